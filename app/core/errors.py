@@ -1,0 +1,42 @@
+"""Errors of the numerical core; the application's own tree in `app.errors` grows from the same root.
+
+    GainlineError
+    └── InputError            something that came in is not usable
+        ├── GainsError        a gain vector that may not be flown
+        └── TrajectoryError   a recorded flight that cannot be scored
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One refused field: its name as the caller wrote it (dotted, `gains.kp`), and why it was refused."""
+
+    field: str
+    reason: str
+
+
+class GainlineError(Exception):
+    """What happened and what it means (`message`), and what to do about it (`hint`)."""
+
+    def __init__(self, message: str, *, hint: str, problems: tuple[Problem, ...] = ()) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.problems = problems
+
+    def __str__(self) -> str:
+        return " ".join((self.message, *(f"{p.field}: {p.reason}." for p in self.problems), self.hint))
+
+
+class InputError(GainlineError):
+    """Something that came in from outside cannot be used; `problems` names the fields."""
+
+
+class GainsError(InputError):
+    """A gain vector that may not be flown."""
+
+
+class TrajectoryError(InputError):
+    """A recorded flight that cannot be scored."""

@@ -1,0 +1,114 @@
+"""Policies: named gain vectors, and the space of those a campaign may choose from."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.errors import GainsError, InputError, Problem
+
+Vector = NDArray[np.float64]
+Gains = Mapping[str, float]
+
+_HINT: Final = "Correct the named gains and send the set again; nothing was changed."
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """One tunable gain, in the controller's own counts or units; `scale` is the step that matters for it."""
+
+    name: str
+    title: str
+    unit: str
+    lower: float
+    upper: float
+    scale: float
+    default: float
+    integer: bool
+
+    def refusal(self, value: object) -> str | None:
+        """Why `value` cannot be flown as this gain, or None when it can."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return "must be a number"
+        if not math.isfinite(value):
+            return "must be a finite number"
+        if self.integer and value != int(value):
+            return f"must be a whole number of counts, got {value:g}"
+        if not self.lower <= value <= self.upper:
+            return f"must lie in {self.lower:g} … {self.upper:g} {self.unit}, got {value:g}"
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class PolicySpace:
+    """The gains of an experiment in a fixed order, with their bounds."""
+
+    gains: tuple[Gain, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(gain.name for gain in self.gains)
+
+    @property
+    def lower(self) -> Vector:
+        return np.array([gain.lower for gain in self.gains])
+
+    @property
+    def upper(self) -> Vector:
+        return np.array([gain.upper for gain in self.gains])
+
+    @property
+    def scale(self) -> Vector:
+        return np.array([gain.scale for gain in self.gains])
+
+    @property
+    def default(self) -> Vector:
+        return np.array([gain.default for gain in self.gains])
+
+    def check(self, gains: Mapping[str, object], *, field: str = "gains") -> dict[str, float]:
+        """The same gains, complete and in order.
+
+        Raises GainsError naming every missing, unknown, non-finite, fractional or out-of-bounds gain.
+        """
+        unknown = [Problem(f"{field}.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
+                   for name in gains if name not in self.names]
+        missing = [Problem(f"{field}.{name}", "is missing") for name in self.names if name not in gains]
+        refused = [Problem(f"{field}.{gain.name}", reason) for gain in self.gains
+                   if gain.name in gains and (reason := gain.refusal(gains[gain.name])) is not None]
+        if problems := (*unknown, *missing, *refused):
+            raise GainsError("These gains cannot be flown.", hint=_HINT, problems=problems)
+        return self.mapping(np.array([gains[name] for name in self.names], dtype=np.float64))
+
+    def vector(self, gains: Gains) -> Vector:
+        """Shape (n,), in the order of `names`."""
+        return np.array([gains[name] for name in self.names], dtype=np.float64)
+
+    def mapping(self, vector: Vector) -> dict[str, float]:
+        """Named gains; integer gains come out as int."""
+        return {gain.name: int(value) if gain.integer else float(value)
+                for gain, value in zip(self.gains, vector, strict=True)}
+
+    def nearest(self, vector: Vector) -> Vector:
+        """The closest flyable vector: clipped to the bounds, integer gains rounded half to even."""
+        rounded = np.where([gain.integer for gain in self.gains], np.rint(vector), vector)
+        return np.clip(rounded, self.lower, self.upper)
+
+    def narrowed(self, bounds: Mapping[str, tuple[float, float]]) -> "PolicySpace":
+        """The same space inside tighter bounds. Raises InputError when they are reversed or reach outside."""
+        problems = [Problem(f"bounds.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
+                    for name in bounds if name not in self.names]
+        for gain in self.gains:
+            low, high = bounds.get(gain.name, (gain.lower, gain.upper))
+            if not (gain.lower <= low < high <= gain.upper):
+                problems.append(Problem(
+                    f"bounds.{gain.name}",
+                    f"must be two rising numbers inside {gain.lower:g} … {gain.upper:g}, got {low:g} … {high:g}"))
+        if problems:
+            raise InputError("These bounds cannot be used.", hint="Choose bounds inside the experiment's own.",
+                             problems=tuple(problems))
+        return PolicySpace(tuple(
+            replace(gain, lower=bounds[gain.name][0], upper=bounds[gain.name][1]) if gain.name in bounds else gain
+            for gain in self.gains))
