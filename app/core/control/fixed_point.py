@@ -1,0 +1,33 @@
+"""Integer arithmetic of a 32-bit autopilot, the same compiled and interpreted."""
+
+from typing import Final
+
+from app.core.kernels import kernel
+
+INT32_MIN: Final = -(2**31)
+INT32_MAX: Final = 2**31 - 1
+
+
+@kernel
+def wrap32(value: int) -> int:
+    """The 32-bit two's-complement integer with the same low 32 bits."""
+    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+
+@kernel
+def divide(dividend: int, divisor: int) -> int:
+    """Quotient truncated toward zero, as C divides. Exact for 32-bit operands, whose quotients a double can tell apart
+    (two different ones lie at least 2⁻³¹ of their size apart, a double resolves 2⁻⁵³)."""
+    return int(dividend / divisor)
+
+
+@kernel
+def limit(value: int, low: int, high: int) -> int:
+    """`value`, held within `low` … `high`."""
+    return low if value < low else min(value, high)
+
+
+@kernel
+def fix(value: float, fraction_bits: int) -> int:
+    """`value`·2ⁿ truncated toward zero."""
+    return int(value * (1 << fraction_bits))

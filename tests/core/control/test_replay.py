@@ -1,0 +1,85 @@
+"""The replica against recorded runs of the original loop (origin: tests/data/vertical_loop/README.md)."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.core.control.fixed_point import INT32_MAX
+from app.core.control.replay import INPUTS, OUTPUTS, LoopTrace, replay_trace
+from app.core.control.vertical_loop import FULL_THRUST, VerticalLoop
+from app.logs.loop_trace import read_loop_trace
+
+TRACES = sorted((Path(__file__).parents[2] / "data" / "vertical_loop").glob("*.csv.gz"))
+
+
+def column(trace: LoopTrace, name: str) -> list[int]:
+    source, names = (trace.inputs, INPUTS) if name in INPUTS else (trace.outputs, OUTPUTS)
+    return [int(value) for value in source[:, names.index(name)]]
+
+
+def test_all_seven_recorded_traces_are_here() -> None:
+    assert len(TRACES) == 7
+
+
+@pytest.mark.parametrize("path", TRACES, ids=lambda path: path.name)
+def test_the_replica_reproduces_every_column_of_every_row(path: Path) -> None:
+    trace = read_loop_trace(path)
+    replay = replay_trace(trace)
+    assert replay.rows == len(trace) >= 6144
+    assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0)
+    assert replay.exact
+
+
+def test_one_wrong_number_is_found_with_its_row_and_size() -> None:
+    trace = read_loop_trace(TRACES[0])
+    wrong = trace.outputs.copy()
+    wrong[3000, OUTPUTS.index("fb_cmd")] += 7
+    wrong[4000, OUTPUTS.index("fb_cmd")] -= 9
+    replay = replay_trace(LoopTrace(trace.inputs, wrong))
+    assert not replay.exact
+    assert replay.first_different_row == 3000
+    assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0) | {"fb_cmd": 9}
+
+
+@pytest.mark.parametrize("path", [path for path in TRACES if not path.name.startswith("wild")],
+                         ids=lambda path: path.name)
+def test_in_flight_is_detected_when_the_recorded_autopilot_detected_it(path: Path) -> None:
+    """Within one step: the recorder summed 0.05 s in floating point, the detector here counts exactly."""
+    trace = read_loop_trace(path)
+    thrusts = column(trace, "thrust")
+    loop = VerticalLoop()
+    loop.start(0, 0)
+    detected = []
+    for row, thrust in zip(trace.inputs.tolist(), thrusts, strict=True):
+        detected.append(loop.detect_flight())
+        assert loop.step(*row) == thrust
+    assert abs(detected.index(True) - column(trace, "in_flight").index(1)) <= 1
+    assert all(detected[detected.index(True):])
+
+
+def test_gains_that_wrap_the_integrator_turn_full_up_into_full_down_and_are_reported() -> None:
+    """ki·sum wraps once ki > 2³¹ / 2 000 000 ≈ 1073."""
+    thrusts, products = [], []
+    for ki in (1073, 1074):
+        loop = VerticalLoop()
+        loop.start(0, 0)
+        thrusts.append([loop.step(1, 3 << 8, 0, ki, 0, 0, 0, 16384, True) for _ in range(4000)][-1])
+        products.append(loop.largest_product)
+    assert thrusts == [FULL_THRUST, 0]
+    assert products == [1073 * 2_000_000, 1074 * 2_000_000]
+    assert products[0] <= INT32_MAX < products[1]
+
+
+def test_throttle_mode_passes_the_thrust_through_and_keeps_the_last_commands() -> None:
+    loop = VerticalLoop()
+    loop.start(0, 0)
+    loop.step(1, 768, 283, 13, 82, 0, 0, 16384, False)
+    commands = (loop.ff_cmd, loop.fb_cmd)
+    assert loop.step(0, 4321, 283, 13, 82, -100, 5, 16384, False) == 4321
+    assert (loop.ff_cmd, loop.fb_cmd) == commands
+    assert (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err) == (-100, 5, 0, 0)
+
+
+def test_a_trace_knows_its_length() -> None:
+    assert len(LoopTrace(np.zeros((5, 9), dtype=np.int64), np.zeros((5, 7), dtype=np.int64))) == 5
