@@ -1,0 +1,81 @@
+"""What every figure is, and the card that a page, a report or a notebook shows it on."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Protocol
+
+import plotly.graph_objects as go
+
+Cell = str | int | float | None
+PlotlyJson = Mapping[str, object]
+CardState = Literal["ready", "waiting", "failed"]
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a data table; `digits` after the point, None for text."""
+
+    name: str
+    title: str
+    unit: str = ""
+    digits: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The same data as the figure, for those who cannot see it or want the numbers."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Card:
+    """A figure with its table and one sentence that says what it shows.
+
+    `waiting`: there is nothing to draw yet, `reason` says what is missing. `failed`: drawing broke, `reason` says how.
+    """
+
+    name: str
+    title: str
+    state: CardState
+    summary: str = ""
+    reason: str = ""
+    figure: PlotlyJson | None = None
+    table: Table | None = None
+
+
+class Figure(Protocol):
+    """One figure over plain data; it never reads anything else."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+
+    def not_ready(self) -> str | None:
+        """Why there is nothing to draw yet, or None."""
+        ...
+
+    def compute(self) -> Card: ...
+
+
+def card_of(figure: Figure) -> Card:
+    """The figure's card; a figure that is not ready or breaks yields a card that says so, never an exception."""
+    try:
+        if (missing := figure.not_ready()) is not None:
+            return Card(name=figure.name, title=figure.title, state="waiting", reason=missing)
+        return figure.compute()
+    except Exception:
+        logger.exception("figure %s failed", figure.name)
+        return Card(name=figure.name, title=figure.title, state="failed",
+                    reason="This figure could not be drawn. The flights are safe; the server's log says why.")
+
+
+def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:
+    """Traces and layout as Plotly's own JSON, every property checked. Raises ValueError on one that does not exist."""
+    figure = go.Figure(data=list(traces), layout=dict(layout))
+    figure.layout.template = None
+    json: PlotlyJson = figure.to_plotly_json()
+    return json

@@ -1,0 +1,109 @@
+"""The gains of each flight, one small panel a gain, the proposed ones as open diamonds."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from app.core.policy import Gain
+from app.figures import theme
+from app.figures.base import Card, Column, Table, plotly_json
+from app.figures.history import History
+from app.figures.theme import PALETTES, Palette, ThemeName
+
+GAP = 0.09
+
+
+@dataclass(frozen=True, slots=True)
+class GainsFigure:
+    """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `next`."""
+
+    history: History
+    theme: ThemeName = "light"
+    name: ClassVar[str] = "gains"
+    title: ClassVar[str] = "Gains per flight"
+
+    def not_ready(self) -> str | None:
+        if self.history.flights or self.history.proposal is not None:
+            return None
+        return "The gains of each flight appear here once the first ones are proposed."
+
+    def compute(self) -> Card:
+        palette, history = PALETTES[self.theme], self.history
+        panels = list(enumerate(history.gains, start=1))
+        traces = [trace for index, gain in panels for trace in self._panel(palette, index, gain)]
+        last = max([flight.number for flight in history.flights]
+                   + ([history.proposal.number] if history.proposal is not None else []))
+        axes: dict[str, object] = {}
+        for index, gain in panels:
+            axes |= self._axes(palette, index, gain, last)
+        layout = theme.layout(palette, showlegend=False, uirevision="gains", **axes)
+        return Card(name=self.name, title=self.title, state="ready", summary=self._summary(),
+                    figure=plotly_json(traces, layout), table=self._table())
+
+    def _panel(self, palette: Palette, index: int, gain: Gain) -> list[dict[str, object]]:
+        colour = palette.gains[(index - 1) % len(palette.gains)]
+        flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
+        common = {"type": "scatter", "xaxis": _axis("x", index), "yaxis": _axis("y", index), "cliponaxis": False}
+        unit = f" {gain.unit}" if gain.unit else ""
+        flown: dict[str, object] = {
+            **common, "mode": "lines+markers", "name": gain.title, "x": [flight.number for flight in flights],
+            "y": [flight.gains[gain.name] for flight in flights], "line": {**theme.line(colour, 2), "shape": "hv"},
+            "marker": {"size": [12 if flight is best else 7 for flight in flights], "color": colour,
+                       "symbol": ["star" if flight is best else "circle" for flight in flights]},
+            "meta": {"role": "flown", "gain": gain.name},
+            "hovertemplate": f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>"}
+        if proposal is None:
+            return [flown]
+        return [flown, {
+            **common, "mode": "markers", "name": f"{gain.title}, proposed", "x": [proposal.number],
+            "y": [proposal.gains[gain.name]], "meta": {"role": "proposed", "gain": gain.name},
+            "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+            "hovertemplate": f"<b>Flight %{{x}}, proposed</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>"}]
+
+    def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
+        count = len(self.history.gains)
+        height = (1 - GAP * (count - 1)) / count
+        top = 1 - (index - 1) * (height + GAP)
+        values = [flight.gains[gain.name] for flight in self.history.flights]
+        if self.history.proposal is not None:
+            values.append(self.history.proposal.gains[gain.name])
+        low, high = padded(min(values), max(values), gain)
+        bottom = index == count
+        x = {"range": [0.5, last + 0.6], "dtick": max(1, -(-last // 12)), "showgrid": False,
+             "showticklabels": bottom, "anchor": _axis("y", index), "matches": None if index == 1 else "x"}
+        return {
+            "xaxis" + _suffix(index): theme.titled(palette, "Flight", **x) if bottom else theme.axis(palette, **x),
+            "yaxis" + _suffix(index): theme.titled(palette, gain.name, domain=[max(0.0, top - height), top],
+                                                   anchor=_axis("x", index), range=[low, high], nticks=4),
+        }
+
+    def _summary(self) -> str:
+        best = self.history.best
+        if best is None:
+            return "No valid flight yet."
+        return f"Best gains, flight {best.number}: " + ", ".join(
+            f"{gain.name} {best.gains[gain.name]:g}" for gain in self.history.gains) + "."
+
+    def _table(self) -> Table:
+        rows: list[tuple[str | int | float | None, ...]] = [
+            (str(flight.number), *(flight.gains[gain.name] for gain in self.history.gains))
+            for flight in self.history.flights]
+        if self.history.proposal is not None:
+            rows.append(("next", *(self.history.proposal.gains[gain.name] for gain in self.history.gains)))
+        columns = (Column("flight", "Flight"),
+                   *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else 4) for gain in self.history.gains))
+        return Table(columns, tuple(rows))
+
+
+def padded(low: float, high: float, gain: Gain) -> tuple[float, float]:
+    """A range around `low` … `high` that is at least half a scale wide, so that a change of one count looks small."""
+    width = max(high - low, 0.5 * gain.scale)
+    middle = (low + high) / 2
+    return max(gain.lower - 0.05 * width, middle - 0.65 * width), middle + 0.65 * width
+
+
+def _suffix(index: int) -> str:
+    return "" if index == 1 else str(index)
+
+
+def _axis(letter: str, index: int) -> str:
+    return letter + _suffix(index)

@@ -1,0 +1,85 @@
+"""What the figures draw: a campaign's flights as plain data."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from app.core.policy import Gain, Gains
+from app.core.trajectory import Samples
+
+Outcome = Literal["captured", "valid", "aborted", "invalid", "lost"]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One line: seconds since the command, shape (n,), and values of the same shape."""
+
+    time_s: Samples
+    values: Samples
+
+    def at(self, time_s: float) -> float | None:
+        """Linear interpolation, None outside of the record."""
+        if len(self.time_s) == 0 or not self.time_s[0] <= time_s <= self.time_s[-1]:
+            return None
+        return float(np.interp(time_s, self.time_s, self.values))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightData:
+    """One flown trial. `error` and `predicted_error` in the experiment's error unit, None where there is none."""
+
+    number: int
+    gains: Gains
+    outcome: Outcome
+    curve: Curve | None
+    error: float | None
+    predicted_error: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NextFlight:
+    """The proposed next flight, with the model's curve for it where there is one."""
+
+    number: int
+    gains: Gains
+    curve: Curve | None
+    predicted_error: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """A campaign as its figures see it.
+
+    `stop_improvement`: the share of the best error by which a flight must beat it to count as progress, None when the
+    stop rule does not ask. `flights` in the order of their numbers.
+    """
+
+    output_title: str
+    output_unit: str
+    error_unit: str
+    gains: tuple[Gain, ...]
+    set_point: Curve
+    reference: Curve | None
+    flights: tuple[FlightData, ...]
+    proposal: NextFlight | None = None
+    stop_improvement: float | None = None
+
+    @property
+    def valid(self) -> tuple[FlightData, ...]:
+        """Valid flights with an error, the only ones that compete."""
+        return tuple(flight for flight in self.flights if flight.outcome == "valid" and flight.error is not None)
+
+    @property
+    def best(self) -> FlightData | None:
+        """The valid flight with the lowest error, the earlier one of equals."""
+        return min(self.valid, key=_error, default=None)
+
+    @property
+    def latest(self) -> FlightData | None:
+        return self.flights[-1] if self.flights else None
+
+
+def _error(flight: FlightData) -> float:
+    assert flight.error is not None
+    return flight.error

@@ -1,0 +1,45 @@
+"""Axis ranges that one wild flight cannot spoil, and numbers short enough to send."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import median_low
+
+import numpy as np
+from tsdownsample import MinMaxLTTBDownsampler
+
+from app.core.trajectory import Samples
+
+MARGIN = 0.06
+
+
+@dataclass(frozen=True, slots=True)
+class RobustRange:
+    """`low` … `high` for an axis; `outside` are the indices of the series that leave it at the top."""
+
+    low: float
+    high: float
+    outside: tuple[int, ...]
+
+
+def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: float = 5.0) -> RobustRange:
+    """A range that shows `low` … `high` and every peak that is not an outlier.
+
+    A peak is an outlier when it exceeds both half again of `low` … `high` and the (low) median of the peaks by more
+    than `spread` times their median absolute deviation.
+    """
+    middle = median_low(peaks) if peaks else high
+    deviation = median_low([abs(peak - middle) for peak in peaks]) if peaks else 0.0
+    limit = max(high + 0.5 * (high - low), middle + spread * deviation)
+    outside = tuple(index for index, peak in enumerate(peaks) if peak > limit)
+    top = max([high, *(peak for peak in peaks if peak <= limit)])
+    pad = MARGIN * (top - low)
+    return RobustRange(low=low - pad, high=top + pad, outside=outside)
+
+
+def thinned(time_s: Samples, values: Samples, points: int) -> tuple[list[float], list[float]]:
+    """At most `points` samples that keep the curve's look and its extremes (MinMaxLTTB), at 0.1 ms and 0.1 mm."""
+    if len(time_s) > points:
+        downsampler = MinMaxLTTBDownsampler()  # type: ignore[no-untyped-call]
+        chosen = downsampler.downsample(np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
+        time_s, values = time_s[chosen], values[chosen]
+    return [round(float(t), 4) for t in time_s], [round(float(v), 4) for v in values]

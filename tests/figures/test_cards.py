@@ -1,0 +1,59 @@
+import logging
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pytest
+
+from app.figures import CAMPAIGN_FIGURES
+from app.figures.base import Card, card_of
+from app.figures.theme import PALETTES, Palette
+from tests.figures.builders import flight, history
+
+
+@dataclass(frozen=True)
+class Broken:
+    name: ClassVar[str] = "broken"
+    title: ClassVar[str] = "Broken figure"
+
+    def not_ready(self) -> str | None:
+        return None
+
+    def compute(self) -> Card:
+        raise ZeroDivisionError("no flights to divide by")
+
+
+def test_a_figure_that_breaks_becomes_an_error_card_and_a_logged_error(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.ERROR):
+        card = card_of(Broken())
+    assert (card.state, card.figure) == ("failed", None)
+    assert "server's log" in card.reason
+    assert "no flights to divide by" in caplog.text
+
+
+@pytest.mark.parametrize("name", CAMPAIGN_FIGURES)
+def test_every_registered_figure_gives_a_card_for_an_empty_and_for_a_flown_campaign(name: str) -> None:
+    empty = card_of(CAMPAIGN_FIGURES[name](history(), "light"))
+    flown = card_of(CAMPAIGN_FIGURES[name](history(flight(1, 0.3), flight(2, None, outcome="lost")), "dark"))
+    assert empty.state in {"ready", "waiting"}
+    assert (flown.name, flown.state) == (name, "ready")
+    assert flown.table is not None
+    assert all(len(row) == len(flown.table.columns) for row in flown.table.rows)
+
+
+def luminance(colour: str) -> float:
+    """WCAG 2.2 relative luminance of #rrggbb."""
+    channels = [int(colour[start:start + 2], 16) / 255 for start in (1, 3, 5)]
+    linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("palette", PALETTES.values(), ids=PALETTES)
+def test_lines_keep_three_to_one_and_text_four_and_a_half_to_one_against_the_surface(palette: Palette) -> None:
+    lines = (palette.best, palette.earlier, palette.prediction, palette.bad, *palette.gains)
+    assert min(contrast(colour, palette.surface) for colour in lines) >= 3.0
+    assert min(contrast(colour, palette.surface) for colour in (palette.ink, palette.dim)) >= 4.5

@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from app.figures.history import Curve
+from app.figures.scale import robust_range, thinned
+from app.figures.takeoffs import TakeoffsFigure
+from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, layout, proposal, trace, traces
+
+
+def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
+    card = TakeoffsFigure(history(proposal=proposal(1))).compute()
+    assert [one["meta"]["role"] for one in traces(card)] == ["set point", "reference", "prediction", "live"]
+    assert set(trace(card, "set point")["y"]) == {3.0}
+    assert trace(card, "live")["x"] == []
+
+
+def test_a_drawn_curve_follows_the_record_within_a_tenth_of_a_millimetre() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3))).compute()
+    drawn = trace(card, "flight", trial=1)
+    expected = np.interp(drawn["x"], TIME_S, climb(0.3).values)
+    np.testing.assert_allclose(drawn["y"], expected, atol=1e-4)
+    assert max(drawn["y"]) == pytest.approx(climb(0.3).values.max(), abs=1e-4)
+
+
+def test_the_best_flight_is_emphasised_and_drawn_above_all_others() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 0.1), flight(3, 0.2), flight(4, None, outcome="aborted")))
+    drawn = [one["meta"] for one in traces(card.compute()) if one["meta"]["role"] == "flight"]
+    assert [(meta["trial"], meta["standing"]) for meta in drawn] == [
+        (4, "invalid"), (1, "earlier"), (3, "earlier"), (2, "best")]
+    widths = {one["meta"]["trial"]: one["line"]["width"] for one in traces(card.compute()) if "trial" in one["meta"]}
+    assert widths[2] > max(widths[1], widths[3], widths[4])
+
+
+def test_the_prediction_is_dashed_and_named_after_the_next_flight() -> None:
+    drawn = trace(TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute(), "prediction")
+    assert drawn["line"]["dash"] == "dash"
+    assert drawn["name"] == "Flight 2, predicted"
+
+
+def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 2.0, overshoot_m=9.0), flight(3, 0.2))).compute()
+    low, high = layout(card)["yaxis"]["range"]
+    assert low == pytest.approx(-0.2, abs=0.1)
+    assert 3.2 < high < 4.0
+    assert trace(card, "off scale", trial=2)["text"] == ["2 ↑ 12.0"]
+    assert "1 off the scale" in card.summary
+
+
+def test_the_table_gives_the_same_curves_in_numbers() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
+    assert card.table is not None
+    assert [column.name for column in card.table.columns] == [
+        "time_s", "set_point", "reference", "flight_1", "prediction"]
+    at_two_seconds = next(row for row in card.table.rows if row[0] == 2.0)
+    assert list(at_two_seconds) == pytest.approx([2.0, 3.0, 2.0, 3.3, 3.1], abs=1e-4)
+
+
+def test_a_record_that_ends_early_leaves_gaps_in_the_table_instead_of_inventing_numbers() -> None:
+    short = Curve(TIME_S[:300], climb(0.3).values[:300])
+    assert short.at(2.0) == pytest.approx(3.3)
+    assert short.at(20.0) is None
+
+
+def test_many_flights_share_the_points_so_that_the_figure_stays_small() -> None:
+    card = TakeoffsFigure(history(*(flight(number, 0.3) for number in range(1, 201)))).compute()
+    assert sum(len(one["x"]) for one in traces(card)) <= 14_000
+
+
+def test_thinning_keeps_the_extremes_of_a_curve() -> None:
+    x, y = thinned(TIME_S, climb(0.3).values, 100)
+    assert len(x) <= 100
+    assert max(y) == pytest.approx(climb(0.3).values.max(), abs=1e-4)
+    assert (x[0], x[-1]) == (0.0, 32.6)
+
+
+@pytest.mark.parametrize(("peaks", "outside"), [
+    ([], ()), ([3.4], ()), ([3.4, 3.5, 3.3], ()), ([3.4, 9.0], (1,)), ([9.0, 3.4, 3.5, 30.0, 3.3], (0, 3)),
+])
+def test_the_robust_range_leaves_out_outliers_only(peaks: list[float], outside: tuple[int, ...]) -> None:
+    span = robust_range(peaks, low=0.0, high=float(SET_POINT.values.max()))
+    assert span.outside == outside
+    assert span.high >= max([3.0, *(peak for index, peak in enumerate(peaks) if index not in outside)])
+
+
+def test_both_themes_draw_the_same_values_in_different_colours() -> None:
+    light, dark = (TakeoffsFigure(history(flight(1, 0.3)), theme).compute() for theme in ("light", "dark"))
+    assert trace(light, "flight", trial=1)["y"] == trace(dark, "flight", trial=1)["y"]
+    assert trace(light, "flight", trial=1)["line"]["color"] != trace(dark, "flight", trial=1)["line"]["color"]
