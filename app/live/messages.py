@@ -1,0 +1,92 @@
+"""What the worker and the web process say to each other: one JSON object a line, told apart by `type`."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from app.core.errors import InputError
+
+MAX_LINE_BYTES: Final = 256 * 1024
+
+Row = tuple[float, float, float, float, float, float, float]
+"""Seconds since the command, altitude, climb rate, set point, reference (SI, up), share of full thrust, volts."""
+
+Phase = Literal["staging", "flying", "landed", "ended"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Telemetry:
+    """What was measured since the last message of this flight. `error_so_far` is the mean error up to `time_s`, in the
+    experiment's unit; None until the first scored sample."""
+
+    campaign_id: int
+    trial_id: int
+    time_s: float
+    samples: list[Row]
+    error_so_far: float | None
+    type: Literal["telemetry"] = "telemetry"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPhase:
+    """A flight has moved on. It may run ahead of the database, which stays the record; `note` says what a person ought
+    to know meanwhile."""
+
+    campaign_id: int
+    trial_id: int
+    phase: Phase
+    note: str = ""
+    type: Literal["phase"] = "phase"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerHello:
+    """First line of the worker to every client: who it is and what it flies."""
+
+    pid: int
+    version: str
+    flying: list[int] = field(default_factory=list)
+    type: Literal["worker"] = "worker"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Abort:
+    """End this trial's flight now: safe gains, land. `request` comes back in the answer."""
+
+    request: int
+    trial_id: int
+    reason: str
+    type: Literal["abort"] = "abort"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AbortAnswer:
+    """`accepted` is False when the worker is not flying that trial."""
+
+    request: int
+    trial_id: int
+    accepted: bool
+    type: Literal["abort answer"] = "abort answer"
+
+
+FromWorker = Telemetry | FlightPhase | WorkerHello | AbortAnswer
+Message = FromWorker | Abort
+
+_ADAPTER: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+
+
+def encode(message: Message) -> bytes:
+    """One line, its end included."""
+    return _ADAPTER.dump_json(message) + b"\n"
+
+
+def decode(line: bytes) -> Message:
+    """Raises InputError when the line is none of the messages above."""
+    try:
+        return _ADAPTER.validate_json(line)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InputError(
+            f"The live link carried a line that is no message: {'.'.join(map(str, first['loc']))} {first['msg']}.",
+            hint="Run the web process and the worker from the same version of Gainline.") from error

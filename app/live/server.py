@@ -1,0 +1,124 @@
+"""The worker's end of the live link: it listens, publishes, and takes aborts, on a thread of its own.
+
+Neither direction waits for storage or for a flight: an abort is handed on from the socket's thread at once, and a
+client too slow to read loses telemetry instead of holding up the flight.
+"""
+
+import asyncio
+import socket
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+import structlog
+
+from app.core.errors import InputError
+from app.live.messages import (
+    MAX_LINE_BYTES,
+    Abort,
+    AbortAnswer,
+    FlightPhase,
+    FromWorker,
+    Telemetry,
+    WorkerHello,
+    decode,
+    encode,
+)
+
+SLOW_CLIENT_BYTES: Final = 256 * 1024
+"""Unread bytes beyond which a client gets no telemetry until it has caught up."""
+STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
+"""Unread bytes beyond which a client is dropped; it reconnects and reads the database."""
+
+_log = structlog.get_logger(__name__)
+
+
+class LiveServer:
+    """Listens at `path` between enter and exit.
+
+    `abort(trial_id, reason)` is called on the socket's thread and says whether that trial flies; `hello()` describes
+    the worker to a new client. Both must return at once.
+    """
+
+    def __init__(self, path: Path, *, abort: Callable[[int, str], bool], hello: Callable[[], WorkerHello]) -> None:
+        self._path = path
+        self._abort = abort
+        self._hello = hello
+        self._writers: set[asyncio.StreamWriter] = set()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="live", daemon=True)
+
+    def __enter__(self) -> Self:
+        listener = _listen(self._path)
+        self._thread.start()
+        asyncio.run_coroutine_threadsafe(self._open(listener), self._loop).result()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+        self._path.unlink(missing_ok=True)
+
+    def publish(self, message: Telemetry | FlightPhase) -> None:
+        """Send to every client, from any thread, without waiting."""
+        self._loop.call_soon_threadsafe(self._send_all, message)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+
+    async def _open(self, listener: socket.socket) -> None:
+        self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=MAX_LINE_BYTES)
+
+    async def _close(self) -> None:
+        self._server.close()
+        for writer in tuple(self._writers):
+            writer.close()
+        await asyncio.sleep(0)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._writers.add(writer)
+        try:
+            writer.write(encode(self._hello()))
+            while line := await reader.readline():
+                self._answer(line, writer)
+        except (ConnectionError, InputError, ValueError) as error:
+            _log.warning("live client dropped", why=str(error))
+        finally:
+            self._writers.discard(writer)
+            writer.close()
+
+    def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
+        message = decode(line)
+        if not isinstance(message, Abort):
+            raise InputError(f"A client sent {message.type!r}, which only the worker sends.",
+                             hint="Connect to the worker's socket with Gainline only.")
+        accepted = self._abort(message.trial_id, message.reason)
+        _log.info("abort asked", trial_id=message.trial_id, reason=message.reason, accepted=accepted)
+        writer.write(encode(AbortAnswer(request=message.request, trial_id=message.trial_id, accepted=accepted)))
+
+    def _send_all(self, message: FromWorker) -> None:
+        line = encode(message)
+        for writer in tuple(self._writers):
+            unread = writer.transport.get_write_buffer_size()
+            if unread > STUCK_CLIENT_BYTES:
+                writer.transport.abort()
+            elif unread <= SLOW_CLIENT_BYTES or not isinstance(message, Telemetry):
+                writer.write(line)
+
+
+def _listen(path: Path) -> socket.socket:
+    """A bound socket that only this user may open: nobody can connect before it listens, which is after the chmod.
+
+    The caller holds the worker's lock, so a file in the way belongs to a dead worker.
+    """
+    path.unlink(missing_ok=True)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    listener.bind(str(path))
+    path.chmod(0o600)
+    return listener

@@ -1,0 +1,41 @@
+"""Notices that another connection has written to the database, for the price of one PRAGMA a look."""
+
+import sqlite3
+import threading
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+from urllib.parse import quote
+
+LOOK_EVERY_S: Final = 0.02
+
+
+class DatabaseWatch:
+    """Follows SQLite's `PRAGMA data_version`, which changes with every commit of any other connection.
+
+    Belongs to the thread that enters it. The file must exist.
+    """
+
+    def __init__(self, database: Path) -> None:
+        self._database = database
+
+    def __enter__(self) -> Self:
+        self._connection = sqlite3.connect(
+            f"file:{quote(str(self._database))}?mode=ro", uri=True, isolation_level=None)
+        self._seen = -1
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self._connection.close()
+
+    def changed(self) -> bool:
+        """Whether anything was committed since the last look; true at the first."""
+        (version,) = self._connection.execute("PRAGMA data_version").fetchone()
+        seen, self._seen = self._seen, int(version)
+        return seen != self._seen
+
+    def wait(self, stop: threading.Event, timeout_s: float) -> bool:
+        """Sleep until something is committed (true), `stop` is set or the time is over (false)."""
+        looks = max(1, round(timeout_s / LOOK_EVERY_S))
+        return any(self.changed() for _ in range(looks) if not stop.wait(LOOK_EVERY_S))

@@ -1,0 +1,68 @@
+"""One holder at a time: locks that the operating system frees when their process ends, however it ends."""
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+POLL_S: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Holder:
+    """Who holds a lock: process id, and where it can be found (a web address, or nothing)."""
+
+    pid: int
+    address: str = ""
+
+    def __str__(self) -> str:
+        return f"process {self.pid}" + (f" at {self.address}" if self.address else "")
+
+
+class LockedError(Exception):
+    """The lock is held; `holder` is None when it has not said who it is."""
+
+    def __init__(self, holder: Holder | None) -> None:
+        super().__init__(f"held by {holder or 'another process'}")
+        self.holder = holder
+
+
+@contextmanager
+def exclusive(path: Path, *, address: str = "", keep_waiting: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """Hold the lock file at `path`. Raises LockedError when another process does and `keep_waiting()` is false."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        while not _take(descriptor):
+            if not keep_waiting():
+                raise LockedError(_holder(descriptor))
+            time.sleep(POLL_S)
+        _sign(descriptor, Holder(pid=os.getpid(), address=address))
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _take(descriptor: int) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _sign(descriptor: int, holder: Holder) -> None:
+    with suppress(OSError):  # a full disk costs the signature, which is a courtesy, not the lock
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, json.dumps(asdict(holder)).encode(), 0)
+
+
+def _holder(descriptor: int) -> Holder | None:
+    try:
+        return Holder(**json.loads(os.pread(descriptor, 4096, 0)))
+    except (ValueError, TypeError):
+        return None

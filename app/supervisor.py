@@ -1,0 +1,76 @@
+"""Keeps one child process running: started again with back-off when it dies, stopped with patience."""
+
+import threading
+import time
+from collections.abc import Callable
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from types import TracebackType
+from typing import Final, Generic, Self, TypeVar
+
+import structlog
+
+FIRST_PAUSE_S: Final = 0.2
+LONGEST_PAUSE_S: Final = 10.0
+HEALTHY_AFTER_S: Final = 20.0
+"""A child that lived this long starts again after the shortest pause."""
+PATIENCE_S: Final = 20.0
+"""How long a child that was asked to stop may take to land what flies and record it."""
+
+_log = structlog.get_logger(__name__)
+T = TypeVar("T")
+
+
+class Supervisor(Generic[T]):
+    """Runs `target(argument)` in a spawned process between enter and exit."""
+
+    def __init__(self, target: Callable[[T], None], argument: T, *, name: str) -> None:
+        self._target = target
+        self._argument = argument
+        self._name = name
+        self._stopping = threading.Event()
+        self._process: BaseProcess | None = None
+        self._thread = threading.Thread(target=self._watch, name=f"{name} supervisor", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._process = self._start()
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self._stopping.set()
+        self._thread.join()
+        process = self._process
+        if process is None:
+            return
+        if process.is_alive():
+            process.terminate()
+        process.join(PATIENCE_S)
+        if process.is_alive():
+            _log.error("child did not stop and is killed", child=self._name, pid=process.pid, after_s=PATIENCE_S)
+            process.kill()
+            process.join()
+
+    def _start(self) -> BaseProcess:
+        process = get_context("spawn").Process(target=self._target, args=(self._argument,), name=self._name)
+        process.start()
+        _log.info("child started", child=self._name, pid=process.pid)
+        return process
+
+    def _watch(self) -> None:
+        pause_s = FIRST_PAUSE_S
+        started_s = time.monotonic()
+        while not self._stopping.is_set():
+            process = self._process
+            assert process is not None
+            process.join(0.1)
+            if process.is_alive() or self._stopping.is_set():
+                continue
+            lived_s = time.monotonic() - started_s
+            pause_s = FIRST_PAUSE_S if lived_s > HEALTHY_AFTER_S else min(2 * pause_s, LONGEST_PAUSE_S)
+            _log.error("child died and is started again", child=self._name, pid=process.pid, code=process.exitcode,
+                       lived_s=round(lived_s, 1), pause_s=pause_s)
+            if not self._stopping.wait(pause_s):
+                self._process = self._start()
+                started_s = time.monotonic()

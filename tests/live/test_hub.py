@@ -1,0 +1,97 @@
+"""The fan-out to event streams."""
+
+import asyncio
+import sqlite3
+import threading
+from pathlib import Path
+
+from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live
+from app.live.messages import Telemetry
+from app.live.watch import DatabaseWatch
+
+
+def change(number: int) -> Change:
+    return Change(id=number, topic="trial", entity_id=7, campaign_id=1)
+
+
+def telemetry(time_s: float) -> Telemetry:
+    return Telemetry(campaign_id=1, trial_id=7, time_s=time_s, samples=[], error_so_far=None)
+
+
+def test_a_slow_stream_gets_every_change_and_only_the_newest_telemetry() -> None:
+    async def scenario() -> list[Change | Live]:
+        hub = Hub()
+        with hub.subscribe() as stream:
+            for number in range(500):
+                hub.publish(telemetry(float(number)))
+                hub.publish(change(number))
+            items = aiter(stream)
+            return [await anext(items) for _ in range(500 + WAITING_TELEMETRY)]
+
+    items = asyncio.run(scenario())
+    assert [item.id for item in items if isinstance(item, Change)] == list(range(500))
+    assert [item.time_s for item in items if isinstance(item, Telemetry)] == [float(n) for n in range(400, 500)]
+
+
+def test_two_streams_see_the_same() -> None:
+    async def collect(hub: Hub, items: list[Change | Live]) -> None:
+        with hub.subscribe() as stream:
+            items.extend([item async for item in stream])
+
+    async def scenario() -> tuple[list[Change | Live], list[Change | Live]]:
+        hub = Hub()
+        first: list[Change | Live] = []
+        second: list[Change | Live] = []
+        tasks = [asyncio.create_task(collect(hub, items)) for items in (first, second)]
+        await asyncio.sleep(0)
+        for item in (change(1), telemetry(0.1), LinkState(worker=False), change(2)):
+            hub.publish(item)
+            await asyncio.sleep(0.01)
+        hub.close()
+        await asyncio.gather(*tasks)
+        return first, second
+
+    first, second = asyncio.run(scenario())
+    assert first == second == [change(1), telemetry(0.1), LinkState(worker=False), change(2)]
+
+
+def test_a_stream_too_far_behind_is_ended_so_that_it_resumes_from_the_database() -> None:
+    async def scenario() -> int:
+        hub = Hub()
+        with hub.subscribe() as stream:
+            for number in range(WAITING_CHANGES + 1):
+                hub.publish(change(number))
+            return len([item async for item in stream])
+
+    assert asyncio.run(scenario()) == 0
+
+
+def test_a_closed_hub_ends_open_and_new_streams() -> None:
+    async def scenario() -> None:
+        hub = Hub()
+        async with asyncio.timeout(1):
+            with hub.subscribe() as stream:
+                hub.close()
+                assert [item async for item in stream] == []
+            with hub.subscribe() as late:
+                assert [item async for item in late] == []
+
+    asyncio.run(scenario())
+
+
+def test_the_watch_sees_other_connections_commits_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a file with ?&#.sqlite3"
+    with sqlite3.connect(path) as writer:
+        writer.execute("CREATE TABLE t (x)")
+        with DatabaseWatch(path) as watch:
+            assert watch.changed()
+            assert not watch.changed()
+            writer.execute("INSERT INTO t VALUES (1)")
+            assert not watch.changed()
+            writer.commit()
+            assert watch.changed()
+            assert not watch.wait(threading.Event(), 0.04)
+            stop = threading.Event()
+            stop.set()
+            assert not watch.wait(stop, 60)
+    writer.close()

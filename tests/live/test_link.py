@@ -1,0 +1,172 @@
+"""The live link over a real Unix socket, worker's end on its thread, web's end on an event loop."""
+
+import asyncio
+import os
+import socket
+import stat
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from app.core.errors import InputError
+from app.live.address import LONGEST_PATH_BYTES, live_address
+from app.live.client import LinkDownError, LiveClient
+from app.live.messages import FlightPhase, FromWorker, Telemetry, WorkerHello, decode, encode
+from app.live.server import SLOW_CLIENT_BYTES, LiveServer
+
+
+def telemetry(time_s: float = 1.0, rows: int = 1) -> Telemetry:
+    return Telemetry(campaign_id=1, trial_id=2, time_s=time_s, error_so_far=0.25,
+                     samples=[(time_s, 1.5, 0.5, 3.0, 2.5, 0.6, 11.1)] * rows)
+
+
+def server(path: Path, abort: Callable[[int, str], bool] = lambda _trial, _why: False) -> LiveServer:
+    return LiveServer(path, abort=abort, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2]))
+
+
+class Web:
+    """A web process's end: everything it heard, and whether its link is up."""
+
+    def __init__(self, path: Path) -> None:
+        self.heard: list[FromWorker] = []
+        self.links: list[bool] = []
+        self.client = LiveClient(path, on_message=self.heard.append, on_link=self.links.append)
+
+    async def until(self, seen: Callable[[], bool]) -> None:
+        async with asyncio.timeout(5):
+            while not seen():
+                await asyncio.sleep(0.005)
+
+
+@asynccontextmanager
+async def connected(path: Path) -> AsyncIterator[Web]:
+    web = Web(path)
+    task = asyncio.create_task(web.client.run())
+    try:
+        yield web
+    finally:
+        task.cancel()
+
+
+@pytest.mark.parametrize("message", [
+    telemetry(), FlightPhase(campaign_id=1, trial_id=2, phase="landed", note="on the ground"),
+    WorkerHello(pid=1, version="0", flying=[3])], ids=lambda message: message.type)
+def test_every_message_survives_the_line(message: FromWorker) -> None:
+    assert decode(encode(message)) == message
+
+
+@pytest.mark.parametrize("line", [b"", b"{}", b"not json", b'{"type": "launch"}', b'{"type":"abort","request":1}'])
+def test_a_line_that_is_no_message_is_refused_with_a_reason(line: bytes) -> None:
+    with pytest.raises(InputError, match="no message"):
+        decode(line)
+
+
+def test_the_socket_is_open_to_its_owner_only_and_gone_afterwards(tmp_path: Path) -> None:
+    path = tmp_path / "w.sock"
+    with server(path):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert not path.exists()
+
+
+def test_a_long_data_folder_gets_a_short_private_address(tmp_path: Path) -> None:
+    deep = tmp_path / ("d" * 120)
+    deep.mkdir()
+    address = live_address(deep)
+    assert len(os.fsencode(address)) <= LONGEST_PATH_BYTES
+    assert stat.S_IMODE(address.parent.stat().st_mode) == 0o700
+    assert address == live_address(deep)
+    assert address != live_address(tmp_path / ("e" * 120))
+    with server(address):
+        assert stat.S_IMODE(address.stat().st_mode) == 0o600
+
+
+def test_telemetry_and_phases_arrive_in_order(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        with server(tmp_path / "w.sock") as worker:
+            async with connected(tmp_path / "w.sock") as web:
+                await web.until(lambda: web.links == [True])
+                sent = [telemetry(float(n)) for n in range(50)]
+                for message in sent:
+                    worker.publish(message)
+                worker.publish(FlightPhase(campaign_id=1, trial_id=2, phase="landed"))
+                await web.until(lambda: len(web.heard) == 52)
+                assert web.heard[0] == WorkerHello(pid=os.getpid(), version="test", flying=[2])
+                assert web.heard[1:51] == sent
+
+    asyncio.run(scenario())
+
+
+def test_an_abort_reaches_the_worker_and_its_answer_comes_back(tmp_path: Path) -> None:
+    asked: list[tuple[int, str]] = []
+
+    def abort(trial_id: int, reason: str) -> bool:
+        asked.append((trial_id, reason))
+        return trial_id == 2
+
+    async def scenario() -> None:
+        with server(tmp_path / "w.sock", abort):
+            async with connected(tmp_path / "w.sock") as web:
+                await web.until(lambda: web.client.connected)
+                answers = await asyncio.gather(*(web.client.abort(trial, "too high") for trial in (2, 3)))
+                assert [answer.accepted for answer in answers] == [True, False]
+
+    asyncio.run(scenario())
+    assert asked == [(2, "too high"), (3, "too high")]
+
+
+def test_an_abort_without_a_worker_says_so_at_once(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with connected(tmp_path / "w.sock") as web:
+            with pytest.raises(LinkDownError, match="no worker is running"):
+                await web.client.abort(1, "now")
+
+    asyncio.run(scenario())
+
+
+def test_the_web_process_finds_a_restarted_worker_again(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        path = tmp_path / "w.sock"
+        async with connected(path) as web:
+            with server(path):
+                await web.until(lambda: web.client.connected)
+            await web.until(lambda: not web.client.connected)
+            with server(path):
+                await web.until(lambda: web.client.connected)
+        assert web.links[:3] == [True, False, True]
+
+    asyncio.run(scenario())
+
+
+def test_a_client_that_never_reads_loses_telemetry_but_no_phase_and_holds_up_nobody(tmp_path: Path) -> None:
+    path = tmp_path / "w.sock"
+    with server(path) as worker, socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sleeper:
+        sleeper.connect(str(path))
+        sleeper.settimeout(5)
+        reader = sleeper.makefile("rb")
+        assert isinstance(decode(reader.readline()), WorkerHello)
+        count = 4 * SLOW_CLIENT_BYTES // len(encode(telemetry(rows=100))) + 1
+        for number in range(count):
+            worker.publish(telemetry(float(number), rows=100))
+        worker.publish(FlightPhase(campaign_id=1, trial_id=2, phase="landed"))
+        heard = 0
+        while isinstance(decode(reader.readline()), Telemetry):
+            heard += 1
+        assert 0 < heard < count
+
+
+def test_a_client_that_talks_nonsense_is_dropped_and_the_others_stay(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        path = tmp_path / "w.sock"
+        with server(path, lambda _trial, _why: True):
+            async with connected(path) as web:
+                await web.until(lambda: web.client.connected)
+                reader, writer = await asyncio.open_unix_connection(str(path))
+                await reader.readline()
+                writer.write(b"GET / HTTP/1.1\r\n\r\n")
+                assert await reader.read() == b""
+                writer.close()
+                assert (await web.client.abort(2, "still heard")).accepted
+
+    asyncio.run(scenario())
