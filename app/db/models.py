@@ -1,0 +1,271 @@
+"""The tables. States are checked by the database too; what moves between them is in each slice's `states.py`."""
+
+from collections.abc import Iterable
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Final, Literal
+
+from sqlalchemy import JSON, CheckConstraint, Enum, ForeignKey, Index, LargeBinary, MetaData, UniqueConstraint, text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+
+from app.campaigns.states import CampaignState, Outcome
+from app.db.types import UtcDateTime, utc_now
+from app.fleet.states import VehicleState
+from app.jobs.states import JobState
+from app.trials.states import UNDER_WAY, FlightState, TrialState
+
+Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
+JsonObject = dict[str, Any]
+GainsJson = dict[str, float]
+OptionsJson = dict[str, bool | int | float | str]
+
+NAMING: Final = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+class Base(DeclarativeBase):
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
+        datetime: UtcDateTime, JsonObject: JSON, GainsJson: JSON, OptionsJson: JSON,
+        list[str]: JSON, list[list[float]]: JSON,
+    }
+
+
+def _is_one_of(column: str, states: Iterable[StrEnum]) -> str:
+    return f"{column} IN ({', '.join(repr(state.value) for state in states)})"
+
+
+def _state_check(states: type[StrEnum], *, column: str = "state") -> CheckConstraint:
+    return CheckConstraint(_is_one_of(column, states), name=column)
+
+
+def _state_type(states: type[StrEnum]) -> Enum:
+    """Stored as its text; the check is a constraint of its own, so that a migration can change it."""
+    return Enum(states, native_enum=False, length=20, values_callable=lambda every: [state.value for state in every])
+
+
+class Reported:
+    """A row whose changes are told to the browsers."""
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        """Topic, the row's id, and the campaign that it belongs to."""
+        raise NotImplementedError
+
+
+class VehicleRow(Base, Reported):
+    """Something that can fly a trial. A simulation's settings stand in each campaign, the row is shared by all."""
+
+    __tablename__ = "vehicle"
+    __table_args__ = (_state_check(VehicleState),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str] = mapped_column(unique=True)
+    title: Mapped[str]
+    is_real: Mapped[bool]
+    state: Mapped[VehicleState] = mapped_column(_state_type(VehicleState))
+    safe_gains: Mapped[GainsJson]
+    concern: Mapped[str] = mapped_column(default="")
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "vehicle", self.id, None
+
+
+class CampaignRow(Base, Reported):
+    """One vehicle, one experiment, one strategy. `version` counts the edits that people made."""
+
+    __tablename__ = "campaign"
+    __table_args__ = (
+        _state_check(CampaignState),
+        _state_check(Outcome, column="outcome"),
+        Index("ix_campaign_updated_at_id", "updated_at", "id"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    version: Mapped[int] = mapped_column(default=1)
+    name: Mapped[str]
+    state: Mapped[CampaignState] = mapped_column(_state_type(CampaignState), index=True)
+    outcome: Mapped[Outcome | None] = mapped_column(_state_type(Outcome))
+    stop_reason: Mapped[str] = mapped_column(default="")
+    experiment: Mapped[str]
+    strategy: Mapped[str]
+    definition: Mapped[JsonObject]
+    definition_digest: Mapped[str | None]
+    vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
+    vehicle_options: Mapped[OptionsJson]
+    parent_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="SET NULL"), index=True)
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    updated_at: Mapped[datetime] = mapped_column(default=utc_now, onupdate=utc_now)
+
+    vehicle: Mapped[VehicleRow] = relationship(lazy="joined", innerjoin=True)
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "campaign", self.id, self.id
+
+
+class TrajectoryRow(Base):
+    """One recorded or predicted flight, packed by `app.trials.codec`. Written once; the database refuses changes."""
+
+    __tablename__ = "trajectory"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    codec: Mapped[int]
+    columns: Mapped[list[str]]
+    samples: Mapped[int]
+    duration_s: Mapped[float]
+    source: Mapped[str]
+    clock: Mapped[str]
+    checksum: Mapped[str]
+    data: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+
+class TrialRow(Base, Reported):
+    """One flight of one policy. `curve` is the scored output in a few [time_s, value] pairs, for small plots."""
+
+    __tablename__ = "trial"
+    __table_args__ = (
+        _state_check(TrialState),
+        CheckConstraint("state != 'valid' OR error IS NOT NULL", name="valid_is_scored"),
+        UniqueConstraint("campaign_id", "number"),
+        Index("ix_trial_campaign_id_state_error", "campaign_id", "state", "error"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    version: Mapped[int] = mapped_column(default=1)
+    campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"))
+    number: Mapped[int]
+    state: Mapped[TrialState] = mapped_column(_state_type(TrialState))
+    kind: Mapped[str]
+    gains: Mapped[GainsJson]
+    read_back: Mapped[GainsJson | None]
+    proposal_id: Mapped[int | None] = mapped_column(ForeignKey("proposal.id", ondelete="SET NULL"), index=True)
+    predicted_error: Mapped[float | None]
+    gate: Mapped[JsonObject]
+    trajectory_id: Mapped[int | None] = mapped_column(ForeignKey("trajectory.id"), unique=True)
+    error: Mapped[float | None]
+    overshoot_m: Mapped[float | None]
+    curve: Mapped[list[list[float]] | None]
+    settings: Mapped[OptionsJson] = mapped_column(default=dict)
+    reason: Mapped[str] = mapped_column(default="")
+    note: Mapped[str] = mapped_column(default="")
+    seed: Mapped[int]
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    flown_at: Mapped[datetime | None]
+
+    trajectory: Mapped[TrajectoryRow | None] = relationship()
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "trial", self.id, self.campaign_id
+
+
+_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(UNDER_WAY))
+
+
+class FlightRow(Base, Reported):
+    """One order to a vehicle: what it was asked, written before it is sent, and what it answered."""
+
+    __tablename__ = "flight"
+    __table_args__ = (
+        _state_check(FlightState),
+        Index("uq_flight_vehicle_under_way", "vehicle_id", unique=True, sqlite_where=text(_UNDER_WAY_SQL),
+              postgresql_where=text(_UNDER_WAY_SQL)),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
+    trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="CASCADE"), index=True)
+    vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
+    state: Mapped[FlightState] = mapped_column(_state_type(FlightState))
+    gains: Mapped[GainsJson]
+    read_back: Mapped[GainsJson | None]
+    speed: Mapped[float | None]
+    worker: Mapped[str | None]
+    problem: Mapped[str] = mapped_column(default="")
+    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
+    claimed_at: Mapped[datetime | None]
+    heartbeat_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+    trial: Mapped[TrialRow] = relationship()
+    vehicle: Mapped[VehicleRow] = relationship()
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "flight", self.id, self.campaign_id
+
+
+class ProposalRow(Base, Reported):
+    """What a strategy proposed from one history; stale as soon as the campaign's history has another digest."""
+
+    __tablename__ = "proposal"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
+    history_digest: Mapped[str]
+    kind: Mapped[str]
+    gains: Mapped[GainsJson]
+    predicted_error: Mapped[float | None]
+    predicted_id: Mapped[int | None] = mapped_column(ForeignKey("trajectory.id"), unique=True)
+    explanation: Mapped[JsonObject]
+    gate: Mapped[JsonObject]
+    stop_verdict: Mapped[JsonObject]
+    computed_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+    predicted: Mapped[TrajectoryRow | None] = relationship()
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "proposal", self.id, self.campaign_id
+
+
+class JobRow(Base, Reported):
+    """Numeric work in waiting, running or done. `lease_until` passes when its worker falls silent."""
+
+    __tablename__ = "job"
+    __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    state: Mapped[JobState] = mapped_column(_state_type(JobState))
+    campaign_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
+    payload: Mapped[JsonObject] = mapped_column(default=dict)
+    progress: Mapped[float] = mapped_column(default=0.0)
+    progress_note: Mapped[str] = mapped_column(default="")
+    problem: Mapped[JsonObject | None]
+    attempts: Mapped[int] = mapped_column(default=0)
+    worker: Mapped[str | None]
+    lease_until: Mapped[datetime | None]
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    started_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "job", self.id, self.campaign_id
+
+
+class EventRow(Base):
+    """The outbox: what changed, in the order in which it changed. An id is never used twice."""
+
+    __tablename__ = "event"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012 - SQLAlchemy reads it from the class
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    topic: Mapped[str]
+    entity_id: Mapped[int]
+    campaign_id: Mapped[int | None]
+    at: Mapped[datetime]
+
+
+class IdempotencyRow(Base):
+    """The answer that a request with this key got, so that the same request sent again gets the same answer."""
+
+    __tablename__ = "idempotency_key"
+
+    key: Mapped[str] = mapped_column(primary_key=True)
+    fingerprint: Mapped[str]
+    answer: Mapped[str]
+    created_at: Mapped[datetime] = mapped_column(default=utc_now, index=True)

@@ -1,0 +1,28 @@
+"""Change events, written in the transaction of the change itself, so that none is lost and none is false.
+
+The web process reads them in order and tells the browsers. They say that a thing changed, not what it became.
+"""
+
+from typing import Final
+
+from sqlalchemy import delete, insert
+from sqlalchemy.orm import Session, UOWTransaction
+
+from app.db.models import EventRow, Reported
+from app.db.types import utc_now
+
+KEPT_EVENTS: Final = 10_000
+"""A browser that was away for longer than this many changes loads everything anew."""
+_PRUNE_EVERY: Final = 500
+
+
+def record_changes(session: Session, _context: UOWTransaction) -> None:
+    """After-flush hook: one event row for each reported row that was added, changed or deleted."""
+    changed = [row for row in (*session.new, *session.dirty, *session.deleted) if isinstance(row, Reported)]
+    for row in changed:
+        topic, entity_id, campaign_id = row.reported_as()
+        stored = session.connection().execute(insert(EventRow).values(
+            topic=topic, entity_id=entity_id, campaign_id=campaign_id, at=utc_now()))
+        (event_id,) = stored.inserted_primary_key or (0,)
+        if event_id % _PRUNE_EVERY == 0:
+            session.connection().execute(delete(EventRow).where(EventRow.id <= event_id - KEPT_EVENTS))

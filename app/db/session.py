@@ -1,0 +1,110 @@
+"""Connections and transactions: SQLite with a write-ahead log, one transaction per request or task.
+
+Writers begin with BEGIN IMMEDIATE. A transaction that starts as a reader and then writes can fail in the middle,
+because somebody else wrote in between; one that takes the write lock first waits for its turn at the start instead.
+"""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy.engine import URL
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.orm import Session, sessionmaker
+from sqlalchemy.pool import ConnectionPoolEntry
+
+from app.db import outbox
+from app.errors import StorageError
+
+_BUSY_TIMEOUT_MS: Final = 5000
+_BEGIN: Final = "gainline_begin"
+
+
+def open_engine(database_file: Path) -> Engine:
+    """An engine on a SQLite file; nothing is opened before the first statement."""
+    engine = create_engine(
+        URL.create("sqlite+pysqlite", database=str(database_file)),
+        connect_args={"check_same_thread": False},
+        pool_size=8,
+        max_overflow=40,
+    )
+    event.listen(engine, "connect", _on_connect)
+    event.listen(engine, "begin", _on_begin)
+    return engine
+
+
+def _on_connect(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> None:
+    connection.isolation_level = None  # the "begin" event says how a transaction begins, not the driver
+    for pragma in ("journal_mode = WAL", "synchronous = NORMAL", "foreign_keys = ON",
+                   f"busy_timeout = {_BUSY_TIMEOUT_MS}"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _on_begin(connection: Connection) -> None:
+    connection.exec_driver_sql(f"BEGIN {connection.get_execution_options().get(_BEGIN, 'DEFERRED')}")
+
+
+class Database:
+    """The application's database. Thread-safe; every `read` and `write` is a transaction of its own."""
+
+    def __init__(self, database_file: Path) -> None:
+        self.file = database_file
+        self.engine = open_engine(database_file)
+        self._readers = sessionmaker(self.engine, expire_on_commit=False)
+        self._writers = sessionmaker(self.engine.execution_options(**{_BEGIN: "IMMEDIATE"}), expire_on_commit=False)
+        event.listen(self._writers, "after_flush", outbox.record_changes)
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A consistent view of the database; whatever was changed in it is dropped."""
+        with self._translated(), self._readers() as session:
+            yield session
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """One transaction that holds the write lock: committed when the block ends, undone when it raises."""
+        with self._translated(), self._writers.begin() as session:
+            yield session
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        """Tell apart what a person can do something about. Raises StorageError for these, the rest passes."""
+        try:
+            yield
+        except DBAPIError as error:
+            if (known := storage_error(error, self.file)) is not None:
+                raise known from error
+            raise
+
+    def close(self) -> None:
+        self.engine.dispose()
+
+
+def storage_error(error: DBAPIError, database_file: Path) -> StorageError | None:
+    """The storage trouble behind a driver's error, or None when it is of another kind."""
+    message = str(error.orig).lower()
+    for words, (happened, hint) in _TROUBLES.items():
+        if words in message:
+            return StorageError(happened.format(file=database_file), hint=hint.format(file=database_file))
+    return None
+
+
+_TROUBLES: Final = {
+    "is full": ("The disk that holds {file} is full; nothing of this request was stored.",
+                "Free some space there, then do the same again; everything stored before is intact."),
+    "disk i/o error": ("The disk that holds {file} could not be written or read; nothing of this request was stored.",
+                       "Check its free space and its health, then do the same again."),
+    "is locked": ("The database was busy for longer than five seconds; nothing of this request was stored.",
+                  "Do the same again. If it happens often, look for another program that holds {file} open."),
+    "readonly database": ("The database {file} may not be written by this user; nothing of this request was stored.",
+                          "Give this user the right to write the file and its folder, then do the same again."),
+    "unable to open": ("The database {file} cannot be opened.",
+                       "Check that its folder exists and that this user may write there."),
+    "malformed": ("The database {file} is damaged.",
+                  "Stop Gainline and restore the last backup; keep the damaged file, most of it can be recovered."),
+    "not a database": ("The file {file} is not a Gainline database.",
+                       "Choose another data folder (GAINLINE_DATA_DIR), or move this file away."),
+}

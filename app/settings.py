@@ -1,0 +1,44 @@
+"""Settings, and the only reader of the environment: every field is also a variable, `GAINLINE_DATA_DIR` and so on."""
+
+import os
+from pathlib import Path
+from typing import Final
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+APP: Final = Path(__file__).resolve().parent
+CHECKOUT: Final = APP.parent
+
+
+def default_data_dir() -> Path:
+    """`var` in a checkout; elsewhere the folder that the platform keeps for a program's data."""
+    if (CHECKOUT / "dev").is_file() and (CHECKOUT / "pyproject.toml").is_file():
+        return CHECKOUT / "var"
+    home = os.environ.get("XDG_DATA_HOME", "")
+    return (Path(home) if home else Path.home() / ".local" / "share") / "gainline"
+
+
+def default_ui_dir() -> Path:
+    """The built UI: inside an installed package, or what the last build left in a checkout."""
+    packaged = APP / "ui"
+    return packaged if packaged.is_dir() else CHECKOUT / "frontend" / "dist"
+
+
+class Settings(BaseSettings):
+    """What a person may set. Command-line options win over variables, variables over these defaults."""
+
+    model_config = SettingsConfigDict(env_prefix="GAINLINE_", frozen=True, extra="forbid")
+
+    data_dir: Path = Field(default_factory=default_data_dir,
+                           description="folder of the database and of the worker's socket")
+    host: str = Field(default="127.0.0.1", description="address of the dashboard")
+    port: int = Field(default=8000, ge=0, le=65535, description="port of the dashboard; 0 takes a free one")
+    ui_dir: Path = Field(default_factory=default_ui_dir, description="folder of the built dashboard")
+    max_upload_bytes: int = Field(default=48 * 2**20, ge=2**16, description="largest flight record that is taken")
+    lease_s: float = Field(default=30.0, gt=0, description="silence after which a worker's job is given to another")
+    log_level: str = Field(default="info", description="least level of a message that is written to the log")
+
+    @property
+    def database_file(self) -> Path:
+        return self.data_dir / "gainline.sqlite3"

@@ -1,0 +1,91 @@
+"""The life of a trial, and of the flight that a worker carries out for it."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Final
+
+
+class TrialState(StrEnum):
+    """One policy, flown once.
+
+        planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
+           │  ↑───────┘ │        ├──→ aborted
+           │            │        └──→ lost ──→ captured (record recovered) | invalid
+           ├────────────┴──→ cancelled
+           └──→ captured (flown elsewhere, imported)
+
+    valid ↔ invalid and aborted ↔ invalid, with a reason; whatever was computed from the flight is computed again.
+    staged: every gain was written and read back. lost: nobody knows how the flight ended; it is never flown again by
+    itself.
+    """
+
+    PLANNED = "planned"
+    STAGED = "staged"
+    FLYING = "flying"
+    CAPTURED = "captured"
+    VALID = "valid"
+    ABORTED = "aborted"
+    INVALID = "invalid"
+    CANCELLED = "cancelled"
+    LOST = "lost"
+
+
+MOVES: Final[Mapping[TrialState, frozenset[TrialState]]] = {
+    TrialState.PLANNED: frozenset({TrialState.STAGED, TrialState.CANCELLED, TrialState.CAPTURED}),
+    TrialState.STAGED: frozenset({TrialState.FLYING, TrialState.PLANNED, TrialState.CANCELLED}),
+    TrialState.FLYING: frozenset({TrialState.CAPTURED, TrialState.ABORTED, TrialState.LOST}),
+    TrialState.CAPTURED: frozenset({TrialState.VALID, TrialState.ABORTED, TrialState.INVALID}),
+    TrialState.VALID: frozenset({TrialState.INVALID}),
+    TrialState.ABORTED: frozenset({TrialState.INVALID}),
+    TrialState.INVALID: frozenset({TrialState.VALID, TrialState.ABORTED}),
+    TrialState.CANCELLED: frozenset(),
+    TrialState.LOST: frozenset({TrialState.CAPTURED, TrialState.INVALID}),
+}
+
+CLASSES: Final = frozenset({TrialState.VALID, TrialState.ABORTED, TrialState.INVALID})
+"""What a finished flight may be classed as."""
+
+HISTORY: Final = frozenset({TrialState.VALID, TrialState.ABORTED})
+"""The flights that a proposal is computed from."""
+
+ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
+    "fly": frozenset({TrialState.PLANNED}),
+    "cancel": frozenset({TrialState.PLANNED, TrialState.STAGED}),
+    "abort": frozenset({TrialState.STAGED, TrialState.FLYING}),
+    "upload": frozenset({TrialState.PLANNED, TrialState.LOST}),
+    "classify": frozenset({TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID,
+                           TrialState.LOST}),
+    "note": frozenset(TrialState),
+}
+"""What a person may do with a trial, and in which states."""
+
+
+class FlightState(StrEnum):
+    """One order to a vehicle: the worker's queue, and the ledger of what the vehicle was given.
+
+        requested ──→ running ──→ landed | aborted | failed | lost | cancelled
+            └──→ cancelled
+    """
+
+    REQUESTED = "requested"
+    RUNNING = "running"
+    LANDED = "landed"
+    ABORTED = "aborted"
+    FAILED = "failed"
+    LOST = "lost"
+    CANCELLED = "cancelled"
+
+
+UNDER_WAY: Final = frozenset({FlightState.REQUESTED, FlightState.RUNNING})
+"""A vehicle has at most one flight in these states."""
+
+FLIGHT_MOVES: Final[Mapping[FlightState, frozenset[FlightState]]] = {
+    FlightState.REQUESTED: frozenset({FlightState.RUNNING, FlightState.CANCELLED}),
+    FlightState.RUNNING: frozenset({FlightState.LANDED, FlightState.ABORTED, FlightState.FAILED, FlightState.LOST,
+                                    FlightState.CANCELLED}),
+    FlightState.LANDED: frozenset(),
+    FlightState.ABORTED: frozenset(),
+    FlightState.FAILED: frozenset(),
+    FlightState.LOST: frozenset(),
+    FlightState.CANCELLED: frozenset(),
+}
