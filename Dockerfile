@@ -1,0 +1,22 @@
+# One image for the web process and for the worker; docker-compose.yml starts one of each.
+
+FROM python:3.13-slim-trixie AS build
+WORKDIR /src
+COPY . .
+RUN ./dev wheel --out-dir /wheel
+
+FROM python:3.13-slim-trixie
+COPY requirements/run.txt /tmp/requirements.txt
+RUN pip install --no-cache-dir --require-hashes -r /tmp/requirements.txt
+COPY --from=build /wheel /tmp/wheel
+RUN pip install --no-cache-dir --no-deps /tmp/wheel/*.whl \
+    && useradd --create-home --uid 1000 gainline \
+    && install --directory --owner=gainline /var/lib/gainline
+USER gainline
+# The compiled kernels are kept beside the data: a new container starts as fast as an old one.
+ENV GAINLINE_DATA_DIR=/var/lib/gainline \
+    NUMBA_CACHE_DIR=/var/lib/gainline/kernels
+VOLUME /var/lib/gainline
+EXPOSE 8000
+STOPSIGNAL SIGTERM
+CMD ["gainline", "serve", "--host", "0.0.0.0"]
