@@ -3,9 +3,10 @@
 The web process reads them in order and tells the browsers. They say that a thing changed, not what it became.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
-from sqlalchemy import delete, insert
+from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session, UOWTransaction
 
 from app.db.models import EventRow, Reported
@@ -26,3 +27,19 @@ def record_changes(session: Session, _context: UOWTransaction) -> None:
         (event_id,) = stored.inserted_primary_key or (0,)
         if event_id % _PRUNE_EVERY == 0:
             session.connection().execute(delete(EventRow).where(EventRow.id <= event_id - KEPT_EVENTS))
+
+
+def latest_event_id(session: Session) -> int:
+    """The id of the newest event; 0 before the first."""
+    return session.scalar(select(func.max(EventRow.id))) or 0
+
+
+def holds_everything_after(session: Session, event_id: int) -> bool:
+    """Whether every event after this one is still here; false also for an id that was never given out."""
+    oldest, latest = session.execute(select(func.min(EventRow.id), func.max(EventRow.id))).one()
+    return bool((oldest or 1) - 1 <= event_id <= (latest or 0))
+
+
+def events_after(session: Session, event_id: int, *, limit: int) -> Sequence[EventRow]:
+    """The next events in their order, at most `limit`."""
+    return session.scalars(select(EventRow).where(EventRow.id > event_id).order_by(EventRow.id).limit(limit)).all()

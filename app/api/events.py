@@ -1,0 +1,75 @@
+"""One stream of server-sent events a browser tab: what changed, and telemetry while something flies."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Header, Request
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from app import __version__
+from app.db.outbox import holds_everything_after, latest_event_id
+from app.db.session import Database
+from app.live.hub import Change, LinkState
+from app.live.link import Live
+from app.live.messages import FlightPhase, Telemetry
+from app.live.tail import changes_after
+
+RETRY_MS: Final = 1000
+
+router = APIRouter(tags=["events"])
+
+
+@router.get("/api/events", response_class=EventSourceResponse)
+async def events(request: Request, last_event_id: Annotated[str | None, Header()] = None,
+                 ) -> AsyncIterator[ServerSentEvent]:
+    """Follow everything that happens.
+
+    `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
+    entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
+    server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
+    flight and `worker` tells when the worker comes or goes; these carry no id and may be dropped for a slow client.
+    """
+    live: Live = request.app.state.live
+    database: Database = request.app.state.database
+    with live.hub.subscribe() as stream:
+        sent, known = await asyncio.to_thread(_start, database, last_event_id)
+        yield ServerSentEvent(event="hello", id=None if last_event_id else str(sent), retry=RETRY_MS,
+                              data={"version": __version__, "worker": live.worker_running})
+        if not known:
+            yield ServerSentEvent(event="reset", id=str(sent), data={})
+        for change in await asyncio.to_thread(_backlog, database, sent):
+            yield _event(change)
+            sent = change.id
+        async for item in stream:
+            if isinstance(item, Change):
+                if item.id <= sent:
+                    continue
+                sent = item.id
+            yield _event(item)
+
+
+def _start(database: Database, last_event_id: str | None) -> tuple[int, bool]:
+    """The event after which the stream begins, and whether the client's own history is known up to there."""
+    with database.read() as session:
+        latest = latest_event_id(session)
+        if not last_event_id:
+            return latest, True
+        if last_event_id.isdecimal() and holds_everything_after(session, int(last_event_id)):
+            return int(last_event_id), True
+        return latest, False
+
+
+def _backlog(database: Database, event_id: int) -> list[Change]:
+    return list(changes_after(database, event_id))
+
+
+def _event(item: Change | Telemetry | FlightPhase | LinkState) -> ServerSentEvent:
+    match item:
+        case Change():
+            return ServerSentEvent(event="change", id=str(item.id), data={
+                "topic": item.topic, "entity_id": item.entity_id, "campaign_id": item.campaign_id})
+        case LinkState():
+            return ServerSentEvent(event="worker", data={"worker": item.worker})
+        case Telemetry() | FlightPhase():
+            return ServerSentEvent(event=item.type, data=item)

@@ -1,0 +1,66 @@
+"""Everything live in the web process, as one thing: the outbox and the worker's telemetry in, event streams out."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import TypeVar
+
+from app.db.session import Database
+from app.live.address import live_address
+from app.live.client import LiveClient
+from app.live.hub import Hub, LinkState
+from app.live.messages import AbortAnswer, FlightPhase, FromWorker, Telemetry
+from app.live.tail import OutboxTail
+
+T = TypeVar("T")
+
+
+class Live:
+    """The hub of the event streams, and the way to the worker."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self.hub = Hub()
+        self.client = LiveClient(live_address(data_dir), on_message=self._heard,
+                                 on_link=lambda up: self.hub.publish(LinkState(worker=up)))
+
+    @property
+    def worker_running(self) -> bool:
+        return self.client.connected
+
+    async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
+        """Past the database, straight to the worker. Raises LinkDownError when it cannot be told."""
+        return await self.client.abort(trial_id, reason)
+
+    def close(self) -> None:
+        """End every stream."""
+        self.hub.close()
+
+    def _heard(self, message: FromWorker) -> None:
+        if isinstance(message, Telemetry | FlightPhase):
+            self.hub.publish(message)
+
+
+@asynccontextmanager
+async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
+    """Runs between the start and the end of the web process."""
+    live = Live(data_dir)
+    tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
+    await asyncio.to_thread(tail.start)
+    listening = asyncio.create_task(live.client.run())
+    try:
+        yield live
+    finally:
+        live.close()
+        listening.cancel()
+        with suppress(asyncio.CancelledError):
+            await listening
+        await asyncio.to_thread(tail.stop)
+
+
+def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[T], None]) -> Callable[[T], None]:
+    """The same call, made from any thread; what comes after the loop has ended is for nobody."""
+    def later(item: T) -> None:
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(call, item)
+    return later

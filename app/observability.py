@@ -1,0 +1,45 @@
+"""Logs: one JSON object a line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error."""
+
+import logging
+import logging.handlers
+import sys
+from pathlib import Path
+from typing import Final, Literal
+
+import structlog
+from structlog.typing import Processor
+
+MAX_LOG_BYTES: Final = 5_000_000
+KEPT_LOGS: Final = 5
+
+_SHARED: Final[tuple[Processor, ...]] = (
+    structlog.contextvars.merge_contextvars,
+    structlog.stdlib.add_log_level,
+    structlog.stdlib.add_logger_name,
+    structlog.processors.TimeStamper(fmt="iso", utc=True),
+)
+
+
+def configure_logs(data_dir: Path, role: Literal["web", "worker"]) -> None:
+    """Send this process's logs, the libraries' included, to its file and to standard error (readable on a terminal)."""
+    folder = data_dir / "log"
+    folder.mkdir(parents=True, exist_ok=True)
+    to_file = logging.handlers.RotatingFileHandler(
+        folder / f"{role}.log", maxBytes=MAX_LOG_BYTES, backupCount=KEPT_LOGS, delay=True, encoding="utf-8")
+    to_file.setFormatter(_formatter(structlog.processors.JSONRenderer()))
+    to_stderr = logging.StreamHandler()
+    to_stderr.setFormatter(_formatter(
+        structlog.dev.ConsoleRenderer() if sys.stderr.isatty() else structlog.processors.JSONRenderer()))
+    to_stderr.setLevel(logging.WARNING if sys.stderr.isatty() else logging.INFO)
+    logging.basicConfig(level=logging.INFO, handlers=[to_file, to_stderr], force=True)
+    logging.raiseExceptions = False  # a full disk must not turn every log line into a traceback
+    structlog.configure(
+        processors=[structlog.stdlib.filter_by_level, *_SHARED, structlog.processors.format_exc_info,
+                    structlog.stdlib.ProcessorFormatter.wrap_for_formatter],
+        logger_factory=structlog.stdlib.LoggerFactory(), cache_logger_on_first_use=True)
+
+
+def _formatter(renderer: Processor) -> logging.Formatter:
+    return structlog.stdlib.ProcessorFormatter(
+        foreign_pre_chain=[*_SHARED, structlog.processors.format_exc_info],
+        processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer])

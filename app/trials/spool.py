@@ -1,0 +1,133 @@
+"""Flight records on disk before they are in the database, so that neither a full disk nor a crash loses a flight.
+
+Room for the record is claimed before lift-off: a flight whose record would not fit does not start.
+"""
+
+import hashlib
+import io
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from app.core.trajectory import Trajectory
+from app.errors import StorageError
+from app.vehicles.base import Ending, FlightRecord, OptionValue
+
+ROOM_BYTES: Final = 4 * 2**20
+"""Claimed before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
+_UNFINISHED: Final = ".claimed"
+_FINISHED: Final = ".flight"
+
+
+@dataclass(frozen=True, slots=True)
+class Spooled:
+    """A flight record as the spool keeps it, and which flight row it belongs to."""
+
+    flight_id: int
+    record: FlightRecord
+
+
+class Spool:
+    """The spool folder. One file a flight, complete or not there at all."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def claim(self, flight_id: int) -> None:
+        """Take the room for one record. Raises StorageError when the disk has not got it."""
+        path = self._path(flight_id, _UNFINISHED)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            with path.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, ROOM_BYTES)
+        except OSError as error:
+            path.unlink(missing_ok=True)
+            raise StorageError(
+                f"There is no room for the flight's record in {self._folder}: {error.strerror}.",
+                hint=f"Free at least {2 * ROOM_BYTES // 2**20} MB there, then fly again; nothing has moved.") from error
+
+    def keep(self, flight_id: int, record: FlightRecord) -> None:
+        """Write a record into its room, from where on it survives a crash. Raises StorageError when it does not fit."""
+        path = self._path(flight_id, _UNFINISHED)
+        content = _pack(Spooled(flight_id, record))
+        try:
+            with path.open("r+b") as file:
+                file.write(content)
+                file.truncate()
+                os.fsync(file.fileno())
+            path.replace(self._path(flight_id, _FINISHED))
+            _sync_folder(self._folder)
+        except OSError as error:
+            raise StorageError(f"The record of flight {flight_id} could not be written to {path}: {error.strerror}.",
+                               hint="Free some space there; the worker keeps trying while it runs.") from error
+
+    def kept(self) -> list[int]:
+        """The flights whose records wait here."""
+        return sorted(int(path.stem) for path in self._folder.glob(f"*{_FINISHED}"))
+
+    def read(self, flight_id: int) -> Spooled:
+        """Raises StorageError when the file is damaged."""
+        path = self._path(flight_id, _FINISHED)
+        try:
+            return _unpack(path.read_bytes())
+        except (OSError, ValueError, KeyError) as error:
+            raise StorageError(f"The record {path} cannot be read: {error}.",
+                               hint="Keep the file for inspection; the trial stays lost until somebody decides.",
+                               ) from error
+
+    def drop(self, flight_id: int) -> None:
+        """Give the room back: the record is in the database, or the flight never began."""
+        for suffix in (_UNFINISHED, _FINISHED):
+            self._path(flight_id, suffix).unlink(missing_ok=True)
+
+    def set_aside(self, flight_id: int) -> Path:
+        """Put a record that cannot be used out of the way, without losing it."""
+        path = self._path(flight_id, _FINISHED)
+        return path.replace(path.with_suffix(".unusable"))
+
+    def sweep(self) -> None:
+        """Give back the rooms of flights that left no record. Only before anything flies."""
+        for path in self._folder.glob(f"*{_UNFINISHED}"):
+            path.unlink(missing_ok=True)
+
+    def _path(self, flight_id: int, suffix: str) -> Path:
+        return self._folder / f"{flight_id}{suffix}"
+
+
+def _pack(spooled: Spooled) -> bytes:
+    record = spooled.record
+    trajectory = record.trajectory
+    header = {"flight_id": spooled.flight_id, "ending": record.ending, "reason": record.reason,
+              "settings": dict(record.settings), "source": trajectory.source, "clock": trajectory.clock,
+              "channels": list(trajectory.channels)}
+    table = io.BytesIO()
+    np.save(table, np.vstack([trajectory.time_s, *trajectory.channels.values()]), allow_pickle=False)
+    body = json.dumps(header).encode() + b"\n" + table.getvalue()
+    return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
+
+
+def _unpack(content: bytes) -> Spooled:
+    digest, _, body = content.partition(b"\n")
+    if hashlib.sha256(body).hexdigest().encode() != digest:
+        raise ValueError("its checksum is wrong")
+    line, _, table = body.partition(b"\n")
+    header = json.loads(line)
+    time_s, *values = np.load(io.BytesIO(table), allow_pickle=False)
+    channels = dict(zip(header["channels"], values, strict=True))
+    ending: Ending = header["ending"]
+    settings: dict[str, OptionValue] = header["settings"]
+    return Spooled(header["flight_id"], FlightRecord(
+        trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
+        ending=ending, reason=header["reason"], settings=settings))
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
