@@ -14,8 +14,10 @@ from app.figures.history import History
 from app.figures.takeoffs import TakeoffsFigure
 from app.figures.theme import ThemeName
 
-CAMPAIGN_FIGURES: Final[Mapping[str, Callable[[History, ThemeName], Figure]]] = MappingProxyType({
-    "takeoffs": TakeoffsFigure,
-    "errors": ErrorsFigure,
-    "gains": GainsFigure,
-})
+CAMPAIGN_FIGURES: Final[Mapping[str, Callable[[History, ThemeName], Figure]]] = MappingProxyType(
+    {
+        "takeoffs": TakeoffsFigure,
+        "errors": ErrorsFigure,
+        "gains": GainsFigure,
+    }
+)

@@ -69,8 +69,12 @@ def card_of(figure: Figure) -> Card:
         return figure.compute()
     except Exception:
         logger.exception("figure %s failed", figure.name)
-        return Card(name=figure.name, title=figure.title, state="failed",
-                    reason="This figure could not be drawn. The flights are safe; the server's log says why.")
+        return Card(
+            name=figure.name,
+            title=figure.title,
+            state="failed",
+            reason="This figure could not be drawn. The flights are safe; the server's log says why.",
+        )
 
 
 def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:

@@ -26,56 +26,99 @@ class ErrorsFigure:
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history
-        traces = [self._best_so_far(palette), *self._threshold(palette), *self._predicted(palette),
-                  *self._measured(palette), *self._not_counted(palette)]
+        traces = [
+            self._best_so_far(palette),
+            *self._threshold(palette),
+            *self._predicted(palette),
+            *self._measured(palette),
+            *self._not_counted(palette),
+        ]
         scored = [flight for flight in history.flights if flight.error is not None]
         must = [flight.error for flight in history.valid[:1] if flight.error is not None]
-        span = robust_range([flight.error or 0.0 for flight in scored], low=0.0,
-                            high=max(must, default=min(flight.error or 0.0 for flight in scored)))
+        span = robust_range(
+            [flight.error or 0.0 for flight in scored],
+            low=0.0,
+            high=max(must, default=min(flight.error or 0.0 for flight in scored)),
+        )
         traces += [_off_scale(palette, scored[index], span.high, history.error_unit) for index in span.outside]
-        last = max([flight.number for flight in history.flights]
-                   + ([history.proposal.number] if history.proposal is not None else []))
+        last = max(
+            [flight.number for flight in history.flights]
+            + ([history.proposal.number] if history.proposal is not None else [])
+        )
         layout = theme.layout(
-            palette, xaxis=theme.titled(palette, "Flight", range=[0.5, last + 0.6], dtick=max(1, -(-last // 12)),
-                                        showgrid=False),
-            yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, span.high]), uirevision="errors")
-        return Card(name=self.name, title=self.title, state="ready", summary=self._summary(),
-                    figure=plotly_json(traces, layout), table=self._table())
+            palette,
+            xaxis=theme.titled(
+                palette, "Flight", range=[0.5, last + 0.6], dtick=max(1, -(-last // 12)), showgrid=False
+            ),
+            yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, span.high]),
+            uirevision="errors",
+        )
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=self._summary(),
+            figure=plotly_json(traces, layout),
+            table=self._table(),
+        )
 
     def _measured(self, palette: Palette) -> list[dict[str, object]]:
         flights, best = self.history.valid, self.history.best
         if not flights:
             return []
         colours = [palette.best if flight is best else palette.ink for flight in flights]
-        return [{
-            "type": "scatter", "mode": "markers+text", "name": "Measured", "x": [flight.number for flight in flights],
-            "y": [_rounded(flight.error) for flight in flights],
-            "text": [f"{flight.error:.3f}" if flight is best or len(flights) <= 10 else "" for flight in flights],
-            "textposition": "top center", "textfont": {"size": 12, "color": palette.ink}, "cliponaxis": False,
-            "marker": {"size": [13 if flight is best else 9 for flight in flights], "color": colours,
-                       "symbol": ["star" if flight is best else "circle" for flight in flights]},
-            "meta": {"role": "measured"},
-            "hovertemplate": f"<b>Flight %{{x}}</b><br>error %{{y:.4f}} {self.history.error_unit}<extra></extra>",
-        }]
+        return [
+            {
+                "type": "scatter",
+                "mode": "markers+text",
+                "name": "Measured",
+                "x": [flight.number for flight in flights],
+                "y": [_rounded(flight.error) for flight in flights],
+                "text": [f"{flight.error:.3f}" if flight is best or len(flights) <= 10 else "" for flight in flights],
+                "textposition": "top center",
+                "textfont": {"size": 12, "color": palette.ink},
+                "cliponaxis": False,
+                "marker": {
+                    "size": [13 if flight is best else 9 for flight in flights],
+                    "color": colours,
+                    "symbol": ["star" if flight is best else "circle" for flight in flights],
+                },
+                "meta": {"role": "measured"},
+                "hovertemplate": f"<b>Flight %{{x}}</b><br>error %{{y:.4f}} {self.history.error_unit}<extra></extra>",
+            }
+        ]
 
     def _not_counted(self, palette: Palette) -> list[dict[str, object]]:
         flights = [flight for flight in self.history.flights if flight.outcome != "valid" and flight.error is not None]
         if not flights:
             return []
-        return [{
-            "type": "scatter", "mode": "markers", "name": "Not counted", "x": [flight.number for flight in flights],
-            "y": [_rounded(flight.error) for flight in flights], "text": [flight.outcome for flight in flights],
-            "marker": {"size": 10, "symbol": "x-thin", "line": {"width": 2, "color": palette.bad}},
-            "meta": {"role": "not counted"},
-            "hovertemplate": f"<b>Flight %{{x}}, %{{text}}</b><br>%{{y:.4f}} {self.history.error_unit}<extra></extra>",
-        }]
+        return [
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "Not counted",
+                "x": [flight.number for flight in flights],
+                "y": [_rounded(flight.error) for flight in flights],
+                "text": [flight.outcome for flight in flights],
+                "marker": {"size": 10, "symbol": "x-thin", "line": {"width": 2, "color": palette.bad}},
+                "meta": {"role": "not counted"},
+                "hovertemplate": f"<b>Flight %{{x}}, %{{text}}</b><br>%{{y:.4f}} {self.history.error_unit}<extra></extra>",
+            }
+        ]
 
     def _best_so_far(self, palette: Palette) -> dict[str, object]:
         best = best_so_far(self.history)
         numbers = [flight.number for flight in self.history.valid]
-        return {"type": "scatter", "mode": "lines", "name": "Best so far", "x": numbers,
-                "y": [round(value, 6) for value in best], "line": {**theme.line(palette.best, 2), "shape": "hv"},
-                "meta": {"role": "best so far"}, "hoverinfo": "skip"}
+        return {
+            "type": "scatter",
+            "mode": "lines",
+            "name": "Best so far",
+            "x": numbers,
+            "y": [round(value, 6) for value in best],
+            "line": {**theme.line(palette.best, 2), "shape": "hv"},
+            "meta": {"role": "best so far"},
+            "hoverinfo": "skip",
+        }
 
     def _threshold(self, palette: Palette) -> list[dict[str, object]]:
         """What a further flight must get below for the stop rule to call it progress."""
@@ -84,9 +127,18 @@ class ErrorsFigure:
             return []
         value = round(best.error * (1 - improvement), 6)
         last = max(flight.number for flight in self.history.flights)
-        return [{"type": "scatter", "mode": "lines", "name": f"Progress counts below {value:.3f}",
-                 "x": [0.5, last + 1.5], "y": [value, value], "line": theme.line(palette.dim, 1.25, "dot"),
-                 "meta": {"role": "threshold"}, "hoverinfo": "skip"}]
+        return [
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": f"Progress counts below {value:.3f}",
+                "x": [0.5, last + 1.5],
+                "y": [value, value],
+                "line": theme.line(palette.dim, 1.25, "dot"),
+                "meta": {"role": "threshold"},
+                "hoverinfo": "skip",
+            }
+        ]
 
     def _predicted(self, palette: Palette) -> list[dict[str, object]]:
         pairs = [(flight.number, flight.predicted_error) for flight in self.history.flights]
@@ -95,13 +147,19 @@ class ErrorsFigure:
         known = [(number, round(value, 6)) for number, value in pairs if value is not None]
         if not known:
             return []
-        return [{
-            "type": "scatter", "mode": "markers", "name": "Predicted", "x": [number for number, _ in known],
-            "y": [value for _, value in known],
-            "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-            "meta": {"role": "predicted"}, "cliponaxis": False,
-            "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>%{{y:.4f}} {self.history.error_unit}<extra></extra>",
-        }]
+        return [
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "Predicted",
+                "x": [number for number, _ in known],
+                "y": [value for _, value in known],
+                "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+                "meta": {"role": "predicted"},
+                "cliponaxis": False,
+                "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>%{{y:.4f}} {self.history.error_unit}<extra></extra>",
+            }
+        ]
 
     def _summary(self) -> str:
         best, valid = self.history.best, self.history.valid
@@ -116,10 +174,18 @@ class ErrorsFigure:
         unit = self.history.error_unit
         running = dict(zip((flight.number for flight in self.history.valid), best_so_far(self.history), strict=True))
         return Table(
-            (Column("flight", "Flight", digits=0), Column("outcome", "Outcome"), Column("error", "Error", unit, 4),
-             Column("predicted_error", "Predicted", unit, 4), Column("best_so_far", "Best so far", unit, 4)),
-            tuple((flight.number, flight.outcome, flight.error, flight.predicted_error, running.get(flight.number))
-                  for flight in self.history.flights))
+            (
+                Column("flight", "Flight", digits=0),
+                Column("outcome", "Outcome"),
+                Column("error", "Error", unit, 4),
+                Column("predicted_error", "Predicted", unit, 4),
+                Column("best_so_far", "Best so far", unit, 4),
+            ),
+            tuple(
+                (flight.number, flight.outcome, flight.error, flight.predicted_error, running.get(flight.number))
+                for flight in self.history.flights
+            ),
+        )
 
 
 def best_so_far(history: History) -> list[float]:
@@ -137,8 +203,18 @@ def _rounded(value: float | None) -> float | None:
 
 def _off_scale(palette: Palette, flight: FlightData, top: float, unit: str) -> dict[str, object]:
     text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
-    return {"type": "scatter", "mode": "markers+text", "name": text, "x": [flight.number], "y": [top],
-            "text": [f"↑ {flight.error:.2f}"], "textposition": "bottom center", "showlegend": False,
-            "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad}, "textfont": {"color": palette.bad},
-            "cliponaxis": False, "meta": {"role": "off scale", "trial": flight.number},
-            "hovertemplate": f"{text}<extra></extra>"}
+    return {
+        "type": "scatter",
+        "mode": "markers+text",
+        "name": text,
+        "x": [flight.number],
+        "y": [top],
+        "text": [f"↑ {flight.error:.2f}"],
+        "textposition": "bottom center",
+        "showlegend": False,
+        "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},
+        "textfont": {"color": palette.bad},
+        "cliponaxis": False,
+        "meta": {"role": "off scale", "trial": flight.number},
+        "hovertemplate": f"{text}<extra></extra>",
+    }

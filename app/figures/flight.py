@@ -49,22 +49,46 @@ class FlightFigure:
     def compute(self) -> Card:
         palette, record = PALETTES[self.theme], self.record
         assert record.curve is not None
-        lines = [*self._context(palette), _line(f"Flight {record.number}", record.curve, palette.ink, 2.5, "flight",
-                                                f"%{{x:.2f}} s · %{{y:.3f}} {record.output_unit}")]
+        lines = [
+            *self._context(palette),
+            _line(
+                f"Flight {record.number}",
+                record.curve,
+                palette.ink,
+                2.5,
+                "flight",
+                f"%{{x:.2f}} s · %{{y:.3f}} {record.output_unit}",
+            ),
+        ]
         inputs = [self._input(palette, index, title) for index, title in enumerate(record.inputs)]
         span = robust_range([float(record.curve.values.max())], low=0.0, high=float(record.set_point.values.max()))
         top = [0.36, 1.0] if inputs else [0.0, 1.0]
         axes: dict[str, object] = {
-            "yaxis": theme.titled(palette, f"{record.output_title} ({record.output_unit})", domain=top,
-                                  range=[span.low, span.high])}
+            "yaxis": theme.titled(
+                palette, f"{record.output_title} ({record.output_unit})", domain=top, range=[span.low, span.high]
+            )
+        }
         if inputs:
             axes["yaxis2"] = theme.titled(palette, "Share of full thrust", domain=[0.0, 0.28], nticks=4)
         layout = theme.layout(
-            palette, uirevision="flight", **axes,
-            xaxis=theme.titled(palette, "Time since the command (s)", anchor="y2" if inputs else "y",
-                               range=[float(record.curve.time_s[0]) - 0.3, float(record.curve.time_s[-1])]))
-        return Card(name=self.name, title=self.title, state="ready", summary=self._summary(),
-                    figure=plotly_json([*lines, *inputs], layout), table=self._table(record.curve))
+            palette,
+            uirevision="flight",
+            **axes,
+            xaxis=theme.titled(
+                palette,
+                "Time since the command (s)",
+                anchor="y2" if inputs else "y",
+                range=[float(record.curve.time_s[0]) - 0.3, float(record.curve.time_s[-1])],
+            ),
+        )
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=self._summary(),
+            figure=plotly_json([*lines, *inputs], layout),
+            table=self._table(record.curve),
+        )
 
     def _context(self, palette: Palette) -> list[dict[str, object]]:
         record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
@@ -80,24 +104,31 @@ class FlightFigure:
     def _input(self, palette: Palette, index: int, title: str) -> dict[str, object]:
         colour = (palette.ink, *palette.gains)[index % (1 + len(palette.gains))]
         dash = ("solid", "dash", "dot")[index % 3]
-        return {**_line(title, self.record.inputs[title], colour, 1.5, "input", "%{x:.2f} s · %{y:.3f}", dash),
-                "yaxis": "y2"}
+        return {
+            **_line(title, self.record.inputs[title], colour, 1.5, "input", "%{x:.2f} s · %{y:.3f}", dash),
+            "yaxis": "y2",
+        }
 
     def _summary(self) -> str:
         record = self.record
         assert record.curve is not None
         peak = int(np.argmax(record.curve.values))
-        return (f"{record.output_title} of flight {record.number}: highest {record.curve.values[peak]:.2f} "
-                f"{record.output_unit} at {record.curve.time_s[peak]:.1f} s.")
+        return (
+            f"{record.output_title} of flight {record.number}: highest {record.curve.values[peak]:.2f} "
+            f"{record.output_unit} at {record.curve.time_s[peak]:.1f} s."
+        )
 
     def _table(self, curve: Curve) -> Table:
         record = self.record
-        named = [(Column("measured", "Measured", record.output_unit, 3), curve),
-                 (Column("set_point", "Set point", record.output_unit, 3), record.set_point)]
+        named = [
+            (Column("measured", "Measured", record.output_unit, 3), curve),
+            (Column("set_point", "Set point", record.output_unit, 3), record.set_point),
+        ]
         if record.predicted is not None:
             named.append((Column("predicted", "Predicted", record.output_unit, 3), record.predicted))
-        named += [(Column(title.lower().replace(" ", "_"), title, "", 3), inputs)
-                  for title, inputs in record.inputs.items()]
+        named += [
+            (Column(title.lower().replace(" ", "_"), title, "", 3), inputs) for title, inputs in record.inputs.items()
+        ]
         seconds = np.linspace(float(curve.time_s[0]), float(curve.time_s[-1]), TABLE_ROWS)
         rows = []
         for second in seconds:
@@ -106,10 +137,20 @@ class FlightFigure:
         return Table((Column("time_s", "Time", "s", 2), *(column for column, _ in named)), tuple(rows))
 
 
-def _line(name: str, curve: Curve, colour: str, width: float, role: str, hover: str | None,
-          dash: str = "solid") -> dict[str, object]:
+def _line(
+    name: str, curve: Curve, colour: str, width: float, role: str, hover: str | None, dash: str = "solid"
+) -> dict[str, object]:
     x, y = thinned(curve.time_s, curve.values, POINTS)
     reading: dict[str, object] = (
-        {"hoverinfo": "skip"} if hover is None else {"hovertemplate": f"<b>{name}</b><br>{hover}<extra></extra>"})
-    return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "line": theme.line(colour, width, dash),
-            "meta": {"role": role}, **reading}
+        {"hoverinfo": "skip"} if hover is None else {"hovertemplate": f"<b>{name}</b><br>{hover}<extra></extra>"}
+    )
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "x": x,
+        "y": y,
+        "line": theme.line(colour, width, dash),
+        "meta": {"role": role},
+        **reading,
+    }

@@ -30,14 +30,22 @@ class GainsFigure:
         palette, history = PALETTES[self.theme], self.history
         panels = list(enumerate(history.gains, start=1))
         traces = [trace for index, gain in panels for trace in self._panel(palette, index, gain)]
-        last = max([flight.number for flight in history.flights]
-                   + ([history.proposal.number] if history.proposal is not None else []))
+        last = max(
+            [flight.number for flight in history.flights]
+            + ([history.proposal.number] if history.proposal is not None else [])
+        )
         axes: dict[str, object] = {}
         for index, gain in panels:
             axes |= self._axes(palette, index, gain, last)
         layout = theme.layout(palette, showlegend=False, uirevision="gains", **axes)
-        return Card(name=self.name, title=self.title, state="ready", summary=self._summary(),
-                    figure=plotly_json(traces, layout), table=self._table())
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=self._summary(),
+            figure=plotly_json(traces, layout),
+            table=self._table(),
+        )
 
     def _panel(self, palette: Palette, index: int, gain: Gain) -> list[dict[str, object]]:
         colour = palette.gains[(index - 1) % len(palette.gains)]
@@ -45,19 +53,35 @@ class GainsFigure:
         common = {"type": "scatter", "xaxis": _axis("x", index), "yaxis": _axis("y", index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
         flown: dict[str, object] = {
-            **common, "mode": "lines+markers", "name": gain.title, "x": [flight.number for flight in flights],
-            "y": [flight.gains[gain.name] for flight in flights], "line": {**theme.line(colour, 2), "shape": "hv"},
-            "marker": {"size": [12 if flight is best else 7 for flight in flights], "color": colour,
-                       "symbol": ["star" if flight is best else "circle" for flight in flights]},
+            **common,
+            "mode": "lines+markers",
+            "name": gain.title,
+            "x": [flight.number for flight in flights],
+            "y": [flight.gains[gain.name] for flight in flights],
+            "line": {**theme.line(colour, 2), "shape": "hv"},
+            "marker": {
+                "size": [12 if flight is best else 7 for flight in flights],
+                "color": colour,
+                "symbol": ["star" if flight is best else "circle" for flight in flights],
+            },
             "meta": {"role": "flown", "gain": gain.name},
-            "hovertemplate": f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>"}
+            "hovertemplate": f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+        }
         if proposal is None:
             return [flown]
-        return [flown, {
-            **common, "mode": "markers", "name": f"{gain.title}, proposed", "x": [proposal.number],
-            "y": [proposal.gains[gain.name]], "meta": {"role": "proposed", "gain": gain.name},
-            "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-            "hovertemplate": f"<b>Flight %{{x}}, proposed</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>"}]
+        return [
+            flown,
+            {
+                **common,
+                "mode": "markers",
+                "name": f"{gain.title}, proposed",
+                "x": [proposal.number],
+                "y": [proposal.gains[gain.name]],
+                "meta": {"role": "proposed", "gain": gain.name},
+                "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+                "hovertemplate": f"<b>Flight %{{x}}, proposed</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+            },
+        ]
 
     def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
         count = len(self.history.gains)
@@ -68,29 +92,47 @@ class GainsFigure:
             values.append(self.history.proposal.gains[gain.name])
         low, high = padded(min(values), max(values), gain)
         bottom = index == count
-        x = {"range": [0.5, last + 0.6], "dtick": max(1, -(-last // 12)), "showgrid": False,
-             "showticklabels": bottom, "anchor": _axis("y", index), "matches": None if index == 1 else "x"}
+        x = {
+            "range": [0.5, last + 0.6],
+            "dtick": max(1, -(-last // 12)),
+            "showgrid": False,
+            "showticklabels": bottom,
+            "anchor": _axis("y", index),
+            "matches": None if index == 1 else "x",
+        }
         return {
             "xaxis" + _suffix(index): theme.titled(palette, "Flight", **x) if bottom else theme.axis(palette, **x),
-            "yaxis" + _suffix(index): theme.titled(palette, gain.name, domain=[max(0.0, top - height), top],
-                                                   anchor=_axis("x", index), range=[low, high], nticks=4),
+            "yaxis" + _suffix(index): theme.titled(
+                palette,
+                gain.name,
+                domain=[max(0.0, top - height), top],
+                anchor=_axis("x", index),
+                range=[low, high],
+                nticks=4,
+            ),
         }
 
     def _summary(self) -> str:
         best = self.history.best
         if best is None:
             return "No valid flight yet."
-        return f"Best gains, flight {best.number}: " + ", ".join(
-            f"{gain.name} {best.gains[gain.name]:g}" for gain in self.history.gains) + "."
+        return (
+            f"Best gains, flight {best.number}: "
+            + ", ".join(f"{gain.name} {best.gains[gain.name]:g}" for gain in self.history.gains)
+            + "."
+        )
 
     def _table(self) -> Table:
         rows: list[tuple[str | int | float | None, ...]] = [
             (str(flight.number), *(flight.gains[gain.name] for gain in self.history.gains))
-            for flight in self.history.flights]
+            for flight in self.history.flights
+        ]
         if self.history.proposal is not None:
             rows.append(("next", *(self.history.proposal.gains[gain.name] for gain in self.history.gains)))
-        columns = (Column("flight", "Flight"),
-                   *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else 4) for gain in self.history.gains))
+        columns = (
+            Column("flight", "Flight"),
+            *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else 4) for gain in self.history.gains),
+        )
         return Table(columns, tuple(rows))
 
 

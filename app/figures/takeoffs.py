@@ -43,11 +43,19 @@ class TakeoffsFigure:
         traces += [_off_scale(palette, drawn[index], span.high) for index in span.outside]
         unit = history.output_unit
         layout = theme.layout(
-            palette, xaxis=theme.titled(palette, "Time since the command (s)", range=self._time_range()),
+            palette,
+            xaxis=theme.titled(palette, "Time since the command (s)", range=self._time_range()),
             yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[span.low, span.high]),
-            uirevision="takeoffs")
-        return Card(name=self.name, title=self.title, state="ready", summary=self._summary(len(span.outside)),
-                    figure=plotly_json(traces, layout), table=self._table(drawn))
+            uirevision="takeoffs",
+        )
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=self._summary(len(span.outside)),
+            figure=plotly_json(traces, layout),
+            table=self._table(drawn),
+        )
 
     def _time_range(self) -> list[float]:
         return [-0.3, float(self.history.set_point.time_s[-1])]
@@ -67,50 +75,98 @@ class TakeoffsFigure:
         assert flight.curve is not None
         standing = self._standing(flight)
         style = {
-            "best": theme.line(palette.best, 3), "latest": theme.line(palette.ink, 2),
-            "earlier": theme.line(palette.earlier, 1.25), "invalid": theme.line(palette.bad, 1.25, "dot"),
+            "best": theme.line(palette.best, 3),
+            "latest": theme.line(palette.ink, 2),
+            "earlier": theme.line(palette.earlier, 1.25),
+            "invalid": theme.line(palette.bad, 1.25, "dot"),
         }[standing]
-        label = {"best": f"{flight.number} · best", "latest": f"{flight.number} · latest",
-                 "earlier": f"{flight.number}", "invalid": f"{flight.number} · {flight.outcome}"}[standing]
+        label = {
+            "best": f"{flight.number} · best",
+            "latest": f"{flight.number} · latest",
+            "earlier": f"{flight.number}",
+            "invalid": f"{flight.number} · {flight.outcome}",
+        }[standing]
         error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.history.error_unit}"
-        return _trace(f"Flight {label}", flight.curve, points, line=style, legendrank=500 + flight.number,
-                      showlegend=standing in {"best", "latest"} or len(self.history.flights) <= 8,
-                      meta={"role": "flight", "trial": flight.number, "standing": standing},
-                      hovertemplate=f"<b>Flight {label}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
-                                    f"{self.history.output_unit}{error}<extra></extra>")
+        return _trace(
+            f"Flight {label}",
+            flight.curve,
+            points,
+            line=style,
+            legendrank=500 + flight.number,
+            showlegend=standing in {"best", "latest"} or len(self.history.flights) <= 8,
+            meta={"role": "flight", "trial": flight.number, "standing": standing},
+            hovertemplate=f"<b>Flight {label}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
+            f"{self.history.output_unit}{error}<extra></extra>",
+        )
 
     def _set_point(self, palette: Palette) -> dict[str, object]:
-        return _trace("Set point", self.history.set_point, CURVE_POINTS, line=theme.line(palette.dim, 1.5, "dot"),
-                      meta={"role": "set point"}, hoverinfo="skip", legendrank=900)
+        return _trace(
+            "Set point",
+            self.history.set_point,
+            CURVE_POINTS,
+            line=theme.line(palette.dim, 1.5, "dot"),
+            meta={"role": "set point"},
+            hoverinfo="skip",
+            legendrank=900,
+        )
 
     def _reference(self, palette: Palette) -> list[dict[str, object]]:
         if self.history.reference is None:
             return []
-        return [_trace("Reference", self.history.reference, CURVE_POINTS, line=theme.line(palette.dim, 1.5, "dashdot"),
-                       meta={"role": "reference"}, hoverinfo="skip", legendrank=901)]
+        return [
+            _trace(
+                "Reference",
+                self.history.reference,
+                CURVE_POINTS,
+                line=theme.line(palette.dim, 1.5, "dashdot"),
+                meta={"role": "reference"},
+                hoverinfo="skip",
+                legendrank=901,
+            )
+        ]
 
     def _prediction(self, palette: Palette) -> list[dict[str, object]]:
         proposal = self.history.proposal
         if proposal is None or proposal.curve is None:
             return []
         text = f"Flight {proposal.number}, predicted"
-        return [_trace(text, proposal.curve, CURVE_POINTS, line=theme.line(palette.prediction, 2.25, "dash"),
-                       meta={"role": "prediction", "trial": proposal.number}, legendrank=899,
-                       hovertemplate=f"<b>{text}</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}"
-                                     "<extra></extra>")]
+        return [
+            _trace(
+                text,
+                proposal.curve,
+                CURVE_POINTS,
+                line=theme.line(palette.prediction, 2.25, "dash"),
+                meta={"role": "prediction", "trial": proposal.number},
+                legendrank=899,
+                hovertemplate=f"<b>{text}</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}<extra></extra>",
+            )
+        ]
 
     def _live(self, palette: Palette) -> dict[str, object]:
-        return {"type": "scatter", "mode": "lines", "name": "Flying now", "x": [], "y": [], "showlegend": False,
-                "line": theme.line(palette.ink, 3.5), "meta": {"role": "live"}, "legendrank": 1, "cliponaxis": True,
-                "hovertemplate": f"<b>Flying now</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}"
-                                 "<extra></extra>"}
+        return {
+            "type": "scatter",
+            "mode": "lines",
+            "name": "Flying now",
+            "x": [],
+            "y": [],
+            "showlegend": False,
+            "line": theme.line(palette.ink, 3.5),
+            "meta": {"role": "live"},
+            "legendrank": 1,
+            "cliponaxis": True,
+            "hovertemplate": f"<b>Flying now</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}"
+            "<extra></extra>",
+        }
 
     def _summary(self, outside: int) -> str:
         history = self.history
         if not history.flights:
             return f"{history.output_title} over time: no flight yet, set point and reference only."
-        best = "" if history.best is None else (
-            f" Best: flight {history.best.number}, error {history.best.error:.3f} {history.error_unit}.")
+        best = (
+            ""
+            if history.best is None
+            else (f" Best: flight {history.best.number}, error {history.best.error:.3f} {history.error_unit}.")
+        )
         off = f" {outside} off the scale, marked at the top." if outside else ""
         noun = "flight" if len(history.flights) == 1 else "flights"
         return f"{history.output_title} over time: {len(history.flights)} {noun}.{best}{off}"
@@ -120,11 +176,15 @@ class TakeoffsFigure:
         named: list[tuple[Column, Curve]] = [(Column("set_point", "Set point", unit, 3), history.set_point)]
         if history.reference is not None:
             named.append((Column("reference", "Reference", unit, 3), history.reference))
-        named += [(Column(f"flight_{flight.number}", f"Flight {flight.number}", unit, 3), flight.curve)
-                  for flight in drawn if flight.curve is not None]
+        named += [
+            (Column(f"flight_{flight.number}", f"Flight {flight.number}", unit, 3), flight.curve)
+            for flight in drawn
+            if flight.curve is not None
+        ]
         if history.proposal is not None and history.proposal.curve is not None:
-            named.append((Column("prediction", f"Flight {history.proposal.number}, predicted", unit, 3),
-                          history.proposal.curve))
+            named.append(
+                (Column("prediction", f"Flight {history.proposal.number}, predicted", unit, 3), history.proposal.curve)
+            )
         rows = tuple((time_s, *_rounded(time_s, [curve for _, curve in named])) for time_s in TABLE_TIMES_S)
         return Table((Column("time_s", "Time", "s", 1), *(column for column, _ in named)), rows)
 
@@ -144,8 +204,18 @@ def _off_scale(palette: Palette, flight: FlightData, top: float) -> dict[str, ob
     assert flight.curve is not None
     peak = int(flight.curve.values.argmax())
     text = f"Flight {flight.number} reaches {flight.curve.values[peak]:.2f}"
-    return {"type": "scatter", "mode": "markers+text", "name": text, "x": [round(float(flight.curve.time_s[peak]), 3)],
-            "y": [top], "text": [f"{flight.number} ↑ {flight.curve.values[peak]:.1f}"], "textposition": "bottom center",
-            "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad}, "textfont": {"color": palette.bad},
-            "showlegend": False, "cliponaxis": False, "meta": {"role": "off scale", "trial": flight.number},
-            "hovertemplate": f"{text}<extra></extra>"}
+    return {
+        "type": "scatter",
+        "mode": "markers+text",
+        "name": text,
+        "x": [round(float(flight.curve.time_s[peak]), 3)],
+        "y": [top],
+        "text": [f"{flight.number} ↑ {flight.curve.values[peak]:.1f}"],
+        "textposition": "bottom center",
+        "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},
+        "textfont": {"color": palette.bad},
+        "showlegend": False,
+        "cliponaxis": False,
+        "meta": {"role": "off scale", "trial": flight.number},
+        "hovertemplate": f"{text}<extra></extra>",
+    }

@@ -24,21 +24,46 @@ class Palette:
     gains: tuple[str, ...]
 
 
-PALETTES: Final[Mapping[ThemeName, Palette]] = MappingProxyType({
-    "light": Palette(surface="#ffffff", ink="#18202b", dim="#545f6e", grid="#e4e8ed", best="#0a7a6c",
-                     earlier="#8590a0", prediction="#6d3fc0", bad="#c0271f",
-                     gains=("#0a7a6c", "#a85a00", "#2f5fc4")),
-    "dark": Palette(surface="#181d24", ink="#eef2f6", dim="#a9b4c1", grid="#2d343e", best="#3fd0bb",
-                    earlier="#75818f", prediction="#bfa3ff", bad="#ff8a80",
-                    gains=("#3fd0bb", "#ffb454", "#8fb3ff")),
-})
+PALETTES: Final[Mapping[ThemeName, Palette]] = MappingProxyType(
+    {
+        "light": Palette(
+            surface="#ffffff",
+            ink="#18202b",
+            dim="#545f6e",
+            grid="#e4e8ed",
+            best="#0a7a6c",
+            earlier="#8590a0",
+            prediction="#6d3fc0",
+            bad="#c0271f",
+            gains=("#0a7a6c", "#a85a00", "#2f5fc4"),
+        ),
+        "dark": Palette(
+            surface="#181d24",
+            ink="#eef2f6",
+            dim="#a9b4c1",
+            grid="#2d343e",
+            best="#3fd0bb",
+            earlier="#75818f",
+            prediction="#bfa3ff",
+            bad="#ff8a80",
+            gains=("#3fd0bb", "#ffb454", "#8fb3ff"),
+        ),
+    }
+)
 
 
 def axis(palette: Palette, **more: object) -> dict[str, object]:
     """A quiet axis: hairline grid, no frame, no zero line."""
-    return {"gridcolor": palette.grid, "linecolor": palette.grid, "zeroline": False, "ticks": "",
-            "automargin": True, "title": {"font": {"size": 13, "color": palette.dim}, "standoff": 8},
-            "tickfont": {"size": 12, "color": palette.dim}, **more}
+    return {
+        "gridcolor": palette.grid,
+        "linecolor": palette.grid,
+        "zeroline": False,
+        "ticks": "",
+        "automargin": True,
+        "title": {"font": {"size": 13, "color": palette.dim}, "standoff": 8},
+        "tickfont": {"size": 12, "color": palette.dim},
+        **more,
+    }
 
 
 def titled(palette: Palette, text: str, **more: object) -> dict[str, object]:
@@ -50,14 +75,26 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
     """The layout that every figure starts from."""
     return {
         "font": {"family": FONT, "size": 13, "color": palette.ink},
-        "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
         "margin": {"l": 8, "r": 14, "t": 12, "b": 8},
         "hovermode": "closest",
-        "hoverlabel": {"bgcolor": palette.surface, "bordercolor": palette.dim,
-                       "font": {"family": FONT, "size": 13, "color": palette.ink}},
-        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "xanchor": "left",
-                   "font": {"size": 12, "color": palette.ink}, "bgcolor": "rgba(0,0,0,0)",
-                   "itemclick": "toggleothers", "itemdoubleclick": "toggle"},
+        "hoverlabel": {
+            "bgcolor": palette.surface,
+            "bordercolor": palette.dim,
+            "font": {"family": FONT, "size": 13, "color": palette.ink},
+        },
+        "legend": {
+            "orientation": "h",
+            "x": 0,
+            "y": 1.02,
+            "yanchor": "bottom",
+            "xanchor": "left",
+            "font": {"size": 12, "color": palette.ink},
+            "bgcolor": "rgba(0,0,0,0)",
+            "itemclick": "toggleothers",
+            "itemdoubleclick": "toggle",
+        },
         "dragmode": "zoom",
         **more,
     }

@@ -12,9 +12,11 @@ from app.figures.history import Curve, FlightData, History, NextFlight, Outcome
 TIME_S = np.linspace(0.0, 32.6, 3261)
 SET_POINT = Curve(TIME_S, np.full_like(TIME_S, 3.0))
 REFERENCE = Curve(TIME_S, np.minimum(3.0, TIME_S))
-GAINS = (Gain("kp", "Proportional gain", "counts", 0, 4000, 400, 283, True),
-         Gain("ki", "Integral gain", "counts", 0, 1073, 107.3, 13, True),
-         Gain("kd", "Derivative gain", "counts", 0, 409, 40.9, 82, True))
+GAINS = (
+    Gain("kp", "Proportional gain", "counts", 0, 4000, 400, 283, True),
+    Gain("ki", "Integral gain", "counts", 0, 1073, 107.3, 13, True),
+    Gain("kd", "Derivative gain", "counts", 0, 409, 40.9, 82, True),
+)
 
 
 def climb(overshoot_m: float) -> Curve:
@@ -22,15 +24,36 @@ def climb(overshoot_m: float) -> Curve:
     return Curve(TIME_S, np.minimum(3.0, 2.0 * TIME_S) + overshoot_m * np.exp(-((TIME_S - 2.0) ** 2)))
 
 
-def flight(number: int, error: float | None, *, outcome: Outcome = "valid", overshoot_m: float = 0.3,
-           predicted_error: float | None = None) -> FlightData:
-    return FlightData(number=number, gains={"kp": 280 + number, "ki": 10 * number, "kd": 80}, outcome=outcome,
-                      curve=climb(overshoot_m), error=error, predicted_error=predicted_error)
+def flight(
+    number: int,
+    error: float | None,
+    *,
+    outcome: Outcome = "valid",
+    overshoot_m: float = 0.3,
+    predicted_error: float | None = None,
+) -> FlightData:
+    return FlightData(
+        number=number,
+        gains={"kp": 280 + number, "ki": 10 * number, "kd": 80},
+        outcome=outcome,
+        curve=climb(overshoot_m),
+        error=error,
+        predicted_error=predicted_error,
+    )
 
 
 def history(*flights: FlightData, proposal: NextFlight | None = None, improvement: float | None = 0.05) -> History:
-    return History(output_title="Altitude", output_unit="m", error_unit="m", gains=GAINS, set_point=SET_POINT,
-                   reference=REFERENCE, flights=flights, proposal=proposal, stop_improvement=improvement)
+    return History(
+        output_title="Altitude",
+        output_unit="m",
+        error_unit="m",
+        gains=GAINS,
+        set_point=SET_POINT,
+        reference=REFERENCE,
+        flights=flights,
+        proposal=proposal,
+        stop_improvement=improvement,
+    )
 
 
 def proposal(number: int) -> NextFlight:

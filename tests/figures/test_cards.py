@@ -42,7 +42,7 @@ def test_every_registered_figure_gives_a_card_for_an_empty_and_for_a_flown_campa
 
 def luminance(colour: str) -> float:
     """WCAG 2.2 relative luminance of #rrggbb."""
-    channels = [int(colour[start:start + 2], 16) / 255 for start in (1, 3, 5)]
+    channels = [int(colour[start : start + 2], 16) / 255 for start in (1, 3, 5)]
     linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in channels]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 

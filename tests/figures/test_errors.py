@@ -3,8 +3,13 @@ import pytest
 from app.figures.errors import ErrorsFigure
 from tests.figures.builders import flight, history, layout, proposal, trace, traces
 
-TABLE_1 = [flight(1, 0.3267, predicted_error=0.33), flight(2, 0.1873, predicted_error=0.2),
-           flight(3, 0.1788), flight(4, 0.1467), flight(5, 0.1515)]
+TABLE_1 = [
+    flight(1, 0.3267, predicted_error=0.33),
+    flight(2, 0.1873, predicted_error=0.2),
+    flight(3, 0.1788),
+    flight(4, 0.1467),
+    flight(5, 0.1515),
+]
 
 
 def test_without_a_scored_flight_the_card_says_when_it_will_be_filled() -> None:
@@ -49,5 +54,8 @@ def test_a_flight_with_a_huge_error_is_marked_at_the_edge_with_its_value() -> No
 def test_the_table_lists_every_flight_with_its_running_best() -> None:
     card = ErrorsFigure(history(flight(1, 0.3), flight(2, 0.05, outcome="invalid"), flight(3, 0.2))).compute()
     assert card.table is not None
-    assert card.table.rows == ((1, "valid", 0.3, None, 0.3), (2, "invalid", 0.05, None, None),
-                               (3, "valid", 0.2, None, 0.2))
+    assert card.table.rows == (
+        (1, "valid", 0.3, None, 0.3),
+        (2, "invalid", 0.05, None, None),
+        (3, "valid", 0.2, None, 0.2),
+    )

@@ -26,7 +26,11 @@ def test_the_best_flight_is_emphasised_and_drawn_above_all_others() -> None:
     card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 0.1), flight(3, 0.2), flight(4, None, outcome="aborted")))
     drawn = [one["meta"] for one in traces(card.compute()) if one["meta"]["role"] == "flight"]
     assert [(meta["trial"], meta["standing"]) for meta in drawn] == [
-        (4, "invalid"), (1, "earlier"), (3, "earlier"), (2, "best")]
+        (4, "invalid"),
+        (1, "earlier"),
+        (3, "earlier"),
+        (2, "best"),
+    ]
     widths = {one["meta"]["trial"]: one["line"]["width"] for one in traces(card.compute()) if "trial" in one["meta"]}
     assert widths[2] > max(widths[1], widths[3], widths[4])
 
@@ -50,7 +54,12 @@ def test_the_table_gives_the_same_curves_in_numbers() -> None:
     card = TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
     assert card.table is not None
     assert [column.name for column in card.table.columns] == [
-        "time_s", "set_point", "reference", "flight_1", "prediction"]
+        "time_s",
+        "set_point",
+        "reference",
+        "flight_1",
+        "prediction",
+    ]
     at_two_seconds = next(row for row in card.table.rows if row[0] == 2.0)
     assert list(at_two_seconds) == pytest.approx([2.0, 3.0, 2.0, 3.3, 3.1], abs=1e-4)
 
@@ -73,9 +82,16 @@ def test_thinning_keeps_the_extremes_of_a_curve() -> None:
     assert (x[0], x[-1]) == (0.0, 32.6)
 
 
-@pytest.mark.parametrize(("peaks", "outside"), [
-    ([], ()), ([3.4], ()), ([3.4, 3.5, 3.3], ()), ([3.4, 9.0], (1,)), ([9.0, 3.4, 3.5, 30.0, 3.3], (0, 3)),
-])
+@pytest.mark.parametrize(
+    ("peaks", "outside"),
+    [
+        ([], ()),
+        ([3.4], ()),
+        ([3.4, 3.5, 3.3], ()),
+        ([3.4, 9.0], (1,)),
+        ([9.0, 3.4, 3.5, 30.0, 3.3], (0, 3)),
+    ],
+)
 def test_the_robust_range_leaves_out_outliers_only(peaks: list[float], outside: tuple[int, ...]) -> None:
     span = robust_range(peaks, low=0.0, high=float(SET_POINT.values.max()))
     assert span.outside == outside
