@@ -19,6 +19,10 @@ class ErrorsFigure:
     name: ClassVar[str] = "errors"
     title: ClassVar[str] = "Error per flight"
 
+    @property
+    def _reading(self) -> str:
+        return f"%{{y:.4f}} {self.history.error_unit}"
+
     def not_ready(self) -> str | None:
         if any(flight.error is not None for flight in self.history.flights):
             return None
@@ -84,7 +88,7 @@ class ErrorsFigure:
                     "symbol": ["star" if flight is best else "circle" for flight in flights],
                 },
                 "meta": {"role": "measured"},
-                "hovertemplate": f"<b>Flight %{{x}}</b><br>error %{{y:.4f}} {self.history.error_unit}<extra></extra>",
+                "hovertemplate": f"<b>Flight %{{x}}</b><br>error {self._reading}<extra></extra>",
             }
         ]
 
@@ -102,7 +106,7 @@ class ErrorsFigure:
                 "text": [flight.outcome for flight in flights],
                 "marker": {"size": 10, "symbol": "x-thin", "line": {"width": 2, "color": palette.bad}},
                 "meta": {"role": "not counted"},
-                "hovertemplate": f"<b>Flight %{{x}}, %{{text}}</b><br>%{{y:.4f}} {self.history.error_unit}<extra></extra>",
+                "hovertemplate": f"<b>Flight %{{x}}, %{{text}}</b><br>{self._reading}<extra></extra>",
             }
         ]
 
@@ -157,7 +161,7 @@ class ErrorsFigure:
                 "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
                 "meta": {"role": "predicted"},
                 "cliponaxis": False,
-                "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>%{{y:.4f}} {self.history.error_unit}<extra></extra>",
+                "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>{self._reading}<extra></extra>",
             }
         ]
 
