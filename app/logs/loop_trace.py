@@ -26,7 +26,8 @@ def read_loop_trace(path: Path) -> LoopTrace:
     try:
         with path.open("rb") as raw:
             stream = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
-            return _read(path.name, io.TextIOWrapper(stream, encoding="utf-8", newline=""))
+            with io.TextIOWrapper(stream, encoding="utf-8", newline="") as text:
+                return _read(path.name, text)
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.",
                          hint="Give a readable trace file, .csv or .csv.gz.") from error

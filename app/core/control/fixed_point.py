@@ -1,5 +1,6 @@
 """Integer arithmetic of a 32-bit autopilot, the same compiled and interpreted."""
 
+import math
 from typing import Final
 
 from app.core.kernels import kernel
@@ -31,3 +32,9 @@ def limit(value: int, low: int, high: int) -> int:
 def fix(value: float, fraction_bits: int) -> int:
     """`value`·2ⁿ truncated toward zero."""
     return int(value * (1 << fraction_bits))
+
+
+@kernel
+def measured(value: float, fraction_bits: int) -> int:
+    """`value`·2ⁿ to the nearest integer: how a continuous quantity enters the loop without a bias."""
+    return math.floor(value * (1 << fraction_bits) + 0.5)

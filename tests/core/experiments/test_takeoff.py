@@ -1,0 +1,117 @@
+"""The takeoff experiment against figures measured with the original loop.
+
+Sources: the simulated AR.Drone 2 (`JSBSIM`) and the twin of the paper's real flights (`TWIN`) were measured once for
+this project with the original vertical loop; `PAPARAZZI` are flights of the real autopilot in its own simulation.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.core.errors import InputError, TrajectoryError
+from app.core.experiments import EXPERIMENTS, get_experiment
+from app.core.experiments.takeoff import Takeoff
+from app.core.trajectory import Trajectory
+
+TAKEOFF = Takeoff()
+TWIN_MODEL = np.array([0.61, 0.3, 0.05, 0.0])
+
+JSBSIM = [((283, 13, 82), 0.3267), ((285, 44, 82), 0.1873), ((286, 102, 82), 0.1515), ((499, 177, 42), 0.1788),
+          ((324, 116, 75), 0.1467), ((1624, 1356, 195), 0.0928), ((1644, 1365, 155), 0.0925),
+          ((1649, 1365, 175), 0.0919), ((1652, 1365, 195), 0.0929)]
+TWIN = [((283, 13, 82), 0.5236), ((286, 60, 81), 0.2341), ((301, 133, 65), 0.2325), ((301, 135, 59), 0.2579),
+        ((301, 134, 62), 0.2437), ((1624, 1356, 195), 0.1189), ((1599, 1366, 130), 0.1281), ((1612, 1361, 163), 0.1211),
+        ((1567, 1037, 173), 0.1181)]
+PAPARAZZI = [("283_13_82", 0.3297), ("1624_1356_195", 0.0987)]
+
+
+def gains(*values: float) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
+    return np.array(values, dtype=np.float64)
+
+
+@pytest.mark.parametrize(("flown", "measured"), JSBSIM)
+def test_the_nominal_model_agrees_with_the_simulated_ardrone_within_4_mm(flown: tuple[int, ...],
+                                                                         measured: float) -> None:
+    assert TAKEOFF.error(TAKEOFF.simulate(gains(*flown), TAKEOFF.nominal_model)) == pytest.approx(measured, abs=0.004)
+
+
+def test_the_model_of_the_real_flights_reproduces_the_twin_within_2_per_mille() -> None:
+    """Asked for within 1 %."""
+    outputs = TAKEOFF.outputs(np.array([flown for flown, _ in TWIN], dtype=np.float64), TWIN_MODEL)
+    assert TAKEOFF.errors(outputs) == pytest.approx([measured for _, measured in TWIN], rel=0.002)
+
+
+def test_the_reference_alone_scores_the_papers_bound() -> None:
+    """0.0913 m in the paper, 0.0914 m measured."""
+    run = TAKEOFF.simulate(gains(283, 13, 82), TAKEOFF.nominal_model)
+    reference = Trajectory(run.time_s, {"altitude_m": run["reference_m"]}, "model", "simulation")
+    assert TAKEOFF.error(reference) == pytest.approx(0.0914, abs=0.0002)
+
+
+@pytest.mark.parametrize(("name", "expected"), PAPARAZZI)
+def test_recorded_flights_of_the_real_autopilot_score_as_published(name: str, expected: float) -> None:
+    path = Path(__file__).parents[2] / "data" / "takeoffs" / f"paparazzi_{name}.csv"
+    rows = np.genfromtxt(path, delimiter=",", names=True)
+    flight = Trajectory(rows["time_s"], {"altitude_m": rows["altitude_m"]}, "csv", "vehicle")
+    assert TAKEOFF.error(flight) == pytest.approx(expected, abs=5e-5)
+
+
+def test_a_batch_gives_what_single_runs_give() -> None:
+    both = np.array([[283.0, 13, 82], [1600, 1023, 127]])
+    batch = TAKEOFF.outputs(both, TWIN_MODEL)
+    singles = [TAKEOFF.simulate(one, TWIN_MODEL) for one in both]
+    assert all(np.array_equal(row, run["altitude_m"]) for row, run in zip(batch, singles, strict=True))
+    assert TAKEOFF.errors(batch).tolist() == [TAKEOFF.error(run) for run in singles]
+
+
+def test_a_run_has_every_channel_on_the_grid_and_stays_above_ground() -> None:
+    run = TAKEOFF.simulate(gains(283, 13, 82), TWIN_MODEL)
+    assert set(run.channels) == {"altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "feed_forward",
+                                 "feedback"}
+    assert len(run) == 16_693
+    assert run.time_s[-1] >= 32.6 > run.time_s[-2]
+    assert run["altitude_m"].min() == 0.0
+    assert 0.0 <= run["thrust"].min() <= run["thrust"].max() <= 1.0
+    assert run["set_point_m"].tolist() == [3.0] * len(run)
+    assert TAKEOFF.set_point(np.array([-0.1, 0.0, 0.1])).tolist() == [0.0, 3.0, 3.0]
+
+
+def test_a_latency_shifts_the_whole_run_continuously() -> None:
+    """Half a step of latency lies half-way between none and one step, so a fit can feel a latency."""
+    steps = [0.0, 0.5, 1.0, 153.6]
+    runs = [TAKEOFF.simulate(gains(283, 13, 82), np.array([0.61, shift / 512, 0.05, 0.0])) for shift in steps]
+    none, half, one, later = (run["altitude_m"] for run in runs)
+    assert half == pytest.approx((none + one) / 2, abs=1e-12)
+    assert one[1:] == pytest.approx(none[:-1], abs=1e-12)
+    assert later[154:] == pytest.approx(0.4 * none[1:-153] + 0.6 * none[:-154], abs=1e-9)
+    assert not later[:154].any()
+
+
+def test_stored_flights_score_as_fresh_ones() -> None:
+    run = TAKEOFF.simulate(gains(1600, 1023, 127), TWIN_MODEL)
+    assert TAKEOFF.error(run.as_stored()) == pytest.approx(TAKEOFF.error(run), abs=1e-7)
+
+
+def test_a_flight_that_ends_early_cannot_be_scored() -> None:
+    run = TAKEOFF.simulate(gains(283, 13, 82), TAKEOFF.nominal_model)
+    short = Trajectory(run.time_s[:8000], {"altitude_m": run["altitude_m"][:8000]}, "csv", "vehicle")
+    with pytest.raises(TrajectoryError, match=r"time_s: must cover 0 … 32\.6 s"):
+        TAKEOFF.error(short)
+
+
+def test_bounds_defaults_and_scales_are_those_of_the_method() -> None:
+    space = TAKEOFF.space
+    assert space.names == ("kp", "ki", "kd")
+    assert space.upper.tolist() == [4000, 1073, 409]
+    assert space.lower.tolist() == [0, 0, 0]
+    assert space.scale.tolist() == pytest.approx([400, 107.3, 40.9])
+    assert space.default.tolist() == [283, 13, 82]
+    assert [parameter.name for parameter in TAKEOFF.model_parameters] == ["hover_throttle", "start_latency_s",
+                                                                         "motor_lag_s", "drag_1_s"]
+
+
+def test_experiments_are_found_by_name_and_unknown_ones_are_refused_with_the_choices() -> None:
+    assert get_experiment("takeoff") is EXPERIMENTS["takeoff"]
+    with pytest.raises(InputError, match=r"no such experiment.*experiment: unknown name 'landing'.*takeoff"):
+        get_experiment("landing")
