@@ -11,14 +11,16 @@
     ├── ConflictError             it is not possible now: the state or the version forbids it
     │   └── BusyError             the vehicle is flying for somebody else
     ├── StorageError              the database cannot take or give what it should; nothing was changed
-    └── SchemaError               the database belongs to another version of the program
+    ├── SchemaError               the database belongs to another version of the program
+    ├── AlreadyRunningError       another process of the program holds the database
+    └── AddressError              the host and port asked for cannot be listened on
 """
 
 from app.core.errors import GainlineError, GainsError, InputError, Problem, TrajectoryError
 
-__all__ = ["BusyError", "ConflictError", "GainlineError", "GainsError", "InputError", "KeyReusedError",
-           "MediaTypeError", "NotFoundError", "Problem", "SchemaError", "StorageError", "TooLargeError",
-           "TrajectoryError"]
+__all__ = ["AddressError", "AlreadyRunningError", "BusyError", "ConflictError", "GainlineError", "GainsError",
+           "InputError", "KeyReusedError", "MediaTypeError", "NotFoundError", "Problem", "SchemaError", "StorageError",
+           "TooLargeError", "TrajectoryError"]
 
 
 class KeyReusedError(InputError):
@@ -55,3 +57,11 @@ class StorageError(GainlineError):
 
 class SchemaError(StorageError):
     """The database is not at this program's revision."""
+
+
+class AlreadyRunningError(GainlineError):
+    """Another server or worker has this database; there may be one of each."""
+
+
+class AddressError(GainlineError):
+    """The host and port asked for cannot be listened on; `problems` names the one to blame."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -33,16 +34,19 @@ class LockedError(Exception):
 
 
 @contextmanager
-def exclusive(path: Path, *, address: str = "", keep_waiting: Callable[[], bool] = lambda: False) -> Iterator[None]:
-    """Hold the lock file at `path`. Raises LockedError when another process does and `keep_waiting()` is false."""
+def exclusive(path: Path, *, keep_waiting: Callable[[], bool] = lambda: False) -> Iterator[Callable[[str], None]]:
+    """Hold the lock file at `path`; what it yields writes the holder's address into it.
+
+    Raises LockedError when another process holds it and `keep_waiting()` is false.
+    """
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
     try:
         while not _take(descriptor):
             if not keep_waiting():
                 raise LockedError(_holder(descriptor))
             time.sleep(POLL_S)
-        _sign(descriptor, Holder(pid=os.getpid(), address=address))
-        yield
+        _sign(descriptor, "")
+        yield partial(_sign, descriptor)
     finally:
         os.close(descriptor)
 
@@ -55,10 +59,10 @@ def _take(descriptor: int) -> bool:
     return True
 
 
-def _sign(descriptor: int, holder: Holder) -> None:
+def _sign(descriptor: int, address: str) -> None:
     with suppress(OSError):  # a full disk costs the signature, which is a courtesy, not the lock
         os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, json.dumps(asdict(holder)).encode(), 0)
+        os.pwrite(descriptor, json.dumps(asdict(Holder(pid=os.getpid(), address=address))).encode(), 0)
 
 
 def _holder(descriptor: int) -> Holder | None:

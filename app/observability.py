@@ -20,7 +20,7 @@ _SHARED: Final[tuple[Processor, ...]] = (
 )
 
 
-def configure_logs(data_dir: Path, role: Literal["web", "worker"]) -> None:
+def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -> None:
     """Send this process's logs, the libraries' included, to its file and to standard error (readable on a terminal)."""
     folder = data_dir / "log"
     folder.mkdir(parents=True, exist_ok=True)
@@ -30,8 +30,9 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"]) -> None:
     to_stderr = logging.StreamHandler()
     to_stderr.setFormatter(_formatter(
         structlog.dev.ConsoleRenderer() if sys.stderr.isatty() else structlog.processors.JSONRenderer()))
-    to_stderr.setLevel(logging.WARNING if sys.stderr.isatty() else logging.INFO)
-    logging.basicConfig(level=logging.INFO, handlers=[to_file, to_stderr], force=True)
+    if sys.stderr.isatty():
+        to_stderr.setLevel(logging.WARNING)
+    logging.basicConfig(level=level.upper(), handlers=[to_file, to_stderr], force=True)
     logging.raiseExceptions = False  # a full disk must not turn every log line into a traceback
     structlog.configure(
         processors=[structlog.stdlib.filter_by_level, *_SHARED, structlog.processors.format_exc_info,

@@ -14,7 +14,7 @@ FIRST_PAUSE_S: Final = 0.2
 LONGEST_PAUSE_S: Final = 10.0
 HEALTHY_AFTER_S: Final = 20.0
 """A child that lived this long starts again after the shortest pause."""
-PATIENCE_S: Final = 20.0
+PATIENCE_S: Final = 12.0
 """How long a child that was asked to stop may take to land what flies and record it."""
 
 _log = structlog.get_logger(__name__)
@@ -46,11 +46,13 @@ class Supervisor(Generic[T]):
             return
         if process.is_alive():
             process.terminate()
-        process.join(PATIENCE_S)
-        if process.is_alive():
-            _log.error("child did not stop and is killed", child=self._name, pid=process.pid, after_s=PATIENCE_S)
-            process.kill()
-            process.join()
+        try:
+            process.join(PATIENCE_S)
+        finally:
+            if process.is_alive():
+                _log.error("child did not stop and is killed", child=self._name, pid=process.pid)
+                process.kill()
+                process.join()
 
     def _start(self) -> BaseProcess:
         process = get_context("spawn").Process(target=self._target, args=(self._argument,), name=self._name)

@@ -14,7 +14,8 @@ HOLD = """
 import sys, time
 from pathlib import Path
 from app.locks import exclusive
-with exclusive(Path(sys.argv[1]), address="http://127.0.0.1:1"):
+with exclusive(Path(sys.argv[1])) as sign:
+    sign("http://127.0.0.1:1")
     print("held", flush=True)
     time.sleep(60)
 """

@@ -1,0 +1,145 @@
+"""`gainline serve`: the web process, with a worker beside it."""
+
+import errno
+import ipaddress
+import signal
+import socket
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import FrameType
+from typing import Final
+
+import structlog
+import uvicorn
+
+from app.db.migrate import migrate
+from app.errors import AddressError, AlreadyRunningError, Problem
+from app.locks import LockedError, exclusive
+from app.main import create_app
+from app.observability import configure_logs
+from app.settings import Settings
+from app.supervisor import Supervisor
+from app.worker import run_supervised_worker
+
+STREAMS_END_WITHIN_S: Final = 3
+
+_log = structlog.get_logger(__name__)
+
+
+def say(line: str) -> None:
+    """Print one line at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[str], None] = say) -> None:
+    """Run the dashboard until SIGINT or SIGTERM; the main thread only.
+
+    Raises AlreadyRunningError when another server has this database, AddressError when the host or port cannot be had,
+    and StorageError when the database cannot be opened or brought up to date.
+    """
+    settings.data_dir.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            stack.callback(signal.signal, number, signal.signal(number, _leave))
+        try:
+            sign = stack.enter_context(exclusive(settings.data_dir / "server.lock"))
+        except LockedError as error:
+            raise _already_served(settings, error) from error
+        listener = stack.enter_context(listen(settings.host, settings.port))
+        sign(web_address(settings.host, listener.getsockname()[1]))
+        configure_logs(settings.data_dir, "web", settings.log_level)
+        migrate(settings.database_file)
+        if with_worker:
+            stack.enter_context(Supervisor(run_supervised_worker, settings, name="worker"))
+        if (exposed := exposure(settings.host)) is not None:
+            announce(exposed)
+        _run(settings, listener, announce)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A listening socket; who connects early waits until the application is ready. Raises AddressError."""
+    try:
+        family, _, _, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(where[:2], family=family, backlog=2048)  # type: ignore[arg-type]
+    except OSError as error:
+        raise _no_address(host, port, error) from error
+
+
+def web_address(host: str, port: int) -> str:
+    """What to type into a browser on this machine."""
+    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - compared, not bound
+    return f"http://[{shown}]:{port}" if ":" in shown else f"http://{shown}:{port}"
+
+
+def exposure(host: str) -> str | None:
+    """What listening on this host opens to others; None on loopback."""
+    try:
+        if host == "localhost" or ipaddress.ip_address(host).is_loopback:
+            return None
+    except ValueError:
+        pass  # a name: it may be anything
+    return (f"Warning: listening on {host}, so anybody who can reach this machine over the network can see, change and "
+            "delete every campaign and start simulated flights: Gainline has no accounts yet. "
+            "Real vehicles fly only from a server on loopback (--host 127.0.0.1).")
+
+
+class _Server(uvicorn.Server):
+    """Uvicorn, which says when it is ready, and ends the open event streams before it waits for them."""
+
+    def __init__(self, config: uvicorn.Config, *, ready: Callable[[], None], closing: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._ready = ready
+        self._closing = closing
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._ready()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._closing()
+        await super().shutdown(sockets)
+
+
+def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
+    application = create_app(settings)
+    address = web_address(settings.host, listener.getsockname()[1])
+
+    def ready() -> None:
+        _log.info("ready", address=address)
+        announce(f"Gainline is ready at {address}")
+
+    def closing() -> None:
+        application.state.live.close()
+
+    config = uvicorn.Config(application, log_config=None, access_log=False, server_header=False,
+                            timeout_graceful_shutdown=STREAMS_END_WITHIN_S)
+    _Server(config, ready=ready, closing=closing).run(sockets=[listener])
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> None:
+    """Unwind everything. Uvicorn takes signals over while it runs, and raises them again when it has shut down."""
+    raise SystemExit(0)
+
+
+def _already_served(settings: Settings, error: LockedError) -> AlreadyRunningError:
+    where = error.holder.address if error.holder else ""
+    return AlreadyRunningError(
+        f"Another Gainline server ({error.holder or 'its process is unknown'}) already uses {settings.database_file}.",
+        hint=(f"Open {where}, " if where else "Use that one, ")
+        + "stop it first, or give this server a folder of its own with --data-dir. The running server is not affected.")
+
+
+def _no_address(host: str, port: int, error: OSError) -> AddressError:
+    match error.errno:
+        case errno.EADDRINUSE:
+            problem = Problem("port", f"{port} is in use by another program")
+            hint = f"Stop that program, or choose another port: --port {port % 65535 + 1} (0 takes a free one)."
+        case errno.EACCES:
+            problem = Problem("port", f"{port} may not be opened by this user")
+            hint = "Choose a port above 1023, for instance --port 8000."
+        case _:
+            problem = Problem("host", f"{host} is no address of this machine ({error.strerror or error})")
+            hint = "Use --host 127.0.0.1 (this machine only) or an address that this machine has."
+    return AddressError(f"Gainline cannot listen on {host}, port {port}.", hint=hint, problems=(problem,))
