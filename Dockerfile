@@ -12,7 +12,7 @@ COPY --from=build /wheel /tmp/wheel
 RUN pip install --no-cache-dir --no-deps /tmp/wheel/*.whl \
     && useradd --create-home --uid 1000 gainline \
     && install --directory --owner=gainline /var/lib/gainline
-USER gainline
+USER 1000
 # The compiled kernels are kept beside the data: a new container starts as fast as an old one.
 ENV GAINLINE_DATA_DIR=/var/lib/gainline \
     NUMBA_CACHE_DIR=/var/lib/gainline/kernels

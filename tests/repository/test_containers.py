@@ -1,0 +1,53 @@
+"""The container files, as far as they can be checked without Docker; .ci/compose-run starts the processes."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from app.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAMS = Path(sys.executable).parent
+SERVICES: dict[str, dict[str, Any]] = YAML(typ="safe").load(ROOT / "docker-compose.yml")["services"]
+
+
+def run(*command: str) -> None:
+    done = subprocess.run(
+        [PROGRAMS / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_compose_file_keeps_to_the_compose_specification() -> None:
+    run("check-jsonschema", "--builtin-schema", "vendor.compose-spec", "docker-compose.yml")
+
+
+def test_the_dockerfile_passes_its_linter() -> None:
+    run("hadolint", "--no-color", "Dockerfile")
+
+
+def test_one_service_serves_and_one_works() -> None:
+    assert {name: service["command"] for name, service in SERVICES.items()} == {
+        "web": ["gainline", "serve", "--no-worker"],
+        "worker": ["gainline", "worker"],
+    }
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_command_of_the_compose_file_is_understood(name: str) -> None:
+    run(*SERVICES[name]["command"], "--help")
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_variable_of_the_compose_file_is_a_setting(name: str) -> None:
+    variables = {each for each in SERVICES[name]["environment"] if each.startswith("GAINLINE_")}
+    assert variables <= {f"GAINLINE_{field.upper()}" for field in Settings.model_fields}
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_the_data_folder_lies_on_the_one_volume(name: str) -> None:
+    assert SERVICES[name]["volumes"] == [f"data:{SERVICES[name]['environment']['GAINLINE_DATA_DIR']}"]

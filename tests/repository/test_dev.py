@@ -1,0 +1,59 @@
+"""`./dev` as a person uses it."""
+
+import ast
+import os
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DEV = ROOT / "dev"
+
+
+def dev(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [DEV, *arguments],
+        cwd="/",
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_without_a_command_it_lists_its_commands() -> None:
+    done = dev()
+    assert done.returncode == 0
+    assert "./dev up" in done.stdout
+    assert "./dev test" in done.stdout
+
+
+def test_an_unknown_command_is_refused() -> None:
+    assert dev("fly").returncode == 2
+
+
+def test_exec_passes_arguments_and_the_exit_status_on() -> None:
+    done = dev("exec", "python", "-c", "import sys; print(sys.argv[1:]); sys.exit(7)", "a b", "--help")
+    assert done.stdout == "['a b', '--help']\n"
+    assert done.returncode == 7
+
+
+def test_exec_runs_the_locked_python_with_its_byte_code_cache() -> None:
+    code = "import os, sys; print(sys.prefix); print(os.environ.get('PYTHONDONTWRITEBYTECODE'))"
+    done = dev("exec", "python", "-c", code, PYTHONDONTWRITEBYTECODE="1")
+    assert done.stdout.splitlines() == [str(ROOT / ".venv"), "None"]
+
+
+def test_exec_of_a_missing_command_says_so() -> None:
+    done = dev("exec", "no-such-command")
+    assert done.returncode == 1
+    assert "no command 'no-such-command'" in done.stderr
+
+
+def test_the_private_node_comes_first() -> None:
+    done = dev("exec", "node", "--print", "process.version")
+    assert done.stdout.startswith("v24.")
+
+
+def test_an_old_python_can_read_far_enough_to_be_told() -> None:
+    ast.parse(DEV.read_text(), feature_version=(3, 7))

@@ -1,0 +1,39 @@
+"""The documents say what the program does."""
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+from app.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+
+
+@pytest.mark.parametrize("name", Settings.model_fields)
+def test_every_setting_is_explained_to_the_operator(name: str) -> None:
+    assert f"| `GAINLINE_{name.upper()}` |" in (ROOT / "docs/operations.md").read_text()
+
+
+def test_no_setting_is_explained_that_does_not_exist() -> None:
+    explained = re.findall(r"^\| `GAINLINE_([A-Z_]+)`", (ROOT / "docs/operations.md").read_text(), re.MULTILINE)
+    assert {name.lower() for name in explained} == set(Settings.model_fields)
+
+
+def test_every_command_of_dev_is_explained_to_contributors() -> None:
+    commands = runpy.run_path(str(ROOT / "dev"), run_name="dev")["COMMANDS"]
+    text = (ROOT / "CONTRIBUTING.md").read_text() + (ROOT / "README.md").read_text()
+    assert [name for name in commands if f"./dev {name}" not in text] == []
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_between_documents_lead_somewhere(document: Path) -> None:
+    links = re.findall(r"\]\((?!https?://|#|mailto:)([^)#]+)", document.read_text())
+    assert [link for link in links if not (document.parent / link).exists()] == []
+
+
+def test_decision_records_are_numbered_without_gaps() -> None:
+    numbers = sorted(int(path.name[:4]) for path in (ROOT / "docs/decisions").glob("[0-9]*.md"))
+    assert numbers == list(range(1, len(numbers) + 1))

@@ -1,0 +1,45 @@
+"""Each contract of the layers catches the import it is there for; `./dev test` checks the code against them."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+VIOLATIONS = {
+    "the core reads settings": ("core/policy.py", "import app.settings", "The core is pure"),
+    "the core knows pydantic": ("core/policy.py", "import pydantic", "The core is pure"),
+    "a vehicle reads logs": ("vehicles/base.py", "import app.logs", "Vehicles, logs and figures"),
+    "a figure reads the database": ("figures/base.py", "import app.db.models", "Vehicles, logs and figures"),
+    "states know their service": ("campaigns/states.py", "import app.campaigns.service", "States import nothing"),
+    "a service uses another slice's repository": (
+        "campaigns/service.py",
+        "import app.trials.repository",
+        "A slice calls another",
+    ),
+    "a repository knows its service": ("campaigns/repository.py", "import app.campaigns.service", "Within a slice"),
+    "a router goes past its service": ("campaigns/router.py", "import app.campaigns.repository", "Routers and tasks"),
+    "tasks use the tables": ("trials/tasks.py", "import app.db.models", "Routers and tasks"),
+    "a service knows FastAPI": ("campaigns/service.py", "from fastapi import HTTPException", "Only routers"),
+    "a service knows Starlette": ("campaigns/service.py", "from starlette.types import ASGIApp", "Only routers"),
+    "the worker knows JSBSim": ("worker.py", "import jsbsim", "Only vehicles know"),
+    "the worker knows pymavlink": ("worker.py", "import pymavlink", "Only vehicles and logs"),
+}
+
+
+@pytest.mark.parametrize(("file", "violation", "contract"), VIOLATIONS.values(), ids=VIOLATIONS.keys())
+def test_a_forbidden_import_breaks_a_contract(file: str, violation: str, contract: str, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "app", tmp_path / "app", ignore=shutil.ignore_patterns("__pycache__", "ui"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    with (tmp_path / "app" / file).open("a") as source:
+        source.write(f"\n{violation}\n")
+    done = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    broken = [line for line in done.stdout.splitlines() if "BROKEN" in line]
+    assert any(line.startswith(contract) for line in broken), done.stdout
