@@ -1,0 +1,107 @@
+"""Campaign files: a campaign as YAML, the fields of `POST /api/campaigns` and a description. Errors name the line."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from app.campaigns.schemas import NewCampaign
+from app.errors import InputError, NotFoundError, Problem
+from app.schemas import Text
+
+PRESETS_DIR: Final = Path(__file__).parent / "presets"
+MAX_FILE_BYTES: Final = 2**20
+
+
+class CampaignFile(NewCampaign):
+    """What a campaign file holds; what is left out has the same working default as over REST."""
+
+    description: Text = ""
+
+
+def preset_names() -> tuple[str, ...]:
+    """The campaigns that come with the program, the paper's own first."""
+    return tuple(sorted((path.stem for path in PRESETS_DIR.glob("*.yaml")), key=lambda name: (len(name), name)))
+
+
+def read_preset(name: str) -> CampaignFile:
+    """Raises NotFoundError naming the presets that there are."""
+    if name not in preset_names():
+        raise NotFoundError("preset", name, hint=f"Choose one of {', '.join(preset_names())}, or give a YAML file.")
+    return read_campaign_file(PRESETS_DIR / f"{name}.yaml")
+
+
+def read_campaign_file(path: Path) -> CampaignFile:
+    """Read and check a campaign file. Raises InputError with the line of everything that is wrong."""
+    document = _load(path)
+    try:
+        return CampaignFile.model_validate(document)
+    except ValidationError as error:
+        problems = tuple(_located(document, entry["loc"], entry["msg"]) for entry in error.errors())
+        raise InputError(f"{path.name} does not describe a campaign.", problems=problems,
+                         hint="Mend the named lines; docs/api.md lists the fields.") from error
+
+
+def name_lines(path: Path, problems: Sequence[Problem]) -> tuple[Problem, ...]:
+    """The same problems with the line of the file that each is about, for checks made after reading."""
+    document = _load(path)
+    return tuple(_located(document, problem.field.split("."), problem.reason) for problem in problems)
+
+
+def _load(path: Path) -> CommentedMap:
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise InputError(f"{path.name} is larger than 1 MiB.", hint="Give a campaign file, not a flight record.")
+        document = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path} could not be read: {error.strerror or error}.",
+                         hint=f"Give a YAML file, or a preset: {', '.join(preset_names())}.") from error
+    except MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark is not None else 1
+        raise InputError(f"{path.name} is not YAML.", problems=(Problem(f"line {line}", str(error.problem)),),
+                         hint="Mend the named line.") from error
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path.name} is not YAML: {error}.", hint="Give a UTF-8 YAML file.") from error
+    if not isinstance(document, CommentedMap):
+        raise InputError(f"{path.name} does not describe a campaign.", hint="Start it with `name: …` on line 1.",
+                         problems=(Problem("line 1", "must hold fields, `name: …` and so on"),))
+    return document
+
+
+def _located(document: CommentedMap, where: Sequence[str | int], reason: str) -> Problem:
+    return Problem(f"line {_line(document, where)}, {'.'.join(str(part) for part in where)}", reason)
+
+
+def _line(document: CommentedMap, where: Sequence[str | int]) -> int:
+    """The line of the deepest part of `where` that the file holds, counted from 1."""
+    node: object = document
+    line = 1
+    for part in where:
+        if isinstance(node, CommentedMap) and part in node:
+            line = node.lc.key(part)[0] + 1
+        elif isinstance(node, CommentedSeq) and isinstance(part, int) and part < len(node):
+            line = node.lc.item(part)[0] + 1
+        else:
+            break
+        node = node[part]
+    return line
+
+
+def with_settings(file: CampaignFile, settings: Mapping[tuple[str, ...], object]) -> CampaignFile:
+    """The file with some fields replaced, each named by its path. Raises InputError when the result is no campaign."""
+    document = file.model_dump()
+    for path, value in settings.items():
+        node = document
+        for part in path[:-1]:
+            node = node[part]
+        node[path[-1]] = value
+    try:
+        return CampaignFile.model_validate(document)
+    except ValidationError as error:
+        problems = tuple(Problem(".".join(map(str, entry["loc"])), entry["msg"]) for entry in error.errors())
+        raise InputError("These settings do not make a campaign.", problems=problems,
+                         hint="Correct the named settings.") from error
