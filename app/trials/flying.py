@@ -1,0 +1,112 @@
+"""What a flight shows of itself while it lasts, and how it is told to end: all in memory, nothing waits."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from app.core.experiments.base import Experiment
+from app.live.messages import FlightPhase, Phase, Row, Telemetry
+from app.vehicles.base import Sample
+
+MESSAGES_PER_S: Final = 25
+
+Publish = Callable[[Telemetry | FlightPhase], None]
+
+
+class AbortFlag:
+    """Raised once, from any thread; the flight asks for it at every sample."""
+
+    def __init__(self) -> None:
+        self._reason: str | None = None
+
+    def put_up(self, reason: str) -> None:
+        """The first reason counts."""
+        self._reason = self._reason or reason or "aborted"
+
+    def reason(self) -> str | None:
+        return self._reason
+
+
+class Airspace:
+    """The flights of this process, by trial. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._flags: dict[int, AbortFlag] = {}
+        self._lock = threading.Lock()
+
+    def enter(self, trial_id: int) -> AbortFlag:
+        with self._lock:
+            return self._flags.setdefault(trial_id, AbortFlag())
+
+    def leave(self, trial_id: int) -> None:
+        with self._lock:
+            self._flags.pop(trial_id, None)
+
+    def abort(self, trial_id: int, reason: str) -> bool:
+        """Whether that trial is being flown here, and so ends now."""
+        with self._lock:
+            flag = self._flags.get(trial_id)
+        if flag is not None:
+            flag.put_up(reason)
+        return flag is not None
+
+    def abort_all(self, reason: str) -> None:
+        with self._lock:
+            flags = tuple(self._flags.values())
+        for flag in flags:
+            flag.put_up(reason)
+
+    def trials(self) -> list[int]:
+        with self._lock:
+            return sorted(self._flags)
+
+
+class Monitor:
+    """Gathers one flight's samples and publishes them in at most 25 messages a second, with the error so far.
+
+    The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample, and no
+    further than the experiment scores; the flight's own error is computed from its full-rate record.
+    """
+
+    def __init__(self, campaign_id: int, trial_id: int, experiment: Experiment, publish: Publish) -> None:
+        self._campaign_id = campaign_id
+        self._trial_id = trial_id
+        self._output = experiment.output
+        self._scored_until_s = float(experiment.grid_s[-1])
+        self._publish = publish
+        self._rows: list[Row] = []
+        self._due_s = 0.0
+        self._last: tuple[float, float] | None = None
+        self._integral = 0.0
+
+    def phase(self, phase: Phase, note: str = "") -> None:
+        self._publish(FlightPhase(campaign_id=self._campaign_id, trial_id=self._trial_id, phase=phase, note=note))
+
+    def sample(self, sample: Sample) -> None:
+        self._score(sample.time_s, abs(sample.set_point_m - getattr(sample, self._output)))
+        self._rows.append((sample.time_s, sample.altitude_m, sample.climb_rate_m_s, sample.set_point_m,
+                           sample.reference_m, sample.thrust, sample.battery_v))
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            self._due_s = now_s + 1.0 / MESSAGES_PER_S
+            self.flush()
+
+    def flush(self) -> None:
+        """Send what has been gathered."""
+        if self._rows:
+            rows, self._rows = self._rows, []
+            self._publish(Telemetry(campaign_id=self._campaign_id, trial_id=self._trial_id, time_s=rows[-1][0],
+                                    samples=rows, error_so_far=self.error_so_far))
+
+    @property
+    def error_so_far(self) -> float | None:
+        if self._last is None or self._last[0] <= 0.0:
+            return None
+        return self._integral / self._last[0]
+
+    def _score(self, time_s: float, deviation: float) -> None:
+        if 0.0 <= time_s <= self._scored_until_s:
+            before_s, before = self._last if self._last is not None else (0.0, deviation)
+            self._integral += (time_s - before_s) * (before + deviation) / 2.0
+            self._last = (time_s, deviation)

@@ -1,0 +1,77 @@
+"""The computing processes, with real ones that are killed."""
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures import CancelledError
+from pathlib import Path
+
+import pytest
+
+from app.pool import CrashedError, Pool
+
+
+def double(number: int) -> int:
+    return 2 * number
+
+
+def die_once(flag: Path) -> int:
+    """Killed from outside as it were, the first time only."""
+    if not flag.exists():
+        flag.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 7
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def sleep_long(mine: Path) -> None:
+    mine.write_text(str(os.getpid()))
+    time.sleep(60)
+
+
+def refuse() -> None:
+    raise ValueError("not today")
+
+
+def test_results_and_errors_of_the_task_come_back() -> None:
+    with Pool(1, prepare=time.time) as pool:
+        assert pool.run(double, 21) == 42
+        with pytest.raises(ValueError, match="not today"):
+            pool.run(refuse)
+        assert pool.run(double, 4) == 8
+
+
+def test_a_killed_process_is_replaced_and_the_task_tried_again(tmp_path: Path) -> None:
+    with Pool(1, prepare=time.time) as pool:
+        assert pool.run(die_once, tmp_path / "flag") == 7
+
+
+def test_a_task_that_always_kills_its_process_fails_and_the_next_one_works() -> None:
+    with Pool(1, prepare=time.time) as pool:
+        with pytest.raises(CrashedError, match="died 2 times"):
+            pool.run(die)
+        assert pool.run(double, 3) == 6
+
+
+def test_closing_the_pool_ends_a_long_task_at_once(tmp_path: Path) -> None:
+    outcome: list[type[BaseException]] = []
+
+    def wait_for_it() -> None:
+        try:
+            pool.run(sleep_long, tmp_path / "pid")
+        except CancelledError as error:
+            outcome.append(type(error))
+
+    with Pool(1, prepare=time.time) as pool:
+        waiting = threading.Thread(target=wait_for_it)
+        waiting.start()
+        while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():
+            time.sleep(0.01)
+    waiting.join(5)
+    assert outcome == [CancelledError]
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
