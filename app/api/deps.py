@@ -1,0 +1,100 @@
+"""What routes ask for: a reader's session, a writer's session, at most one carrying-out per idempotency key."""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from typing import Annotated, TypeVar
+
+from fastapi import Depends, Header, Path, Query, Request
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+
+from app.db.idempotency import carry_out_once
+from app.db.session import Database
+from app.errors import MediaTypeError
+from app.live.link import Live as LiveLink
+from app.settings import Settings
+
+M = TypeVar("M", bound=BaseModel)
+
+Id = Annotated[int, Path(ge=1, le=2**63 - 1)]
+Limit = Annotated[int, Query(ge=1, le=200, description="how many items the page may hold")]
+CursorText = Annotated[str | None, Query(max_length=500, description="`next_cursor` of the page before")]
+IdempotencyKey = Annotated[str | None, Header(
+    alias="Idempotency-Key", min_length=1, max_length=200,
+    description="a text of the caller's own, new for each act: the same request sent again with it is harmless")]
+
+
+def _database(request: Request) -> Database:
+    database: Database = request.app.state.database
+    return database
+
+
+def _settings(request: Request) -> Settings:
+    settings: Settings = request.app.state.settings
+    return settings
+
+
+def _live(request: Request) -> LiveLink:
+    live: LiveLink = request.app.state.live
+    return live
+
+
+CurrentDatabase = Annotated[Database, Depends(_database)]
+CurrentSettings = Annotated[Settings, Depends(_settings)]
+Live = Annotated[LiveLink, Depends(_live)]
+
+
+def _reader(database: CurrentDatabase) -> Iterator[Session]:
+    with database.read() as session:
+        yield session
+
+
+def _writer(database: CurrentDatabase) -> Iterator[Session]:
+    with database.write() as session:
+        yield session
+
+
+# Scope "function": the transaction is over, for better or worse, before the answer is sent.
+Reader = Annotated[Session, Depends(_reader, scope="function")]
+Writer = Annotated[Session, Depends(_writer, scope="function")]
+
+
+class Once:
+    """Carries out a POST in one transaction, and not again when it comes again with the same idempotency key."""
+
+    def __init__(self, database: Database, key: str | None, fingerprint: str) -> None:
+        self._database = database
+        self._key = key
+        self._fingerprint = fingerprint
+
+    def __call__(self, answer: type[M], work: Callable[[Session], M]) -> M:
+        """What `work` answers, or what it answered the first time. Raises KeyReusedError for another request."""
+        with self._database.write() as session:
+            if self._key is None:
+                return work(session)
+            return carry_out_once(session, self._key, self._fingerprint, answer, work)
+
+
+def fingerprint(request: Request, body_digest: str) -> str:
+    """What makes two requests the same one: method, path and body."""
+    return hashlib.sha256(f"{request.method} {request.url.path} {body_digest}".encode()).hexdigest()
+
+
+async def _once(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> Once:
+    return Once(database, key, fingerprint(request, hashlib.sha256(await request.body()).hexdigest()))
+
+
+Act = Annotated[Once, Depends(_once)]
+
+
+def json_only(request: Request) -> None:
+    """Refuse a body that is not JSON with a sentence about it, rather than with a list of missing fields."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    has_body = request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers
+    if has_body and kind != "application/json":
+        raise MediaTypeError(f"The body is {kind or 'of no stated type'}, and JSON is expected here.",
+                             hint="Send JSON with the header `Content-Type: application/json`.")
+
+
+JSON_BYTES = 2**20
+"""Largest JSON body."""

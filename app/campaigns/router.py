@@ -1,0 +1,80 @@
+"""Campaigns and their proposals over HTTP."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, status
+
+from app.api.deps import JSON_BYTES, Act, CursorText, Id, Limit, Reader, Writer, json_only
+from app.campaigns import service
+from app.campaigns.schemas import Campaign, CampaignEdit, CampaignSummary, Clone, Finish, NewCampaign, NextFlight
+from app.campaigns.service import Sort
+from app.campaigns.states import CampaignState
+from app.schemas import Page
+
+router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)],
+                   max_body_size=JSON_BYTES)
+
+
+@router.get("")
+def list_campaigns(session: Reader,
+                   search: Annotated[str, Query(max_length=200, description="part of the name")] = "",
+                   state: Annotated[list[CampaignState] | None, Query()] = None,
+                   vehicle: Annotated[list[str] | None, Query(description="kinds of vehicle")] = None,
+                   sort: Sort = Sort.NEWEST, limit: Limit = 50, cursor: CursorText = None) -> Page[CampaignSummary]:
+    """Campaigns with what a card shows of them."""
+    return service.list_campaigns(session, search=search, states=state or [], vehicles=vehicle or [], sort=sort,
+                                  limit=limit, cursor=cursor)
+
+
+@router.post("", status_code=status.HTTP_201_CREATED)
+def create_campaign(act: Act, body: NewCampaign) -> Campaign:
+    """Create a campaign; its first gains are then computed, and it becomes ready."""
+    return act(Campaign, lambda session: service.create_campaign(session, body))
+
+
+@router.get("/{campaign_id}")
+def get_campaign(session: Reader, campaign_id: Id) -> Campaign:
+    return service.get_campaign(session, campaign_id)
+
+
+@router.patch("/{campaign_id}")
+def edit_campaign(session: Writer, campaign_id: Id, body: CampaignEdit) -> Campaign:
+    """Rename a campaign at any time; change its definition or vehicle before the first flight."""
+    return service.edit_campaign(session, campaign_id, body)
+
+
+@router.delete("/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT)
+def delete_campaign(session: Writer, campaign_id: Id) -> None:
+    """Delete a campaign in which nothing has flown."""
+    service.delete_campaign(session, campaign_id)
+
+
+@router.post("/{campaign_id}/finish")
+def finish_campaign(act: Act, campaign_id: Id, body: Finish | None = None) -> Campaign:
+    """End a campaign between flights, on the operator's word."""
+    reason = (body or Finish()).reason
+    return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason))
+
+
+@router.post("/{campaign_id}/archive")
+def archive_campaign(act: Act, campaign_id: Id) -> Campaign:
+    """Put a finished campaign away."""
+    return act(Campaign, lambda session: service.archive_campaign(session, campaign_id))
+
+
+@router.post("/{campaign_id}/clone", status_code=status.HTTP_201_CREATED)
+def clone_campaign(act: Act, campaign_id: Id, body: Clone | None = None) -> Campaign:
+    """A new campaign with the same definition, linked to this one."""
+    return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
+
+
+@router.get("/{campaign_id}/proposal")
+def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
+    """Where the next gain set stands, and the gain set once it is there."""
+    return service.next_flight(session, campaign_id)
+
+
+@router.post("/{campaign_id}/proposal", status_code=status.HTTP_202_ACCEPTED)
+def compute_proposal(act: Act, campaign_id: Id) -> NextFlight:
+    """Compute the next gain set anew."""
+    return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))

@@ -1,0 +1,35 @@
+"""Requests that may come twice: the first one's answer is kept in the transaction that carried it out."""
+
+from collections.abc import Callable
+from datetime import timedelta
+from typing import Final, TypeVar
+
+from pydantic import BaseModel
+from sqlalchemy import delete
+from sqlalchemy.orm import Session
+
+from app.db.models import IdempotencyRow
+from app.db.types import utc_now
+from app.errors import KeyReusedError, Problem
+
+KEPT: Final = timedelta(days=7)
+M = TypeVar("M", bound=BaseModel)
+
+
+def carry_out_once(session: Session, key: str, fingerprint: str, answer: type[M], work: Callable[[Session], M]) -> M:
+    """Call `work`, or give the answer it gave before to this key.
+
+    The session must hold the write lock: two requests with one key then come one after the other.
+    Raises KeyReusedError when the key came with another request.
+    """
+    if (known := session.get(IdempotencyRow, key)) is not None:
+        if known.fingerprint != fingerprint:
+            raise KeyReusedError(
+                f"The idempotency key {key!r} was used before, for another request.",
+                hint="Use a new key for every act, and the same key only to send the very same request again.",
+                problems=(Problem("Idempotency-Key", "stands for another request"),))
+        return answer.model_validate_json(known.answer)
+    session.execute(delete(IdempotencyRow).where(IdempotencyRow.created_at < utc_now() - KEPT))
+    result = work(session)
+    session.add(IdempotencyRow(key=key, fingerprint=fingerprint, answer=result.model_dump_json()))
+    return result

@@ -1,0 +1,38 @@
+"""Jobs over HTTP."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query
+
+from app.api.deps import JSON_BYTES, Act, CursorText, Id, Limit, Reader, json_only
+from app.jobs import service
+from app.jobs.schemas import Job
+from app.jobs.states import JobState
+from app.schemas import Page
+
+router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json_only)], max_body_size=JSON_BYTES)
+
+
+@router.get("")
+def list_jobs(session: Reader, state: Annotated[list[JobState] | None, Query()] = None,
+              campaign_id: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None, limit: Limit = 50,
+              cursor: CursorText = None) -> Page[Job]:
+    """Jobs, the newest first."""
+    return service.list_jobs(session, states=state or [], campaign_id=campaign_id, limit=limit, cursor=cursor)
+
+
+@router.get("/{job_id}")
+def get_job(session: Reader, job_id: Id) -> Job:
+    return service.get_job(session, job_id)
+
+
+@router.post("/{job_id}/cancel")
+def cancel_job(act: Act, job_id: Id) -> Job:
+    """End a job that waits or runs; what it has computed is dropped."""
+    return act(Job, lambda session: service.cancel_job(session, job_id))
+
+
+@router.post("/{job_id}/retry")
+def retry_job(act: Act, job_id: Id) -> Job:
+    """Let a failed or cancelled job run again."""
+    return act(Job, lambda session: service.retry_job(session, job_id))

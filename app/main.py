@@ -1,0 +1,61 @@
+"""The web application, put together."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
+from starlette.middleware.gzip import GZipMiddleware
+
+from app import __version__
+from app.api import catalogue, errors, events
+from app.api.headers import HeadersMiddleware
+from app.api.openapi import describe
+from app.campaigns.router import router as campaigns
+from app.db.migrate import require_current
+from app.db.session import Database
+from app.fleet.router import router as fleet
+from app.jobs.router import router as jobs
+from app.live.link import live_link
+from app.settings import Settings
+from app.trials.router import records
+from app.trials.router import router as trials
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The application on the settings' database, which must be at the program's revision when it starts.
+
+    Raises SchemaError at start-up when it is not.
+    """
+    settings = settings or Settings()
+    database = Database(settings.database_file)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        require_current(settings.database_file)
+        async with live_link(settings.data_dir, database) as live:
+            app.state.live = live
+            yield
+        database.close()
+
+    app = FastAPI(
+        title="Gainline", version=__version__, lifespan=lifespan, openapi_url="/api/openapi.json", docs_url=None,
+        redoc_url=None, responses=errors.RESPONSES, generate_unique_id_function=_operation_id,
+        max_body_size=settings.max_upload_bytes,
+    )
+    app.state.settings = settings
+    app.state.database = database
+    for router in (catalogue.router, campaigns, trials, records, fleet, jobs, events.router):
+        app.include_router(router)
+    errors.install(app)
+    describe(app)
+    app.add_middleware(GZipMiddleware, minimum_size=1000)
+    app.add_middleware(HeadersMiddleware)
+    if (settings.ui_dir / "index.html").is_file():
+        app.frontend("/", directory=settings.ui_dir, fallback="index.html")
+    return app
+
+
+def _operation_id(route: APIRoute) -> str:
+    """The function's name, so that generated clients have readable calls."""
+    return route.name

@@ -1,0 +1,74 @@
+"""What the slices' request and response models have in common."""
+
+from typing import Annotated, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+T = TypeVar("T")
+
+OptionValue = bool | int | float | str
+"""A setting of a strategy or vehicle; which kind it has to be is the setting's own matter."""
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A finite JSON number: no text that looks like one, no NaN, no infinity."""
+
+Text = Annotated[str, Field(max_length=2000)]
+Name = Annotated[str, Field(min_length=1, max_length=120, pattern=r"\S", examples=["AR.Drone takeoff"])]
+Version = Annotated[int, Field(ge=1, strict=True, description="the version that was edited, as last read")]
+
+
+class Request(BaseModel):
+    """A body sent to us: a field that we do not know is a mistake, and said so."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)
+
+
+class ProblemField(BaseModel):
+    """One refused field, dotted as the caller wrote it, and why it was refused."""
+
+    field: str
+    reason: str
+
+
+class Problem(BaseModel):
+    """An error (RFC 9457): what happened, what to do about it, and which fields are to blame."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    hint: str
+    problems: list[ProblemField]
+
+
+class Trouble(BaseModel):
+    """Why something is not to be had at present, and what to do about it."""
+
+    title: str
+    detail: str
+    hint: str
+
+
+class Page(BaseModel, Generic[T]):
+    """A part of a list. `next_cursor` asks for the part after it; null at the end. `total` counts the whole list."""
+
+    items: list[T]
+    total: int
+    next_cursor: str | None
+
+
+class Check(BaseModel):
+    """One check of the gate: its worst number and the limit, where it has them."""
+
+    name: str
+    passed: bool
+    sentence: str
+    worst: float | None
+    limit: float | None
+
+
+class Gate(BaseModel):
+    """What the gate said about a gain set before its flight."""
+
+    passed: bool
+    checks: list[Check]

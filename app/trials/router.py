@@ -1,0 +1,102 @@
+"""Trials and their records over HTTP."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Response, status
+from starlette.concurrency import run_in_threadpool
+
+from app.api.deps import JSON_BYTES, Act, CurrentDatabase, Id, Live, Reader, Writer, json_only
+from app.api.uploads import REQUEST_BODY, Record
+from app.trials import service
+from app.trials.schemas import Abort, AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial, TrialEdit
+
+router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)], max_body_size=JSON_BYTES)
+
+
+@router.get("/campaigns/{campaign_id}/trials")
+def list_trials(session: Reader, campaign_id: Id) -> list[Trial]:
+    """All trials of a campaign, in the order of their numbers."""
+    return service.list_trials(session, campaign_id)
+
+
+@router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
+def create_trial(act: Act, campaign_id: Id, body: NewTrial) -> Trial:
+    """Plan a trial of the proposal or of gains of one's own, and fly it at once if asked to."""
+    return act(Trial, lambda session: service.create_trial(session, campaign_id, body))
+
+
+@router.get("/trials/{trial_id}")
+def get_trial(session: Reader, trial_id: Id) -> Trial:
+    return service.get_trial(session, trial_id)
+
+
+@router.patch("/trials/{trial_id}")
+def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
+    """Change the note."""
+    return service.edit_trial(session, trial_id, body)
+
+
+@router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
+def fly_trial(act: Act, trial_id: Id, body: FlightOrder | None = None) -> Trial:
+    """Ask for the flight of a planned trial. A vehicle that has a flight already refuses a second one."""
+    return act(Trial, lambda session: service.fly_trial(session, trial_id, body or FlightOrder()))
+
+
+@router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)
+async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body: Abort | None = None) -> AbortAnswer:
+    """End a flight now. Goes straight to the worker and waits for no storage; asking again is harmless."""
+    reason = (body or Abort()).reason
+    if live.worker_running and (await live.abort(trial_id, reason)).accepted:
+        return AbortAnswer(trial_id=trial_id, accepted=True,
+                           sentence="The worker ends the flight and restores the safe gains.")
+    return await run_in_threadpool(_withdraw, database, trial_id, reason)
+
+
+def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAnswer:
+    with database.write() as session:
+        return service.withdraw_flight(session, trial_id, reason)
+
+
+@router.post("/trials/{trial_id}/cancel")
+def cancel_trial(act: Act, trial_id: Id) -> Trial:
+    """Give up a trial that has not flown."""
+    return act(Trial, lambda session: service.cancel_trial(session, trial_id))
+
+
+@router.post("/trials/{trial_id}/classify")
+def classify_trial(act: Act, trial_id: Id, body: Classification) -> Trial:
+    """Say what a finished flight is worth; whatever was computed from it is computed again."""
+    return act(Trial, lambda session: service.classify_trial(session, trial_id, body))
+
+
+@router.get("/trials/{trial_id}/trajectory")
+def get_trajectory(session: Reader, trial_id: Id,
+                   points: Annotated[int, Query(ge=10, le=20_000)] = 1000) -> Trajectory:
+    """The record thinned to at most so many points, peaks kept."""
+    return service.get_trajectory(session, trial_id, points)
+
+
+@router.get("/trials/{trial_id}/trajectory.csv", response_class=Response, responses={
+    200: {"content": {"text/csv": {"schema": {"type": "string"}}},
+          "headers": {"X-Checksum-SHA256": {"schema": {"type": "string"},
+                                            "description": "checksum of the stored record"}}}})
+def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
+    """The whole record, every number exactly as it is stored (single precision, nine digits)."""
+    export = service.export_trajectory(session, trial_id)
+    return Response(export.csv, media_type="text/csv", headers={
+        "Content-Disposition": f'attachment; filename="{export.file_name}"', "X-Checksum-SHA256": export.checksum})
+
+
+records = APIRouter(prefix="/api", tags=["trials"])
+"""Apart from the rest, because what comes in here is no JSON."""
+
+
+@records.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
+def upload_trajectory(record: Record, trial_id: Id) -> Trial:
+    """Hand in the record of a flight made elsewhere, or the recovered one of a lost flight.
+
+    CSV with the columns time_s (seconds since the command) and altitude_m (up), and optionally the other channels; at
+    most 200 000 rows. It is scored and classed at once.
+    """
+    trajectory = service.read_record(record.file)
+    return record.once(Trial, lambda session: service.import_trajectory(session, trial_id, trajectory))

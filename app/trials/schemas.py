@@ -1,0 +1,116 @@
+"""What trials and trajectories look like from outside."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, Field
+
+from app.schemas import Gate, Number, Request, Text, Version
+from app.trials.states import FlightState, TrialState
+
+Kind = Literal["start", "step", "shorter step", "repeat", "manual"]
+Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1000)]
+
+
+class FlightOrder(Request):
+    """How a simulated flight is to run: simulated time over wall time, null as fast as possible."""
+
+    speed: Speed | None = 10.0
+
+
+class NewTrial(Request):
+    """A trial of a proposal, or of gains of one's own: exactly one of the two. With `fly` it is flown at once."""
+
+    proposal_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)] | None = None
+    gains: Annotated[dict[str, Number], Field(max_length=50, examples=[{"kp": 283, "ki": 13, "kd": 82}])] | None = None
+    note: Text = ""
+    fly: FlightOrder | None = None
+
+
+class TrialEdit(Request):
+    """A person's note."""
+
+    version: Version
+    note: Text
+
+
+class Classification(Request):
+    """A person's word on a finished flight."""
+
+    version: Version
+    outcome: Literal["valid", "aborted", "invalid"]
+    reason: Annotated[str, Field(min_length=1, max_length=500, pattern=r"\S")]
+
+
+class Abort(Request):
+    """Why the flight is to end now."""
+
+    reason: Annotated[str, Field(max_length=500)] = "aborted by the operator"
+
+
+class AbortAnswer(BaseModel):
+    """`accepted` is true when the worker has taken the abort; the flight's end is reported by its events."""
+
+    trial_id: int
+    accepted: bool
+    sentence: str
+
+
+class RecordBrief(BaseModel):
+    """The stored record of a flight, without its samples."""
+
+    samples: int
+    duration_s: float
+    source: str
+    clock: str
+    channels: list[str]
+    checksum: str
+
+
+class FlightBrief(BaseModel):
+    """The last order to the vehicle for this trial. `problem` says why it failed."""
+
+    id: int
+    state: FlightState
+    problem: str
+
+
+class Trial(BaseModel):
+    """One flight of one policy. `error` is the performance measure, lower is better."""
+
+    id: int
+    version: int
+    campaign_id: int
+    number: int
+    state: TrialState
+    kind: Kind
+    gains: dict[str, float]
+    read_back: dict[str, float] | None
+    proposal_id: int | None
+    error: float | None
+    predicted_error: float | None
+    overshoot_m: float | None
+    verdict: Annotated[str, Field(description="the flight against the best before it and against its prediction")]
+    reason: Annotated[str, Field(description="why it has the state that it has, where somebody or something said so")]
+    note: str
+    gate: Gate
+    record: RecordBrief | None
+    flight: FlightBrief | None
+    seed: int
+    speed: float | None
+    created_at: datetime
+    flown_at: datetime | None
+    actions: Annotated[list[str], Field(description="what may be done with it now: fly, cancel, abort, upload, …")]
+
+
+class Trajectory(BaseModel):
+    """A flight's record, thinned to the asked number of points; every channel has as many values as `time_s`."""
+
+    trial_id: int
+    source: str
+    clock: str
+    checksum: str
+    samples: Annotated[int, Field(description="samples of the stored record, before thinning")]
+    units: dict[str, str]
+    time_s: list[float]
+    channels: dict[str, list[float]]
