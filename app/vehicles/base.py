@@ -41,7 +41,8 @@ class FlightOrder:
     """What one flight is to do.
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
-    over wall time (10.0: ten times as fast as life); None runs as fast as possible. Vehicles that own no time ignore it.
+    over wall time (10.0: ten times as fast as life); None runs as fast as possible. Vehicles that own no time ignore
+    it.
     """
 
     seed: int

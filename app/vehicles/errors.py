@@ -1,0 +1,16 @@
+"""Errors of vehicles.
+
+    GainlineError
+    └── VehicleError          a vehicle could not do what was asked
+        └── SafeGainsError    it may still hold experimental gains: to be quarantined
+"""
+
+from app.core.errors import GainlineError
+
+
+class VehicleError(GainlineError):
+    """A vehicle could not do what was asked of it."""
+
+
+class SafeGainsError(VehicleError):
+    """The safe gains could not be verified on the vehicle; it must not fly until a person has looked at it."""

@@ -1,0 +1,24 @@
+"""A vehicle that flies elsewhere: its flights come in as files."""
+
+from typing import Final, NoReturn
+
+from app.core.policy import Gains
+from app.vehicles.errors import VehicleError
+from app.vehicles.kinds import Options, VehicleKind
+
+
+def _open(_options: Options, _safe_gains: Gains) -> NoReturn:
+    raise VehicleError("This vehicle flies elsewhere, so this program cannot fly it.",
+                       hint="Fly the proposed gains yourself, then upload the flight's log as CSV with the columns "
+                            "time_s and altitude_m.")
+
+
+IMPORT: Final = VehicleKind(
+    name="import",
+    title="Flown elsewhere",
+    line="You fly the proposed gains on your own vehicle and upload the recorded altitude as CSV.",
+    is_real=True,
+    can_fly=False,
+    options=(),
+    open=_open,
+)

@@ -1,0 +1,174 @@
+"""One flight of the AR.Drone 2 in JSBSim, closed at 512 Hz around the autopilot's vertical loop.
+
+The aircraft file holds attitude, heading and horizontal position by itself, so that each step crosses into JSBSim for
+three numbers out (altitude, sink rate, tilt) and one in (thrust).
+"""
+
+import logging
+import math
+from pathlib import Path
+from typing import Final
+
+import jsbsim
+import numpy as np
+
+from app.core.control.vertical_loop import RATE_HZ, STEP_S
+from app.vehicles.disturbances import gusts, streams
+from app.vehicles.errors import VehicleError
+from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, Integers, Rows, control
+from app.vehicles.simulated import MOST_STEPS
+
+MASS_KG: Final = 0.4
+FULL_THRUST_N: Final = 4 * 0.35 * 4.4482216
+GRAVITY_M_S2: Final = 9.81
+
+_ROOT: Final = Path(__file__).parent
+_AIRCRAFT: Final = "ardrone2"
+_LATITUDE_DEG: Final = 52.0
+_FOOT_M: Final = 0.3048
+_POUND_KG: Final = 0.45359237
+_CENTRE_ABOVE_GROUND_M: Final = 0.1 - 0.00196
+"""Height at which the four springs carry the weight."""
+
+_GROUND_STEPS: Final = 4
+"""Steps of JSBSim for one of the loop near the ground: the contacts settle in 1 ms, less than one step of the loop, and
+JSBSim's integration would let the vehicle dance on them."""
+_CLEAR_OF_GROUND_M: Final = 0.02
+_SETTLING_STEPS: Final = 200
+_GUST_CORRELATION_S: Final = 1.0
+_FULL_BATTERY_V: Final = 11.1
+
+_log = logging.getLogger(__name__)
+
+
+class _Logger(jsbsim.FGLogger):
+    """JSBSim's messages into Python's log instead of standard output; banners and echoes are dropped."""
+
+    _LEVELS: Final = {jsbsim.LogLevel.WARN: logging.WARNING, jsbsim.LogLevel.ERROR: logging.ERROR,
+                      jsbsim.LogLevel.FATAL: logging.CRITICAL}
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._level: int | None = None
+        self._text = ""
+
+    def set_level(self, level: jsbsim.LogLevel) -> None:
+        self._level = self._LEVELS.get(level)
+        self._text = ""
+
+    def file_location(self, filename: str, line: int) -> None:
+        self._text += f"{filename}:{line}: "
+
+    def message(self, message: str) -> None:
+        self._text += message
+
+    def format(self, format: jsbsim.LogFormat) -> None:  # noqa: A002
+        """Colours say nothing here."""
+
+    def flush(self) -> None:
+        if self._level is not None:
+            _log.log(self._level, "JSBSim: %s", self._text.strip())
+
+
+def new_aircraft() -> jsbsim.FGFDMExec:
+    """The AR.Drone 2 of the aircraft file, standing on its springs at 52° north, sea level, at 512 Hz; no wind.
+
+    Raises VehicleError when JSBSim cannot load it.
+    """
+    jsbsim.set_logger(_Logger())
+    fdm = jsbsim.FGFDMExec(str(_ROOT))
+    fdm.set_debug_level(0)
+    fdm.set_aircraft_path("aircraft")
+    if not fdm.load_model(_AIRCRAFT):
+        raise VehicleError("JSBSim could not load the simulated vehicle.", hint="Install the program again.")
+    fdm.set_dt(STEP_S)
+    fdm["ic/lat-geod-deg"] = _LATITUDE_DEG
+    fdm["ic/h-agl-ft"] = _CENTRE_ABOVE_GROUND_M / _FOOT_M
+    if not fdm.run_ic():
+        raise VehicleError("JSBSim could not place the vehicle on the ground.", hint="Install the program again.")
+    return fdm
+
+
+class JsbsimFlight:
+    """A simulation by the protocol of `app.vehicles.simulated`.
+
+    `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone.
+    """
+
+    def __init__(self, options: dict[str, float], seed: int) -> None:
+        noise, *directions = streams(seed, 4)
+        self._noise_m = noise.normal(0.0, options["altitude_noise_m"], MOST_STEPS)
+        self._gusts_ft_s = [
+            gusts(direction, MOST_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=_GUST_CORRELATION_S).tolist()
+            for direction in directions] if options["gust_m_s"] > 0.0 else []
+        self._fdm = new_aircraft()
+        self._configure(options)
+        self._resting_steps = round(options["start_latency_s"] * RATE_HZ)
+        self._sags = options["battery_sag"] > 0.0
+        self._autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
+        self._done = 0
+        self._ground_m = self._settle()
+
+    def advance(self, steps: int, command: Integers) -> Rows:
+        """As the protocol says. The altitude recorded is the one sensed, noise included."""
+        rows = np.empty((steps, len(CHANNELS)))
+        rows[:, BATTERY] = _FULL_BATTERY_V
+        altitude_ft = self._property("position/h-agl-ft").get_double_value
+        sink_ft_s = self._property("velocities/v-down-fps").get_double_value
+        cosine_of_tilt = self._property("attitude/cosine-of-tilt").get_double_value
+        set_thrust = self._property("motors/thrust-norm").set_double_value
+        run, autopilot, done, resting = self._fdm.run, self._autopilot, self._done, self._resting_steps
+        for i, (row, noise_m) in enumerate(zip(rows, self._noise_m[done:done + steps].tolist(), strict=True)):
+            altitude_m = altitude_ft() * _FOOT_M - self._ground_m
+            set_thrust(control(autopilot, command, altitude_m + noise_m, sink_ft_s() * -_FOOT_M, cosine_of_tilt(),
+                               done + i >= resting, row))
+            if self._sags or self._gusts_ft_s:
+                self._exchange(done + i, row)
+            if altitude_m > _CLEAR_OF_GROUND_M:
+                run()
+            else:
+                self._run_near_ground()
+        self._done += steps
+        return rows
+
+    @property
+    def horizontal_offset_m(self) -> tuple[float, float]:
+        """How far north and east of its place of takeoff the vehicle is."""
+        north_ft, east_ft = (self._fdm[f"position/from-start-neu-{axis}-ft"] for axis in "ne")
+        return north_ft * _FOOT_M, east_ft * _FOOT_M
+
+    def _property(self, path: str) -> jsbsim.FGPropertyNode:
+        """A handle that skips the search for the name at every access."""
+        node = self._fdm.get_property_manager().get_node(path)
+        if node is None:
+            raise VehicleError(f"The simulated vehicle has no property {path}.", hint="Install the program again.")
+        return node
+
+    def _configure(self, options: dict[str, float]) -> None:
+        fdm = self._fdm
+        fdm["motors/thrust-scale"] = options["thrust_scale"]
+        fdm["motors/lag-s"] = options["motor_lag_s"]
+        fdm["battery/sag"] = options["battery_sag"]
+        fdm["inertia/pointmass-weight-lbs"] = (options["mass_kg"] - MASS_KG) / _POUND_KG
+        blows_to = math.radians(options["wind_from_deg"] + 180.0)
+        fdm["atmosphere/wind-north-fps"] = options["wind_m_s"] / _FOOT_M * math.cos(blows_to)
+        fdm["atmosphere/wind-east-fps"] = options["wind_m_s"] / _FOOT_M * math.sin(blows_to)
+
+    def _settle(self) -> float:
+        """Stand until nothing moves; the height of the centre then, m."""
+        for _ in range(_SETTLING_STEPS):
+            self._run_near_ground()
+        return self._fdm["position/h-agl-ft"] * _FOOT_M
+
+    def _run_near_ground(self) -> None:
+        self._fdm.set_dt(STEP_S / _GROUND_STEPS)
+        for _ in range(_GROUND_STEPS):
+            self._fdm.run()
+        self._fdm.set_dt(STEP_S)
+
+    def _exchange(self, step: int, row: Rows) -> None:
+        """What only some flights have: gusts in, battery voltage out."""
+        if self._gusts_ft_s:
+            for axis, series in zip(("north", "east", "down"), self._gusts_ft_s, strict=True):
+                self._fdm[f"atmosphere/gust-{axis}-fps"] = series[step]
+        row[BATTERY] = _FULL_BATTERY_V * self._fdm["battery/voltage-norm"]

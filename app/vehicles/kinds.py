@@ -1,0 +1,76 @@
+"""What a kind of vehicle is: its description, its settings, and how one is opened."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from app.core.errors import InputError, Problem
+from app.core.policy import Gains
+from app.vehicles.base import OptionValue, Vehicle, VehicleOption
+
+Options = Mapping[str, OptionValue]
+
+
+def _nothing(_options: Options) -> tuple[Problem, ...]:
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleKind:
+    """A registered kind of vehicle.
+
+    `open(options, safe_gains)` gets complete, checked options and returns a vehicle that holds its safe gains;
+    `conflicts(options)` names options that are possible one by one but not together.
+    """
+
+    name: str
+    title: str
+    line: str
+    is_real: bool
+    can_fly: bool
+    options: tuple[VehicleOption, ...]
+    open: Callable[[Options, Gains], Vehicle]
+    conflicts: Callable[[Options], tuple[Problem, ...]] = _nothing
+
+    def check(self, options: Mapping[str, object], *, field: str) -> dict[str, OptionValue]:
+        """The options completed with the defaults. Raises InputError naming every unknown or impossible one."""
+        known = {option.name: option for option in self.options}
+        names = ", ".join(known) or "none"
+        problems = [Problem(f"{field}.{name}", f"is not an option of {self.name} ({names})")
+                    for name in options if name not in known]
+        complete: dict[str, OptionValue] = {}
+        for name, option in known.items():
+            value, reason = _accept(option, options.get(name, option.default))
+            complete[name] = value
+            if reason:
+                problems.append(Problem(f"{field}.{name}", reason))
+        if not problems:
+            problems = [Problem(f"{field}.{p.field}", p.reason) for p in self.conflicts(complete)]
+        if problems:
+            raise InputError(f"These options do not suit the vehicle {self.name}.", problems=tuple(problems),
+                             hint="Correct the named options, or leave them out to get their defaults.")
+        return complete
+
+
+def _accept(option: VehicleOption, value: object) -> tuple[OptionValue, str | None]:
+    """`value` in the type of the option's default, and why it cannot be used, if so."""
+    default = option.default
+    if isinstance(default, bool | str):
+        fits = isinstance(value, type(default))
+        return (value, None) if isinstance(value, bool | str) and fits else (default, _expected(default))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return default, f"must be a number, got {value!r}"
+    if not math.isfinite(value):
+        return default, "must be a finite number"
+    low, high = option.lower, option.upper
+    if (low is not None and value < low) or (high is not None and value > high):
+        return default, f"must lie in {_edge(low)} … {_edge(high)} {option.unit}, got {value:g}"
+    return float(value), None
+
+
+def _expected(default: bool | str) -> str:
+    return "must be true or false" if isinstance(default, bool) else "must be a text"
+
+
+def _edge(limit: float | None) -> str:
+    return "any" if limit is None else f"{limit:g}"

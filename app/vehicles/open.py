@@ -1,0 +1,59 @@
+"""The vehicles there are, and the one way to take control of one."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import Final
+
+from app.core.errors import InputError, Problem
+from app.core.policy import Gains
+from app.vehicles.base import OptionValue, Vehicle
+from app.vehicles.errors import SafeGainsError
+from app.vehicles.imported import IMPORT
+from app.vehicles.jsbsim.kind import JSBSIM
+from app.vehicles.kinds import VehicleKind
+from app.vehicles.twin import TWIN
+
+VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
+    {kind.name: kind for kind in (JSBSIM, TWIN, IMPORT)})
+
+
+def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:
+    """Raises InputError when there is no vehicle of that kind."""
+    if kind not in VEHICLE_KINDS:
+        raise InputError("There is no such vehicle.", hint=f"Choose one of: {', '.join(VEHICLE_KINDS)}.",
+                         problems=(Problem(field, f"unknown kind {kind!r}"),))
+    return VEHICLE_KINDS[kind]
+
+
+def check_options(kind: str, options: Mapping[str, object], *, field: str = "vehicle") -> dict[str, OptionValue]:
+    """The options of a vehicle completed with their defaults.
+
+    Raises InputError naming every field that is unknown or out of range as `<field>.options.<name>`.
+    """
+    return get_kind(kind, field=f"{field}.kind").check(options, field=f"{field}.options")
+
+
+@contextmanager
+def open_vehicle(kind: str, options: Mapping[str, object], *, safe_gains: Gains) -> Iterator[Vehicle]:
+    """Control of one vehicle; on any exit, an exception included, it is left holding `safe_gains`, read back.
+
+    Raises InputError for options it cannot have, VehicleError when it cannot be opened, and SafeGainsError when the
+    safe gains could not be verified at the end.
+    """
+    vehicle = get_kind(kind).open(check_options(kind, options), safe_gains)
+    try:
+        yield vehicle
+    finally:
+        try:
+            _restore(vehicle)
+        finally:
+            vehicle.close()
+
+
+def _restore(vehicle: Vehicle) -> None:
+    wanted = dict(vehicle.safe_gains)
+    held = vehicle.stage(wanted)
+    if held != wanted:
+        raise SafeGainsError(f"The vehicle holds {held} instead of its safe gains {wanted}.",
+                             hint="Do not fly it. Set its gains by hand, read them back, then release it.")

@@ -1,0 +1,171 @@
+"""What all simulated vehicles share: gains, the course of a flight, its record, pacing and aborts."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Final, Protocol
+
+import numpy as np
+
+from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
+from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S
+from app.core.errors import GainsError, Problem
+from app.core.policy import Gains
+from app.core.trajectory import Trajectory
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
+from app.vehicles.errors import VehicleError
+from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, TARGET, Integers, Rows
+from app.vehicles.pacing import Pacer
+
+GAIN_NAMES: Final = ("kp", "ki", "kd")
+TAKEOFF_ALTITUDE_M: Final = 3.0
+FLIGHT_S: Final = 33.0
+"""Recorded after the command: a little more than the 32.6 s that are scored."""
+TELEMETRY_HZ: Final = 50
+
+_LANDING_RATE_M_S: Final = 0.5
+_LANDING_S: Final = 30.0
+_LANDED_M: Final = 0.02
+_LANDING_SLICE: Final = RATE_HZ // 4
+
+STEPS: Final = round(FLIGHT_S * RATE_HZ) + 1
+MOST_STEPS: Final = STEPS + round(_LANDING_S * RATE_HZ)
+"""Steps of the longest flight: aborted at the last instant, then landed."""
+
+ShouldAbort = Callable[[], str | None]
+
+
+class Simulation(Protocol):
+    """One flight of a simulated vehicle, resting on the ground and commanded to take off at step 0."""
+
+    def advance(self, steps: int, command: Integers) -> Rows:
+        """Fly so many steps of 1/512 s under the autopilot's `command`; one row of `CHANNELS` for each, shape
+        (steps, 8), holding what the autopilot sensed at the beginning of the step and the thrust it then chose."""
+        ...
+
+
+class SimulatedVehicle:
+    """A vehicle that is a program: it holds the loop's three integers, and each flight starts it afresh on the ground.
+
+    `launch(order)` gives the simulation of one flight; `settings` describe the vehicle in its records.
+    """
+
+    is_real: Final = False
+
+    def __init__(self, kind: str, safe_gains: Gains, settings: Mapping[str, OptionValue],
+                 launch: Callable[[FlightOrder], Simulation]) -> None:
+        self.kind: Final = kind
+        self.safe_gains: Final[Gains] = _counts(safe_gains)
+        self._settings = dict(settings)
+        self._launch = launch
+        self._held: dict[str, float] = dict(self.safe_gains)
+        self._staged = False
+
+    def stage(self, gains: Gains) -> dict[str, float]:
+        """Write every gain and return what the vehicle now holds. Raises GainsError for what its 32-bit integers cannot
+        hold; nothing is changed then."""
+        self._held = _counts(gains)
+        self._staged = True
+        return dict(self._held)
+
+    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None],
+            should_abort: ShouldAbort) -> FlightRecord:
+        """Take off to 3 m with the staged gains, holding simulated time back to the order's speed.
+
+        `should_abort` is asked every 20 ms of vehicle time. An abort ends the flight there: the safe gains are set and
+        the vehicle descends at 0.5 m/s; the record keeps both, the set point of the descent being the ground.
+        Afterwards the vehicle holds its safe gains. Raises VehicleError when nothing was staged or the simulation
+        broke down.
+        """
+        if not self._staged:
+            raise VehicleError("No gains were staged for this flight, so it was not started.",
+                               hint="Stage the gains, compare what is read back, then fly.")
+        try:
+            simulation = self._launch(order)
+            rows: list[Rows] = []
+            reason = self._take_off(simulation, rows, Pacer(order.speed), on_sample, should_abort)
+            self._restore()
+            if reason is not None:
+                rows.extend(self._land(simulation, landed=not rows or bool(rows[-1][-1, ALTITUDE] <= _LANDED_M)))
+        finally:
+            self._restore()
+        return FlightRecord(trajectory=self._trajectory(rows), ending="completed" if reason is None else "aborted",
+                            reason=reason or "", settings=self._settings)
+
+    def close(self) -> None:
+        """Nothing is held open between flights."""
+
+    def _restore(self) -> None:
+        self._held = dict(self.safe_gains)
+        self._staged = False
+
+    def _take_off(self, simulation: Simulation, rows: list[Rows], pacer: Pacer, on_sample: Callable[[Sample], None],
+                  should_abort: ShouldAbort) -> str | None:
+        """Fill `rows` until the manoeuvre is over; the reason of an abort, or None."""
+        command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
+        for first, last in _slices():
+            pacer.wait_until(first * STEP_S)
+            if (reason := should_abort()) is not None:
+                return reason
+            rows.append(_flown(simulation, last - first, command, TAKEOFF_ALTITUDE_M))
+            on_sample(_sample(first, rows[-1][0]))
+        return None
+
+    def _land(self, simulation: Simulation, *, landed: bool) -> Iterator[Rows]:
+        """Descend until the vehicle stands on the ground, half a minute at most, as fast as it can be computed."""
+        command = self._command(CLIMB, fix(-_LANDING_RATE_M_S, SPEED_BITS))
+        for _ in range(round(_LANDING_S * RATE_HZ) // _LANDING_SLICE):
+            if landed:
+                return
+            rows = _flown(simulation, _LANDING_SLICE, command, 0.0)
+            landed = bool(rows[-1, ALTITUDE] <= _LANDED_M)
+            yield rows
+
+    def _command(self, mode: int, target: int) -> Integers:
+        command = np.empty(COMMAND_SIZE, dtype=np.int64)
+        command[[MODE, TARGET, KP, KI, KD]] = (mode, target, *(self._held[name] for name in GAIN_NAMES))
+        return command
+
+    def _trajectory(self, rows: list[Rows]) -> Trajectory:
+        record = np.concatenate([np.empty((0, len(CHANNELS))), *rows])
+        time_s = np.arange(len(record), dtype=np.float64) * STEP_S
+        channels = {name: np.ascontiguousarray(record[:, i]) for i, name in enumerate(CHANNELS)}
+        return Trajectory(time_s, channels, self.kind, "simulation")
+
+
+def _slices() -> Iterator[tuple[int, int]]:
+    """First and past-last step of each 20 ms; the very last slice is the instant at which the record ends."""
+    edges = [round(i * RATE_HZ / TELEMETRY_HZ) for i in range(round(FLIGHT_S * TELEMETRY_HZ) + 1)]
+    return zip(edges, [*edges[1:], STEPS], strict=True)
+
+
+def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: float) -> Rows:
+    rows = simulation.advance(steps, command)
+    rows[:, CHANNELS.index("set_point_m")] = set_point_m
+    if not np.isfinite(rows).all():
+        raise VehicleError("The simulation broke down: the vehicle's state is no longer a number.",
+                           hint="These gains or options throw the vehicle about; choose milder ones.")
+    return rows
+
+
+def _sample(step: int, row: Rows) -> Sample:
+    values = dict(zip(CHANNELS, row.tolist(), strict=True))
+    return Sample(time_s=step * STEP_S, altitude_m=values["altitude_m"], climb_rate_m_s=values["climb_rate_m_s"],
+                  set_point_m=values["set_point_m"], reference_m=values["reference_m"], thrust=values["thrust"],
+                  battery_v=values["battery_v"])
+
+
+def _counts(gains: Gains) -> dict[str, float]:
+    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in GAIN_NAMES]
+    problems.extend(Problem(f"gains.{name}", reason) for name in GAIN_NAMES
+                    if (reason := _refusal(gains.get(name))) is not None)
+    if problems:
+        raise GainsError("The vehicle cannot hold these gains.", problems=tuple(problems),
+                         hint=f"Send {', '.join(GAIN_NAMES)} as whole numbers of counts.")
+    return {name: int(gains[name]) for name in GAIN_NAMES}
+
+
+def _refusal(value: float | None) -> str | None:
+    if value is None:
+        return "is missing"
+    if not INT32_MIN <= value <= INT32_MAX:
+        return f"must be a number that 32 bits hold, got {value:g}"
+    return None if value == int(value) else f"must be a whole number of counts, got {value:g}"
