@@ -35,8 +35,13 @@ def in_c(library: Path) -> tuple[Callable[[], int], "np.ndarray[tuple[int], np.d
     function.restype = ctypes.c_int64
     gains = [ctypes.c_int32(gain) for gain in GAINS]
     model = [ctypes.c_double(value) for value in (HOVER, LAG, DRAG)]
-    arguments = (*gains, *model, ctypes.c_int32(TARGET), ctypes.c_int64(SAMPLES),
-                 altitude.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
+    arguments = (
+        *gains,
+        *model,
+        ctypes.c_int32(TARGET),
+        ctypes.c_int64(SAMPLES),
+        altitude.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+    )
     return lambda: int(function(*arguments)), altitude
 
 
@@ -60,17 +65,21 @@ def main() -> int:
         return 2
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "rollout.so"
-        subprocess.run([compiler, "-O2", "-fwrapv", "-shared", "-fPIC", "-o", library,
-                        Path(__file__).with_suffix(".c"), "-lm"], check=True)
+        subprocess.run(
+            [compiler, "-O2", "-fwrapv", "-shared", "-fPIC", "-o", library, Path(__file__).with_suffix(".c"), "-lm"],
+            check=True,
+        )
         c, c_altitude = in_c(library)
         python, python_altitude = in_python()
         assert c() == python(), "the largest products differ"
         assert np.array_equal(c_altitude, python_altitude), "the altitudes differ"
         times = np.array([(seconds(c), seconds(python)) for _ in range(ROUNDS)]).min(axis=0)
     ratio = times[1] / times[0]
-    print(f"one takeoff, {SAMPLES} steps, best of {ROUNDS}: C -O2 {times[0] * 1e6:.0f} µs "
-          f"({times[0] / SAMPLES * 1e9:.1f} ns a step), compiled Python {times[1] * 1e6:.0f} µs "
-          f"({times[1] / SAMPLES * 1e9:.1f} ns a step), ratio {ratio:.2f} (limit {LIMIT})")
+    print(
+        f"one takeoff, {SAMPLES} steps, best of {ROUNDS}: C -O2 {times[0] * 1e6:.0f} µs "
+        f"({times[0] / SAMPLES * 1e9:.1f} ns a step), compiled Python {times[1] * 1e6:.0f} µs "
+        f"({times[1] / SAMPLES * 1e9:.1f} ns a step), ratio {ratio:.2f} (limit {LIMIT})"
+    )
     return 0 if ratio <= LIMIT else 1
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from app.core.trajectory import Trajectory
 
 OptionValue = bool | int | float | str
@@ -62,3 +64,8 @@ class Flight:
     trajectory: Trajectory
     error: float | None
     outcome: Literal["valid", "aborted"]
+
+
+def flight_seed(seed: int, number: int) -> int:
+    """The seed of a campaign's flight `number` (from 1): 32 bits, unrelated between flights and between campaigns."""
+    return int(np.random.SeedSequence((seed, number)).generate_state(1)[0])

@@ -1,9 +1,9 @@
 """Errors of the numerical core; the application's own tree in `app.errors` grows from the same root.
 
-    GainlineError
-    └── InputError            something that came in is not usable
-        ├── GainsError        a gain vector that may not be flown
-        └── TrajectoryError   a recorded flight that cannot be scored
+GainlineError
+└── InputError            something that came in is not usable
+    ├── GainsError        a gain vector that may not be flown
+    └── TrajectoryError   a recorded flight that cannot be scored
 """
 
 from dataclasses import dataclass

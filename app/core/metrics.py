@@ -34,8 +34,11 @@ def require_scorable(trajectory: Trajectory, channel: str, start_s: float, stop_
     the next, the ends of the window included.
     """
     if problem := _problem(trajectory, channel, start_s, stop_s):
-        raise TrajectoryError("This flight cannot be scored.", problems=(problem,),
-                              hint="Record it again, or class the flight as invalid; the raw record is kept.")
+        raise TrajectoryError(
+            "This flight cannot be scored.",
+            problems=(problem,),
+            hint="Record it again, or class the flight as invalid; the raw record is kept.",
+        )
 
 
 def _problem(trajectory: Trajectory, channel: str, start_s: float, stop_s: float) -> Problem | None:
@@ -60,7 +63,7 @@ def _gap(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
         return Problem("time_s", f"must cover {start_s:g} … {stop_s:g} s from the command on, got {covered}")
     first = max(int(np.searchsorted(time_s, start_s, side="right")) - 1, 0)
     last = int(np.searchsorted(time_s, stop_s, side="left"))
-    gaps = np.diff(time_s[first:last + 1])
+    gaps = np.diff(time_s[first : last + 1])
     if gaps.size and gaps.max() > MAX_GAP_S + _STAMP_RESOLUTION_S:
         at = first + int(np.argmax(gaps))
         return Problem("time_s", f"has a gap of {gaps.max():.3g} s after {time_s[at]:.3f} s, more than {MAX_GAP_S:g} s")

@@ -13,6 +13,7 @@ from app.core.errors import GainsError, InputError, Problem
 Vector = NDArray[np.float64]
 Gains = Mapping[str, float]
 
+_ROUNDING: Final = 1e-9  # a step of exactly the allowed fraction is allowed
 _HINT: Final = "Correct the named gains and send the set again; nothing was changed."
 
 
@@ -73,11 +74,17 @@ class PolicySpace:
 
         Raises GainsError naming every missing, unknown, non-finite, fractional or out-of-bounds gain.
         """
-        unknown = [Problem(f"{field}.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
-                   for name in gains if name not in self.names]
+        unknown = [
+            Problem(f"{field}.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
+            for name in gains
+            if name not in self.names
+        ]
         missing = [Problem(f"{field}.{name}", "is missing") for name in self.names if name not in gains]
-        refused = [Problem(f"{field}.{gain.name}", reason) for gain in self.gains
-                   if gain.name in gains and (reason := gain.refusal(gains[gain.name])) is not None]
+        refused = [
+            Problem(f"{field}.{gain.name}", reason)
+            for gain in self.gains
+            if gain.name in gains and (reason := gain.refusal(gains[gain.name])) is not None
+        ]
         if problems := (*unknown, *missing, *refused):
             raise GainsError("These gains cannot be flown.", hint=_HINT, problems=problems)
         return self.mapping(np.array([gains[name] for name in self.names], dtype=np.float64))
@@ -88,27 +95,55 @@ class PolicySpace:
 
     def mapping(self, vector: Vector) -> dict[str, float]:
         """Named gains; integer gains come out as int."""
-        return {gain.name: int(value) if gain.integer else float(value)
-                for gain, value in zip(self.gains, vector, strict=True)}
+        return {
+            gain.name: int(value) if gain.integer else float(value)
+            for gain, value in zip(self.gains, vector, strict=True)
+        }
 
     def nearest(self, vector: Vector) -> Vector:
         """The closest flyable vector: clipped to the bounds, integer gains rounded half to even."""
         rounded = np.where([gain.integer for gain in self.gains], np.rint(vector), vector)
         return np.clip(rounded, self.lower, self.upper)
 
+    def reachable(self, base: Vector, fraction: float) -> tuple[Vector, Vector]:
+        """Lowest and highest flyable vectors within `fraction` of each range around `base`, inside the bounds."""
+        reach = fraction * (self.upper - self.lower) + _ROUNDING
+        integer = [gain.integer for gain in self.gains]
+        low = np.where(integer, np.ceil(base - reach), base - reach)
+        high = np.where(integer, np.floor(base + reach), base + reach)
+        return np.maximum(low, self.lower), np.minimum(high, self.upper)
+
+    def change(self, one: Gains, other: Gains) -> dict[str, float]:
+        """How far apart two sets are, each gain as a share of its range."""
+        return {gain.name: abs(one[gain.name] - other[gain.name]) / (gain.upper - gain.lower) for gain in self.gains}
+
     def narrowed(self, bounds: Mapping[str, tuple[float, float]]) -> "PolicySpace":
         """The same space inside tighter bounds. Raises InputError when they are reversed or reach outside."""
-        problems = [Problem(f"bounds.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
-                    for name in bounds if name not in self.names]
+        problems = [
+            Problem(f"bounds.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
+            for name in bounds
+            if name not in self.names
+        ]
         for gain in self.gains:
             low, high = bounds.get(gain.name, (gain.lower, gain.upper))
-            if not (gain.lower <= low < high <= gain.upper):
-                problems.append(Problem(
-                    f"bounds.{gain.name}",
-                    f"must be two rising numbers inside {gain.lower:g} … {gain.upper:g}, got {low:g} … {high:g}"))
+            if gain.integer and not (float(low).is_integer() and float(high).is_integer()):
+                problems.append(Problem(f"bounds.{gain.name}", f"must be whole numbers, got {low:g} … {high:g}"))
+            elif not (gain.lower <= low < high <= gain.upper):
+                problems.append(
+                    Problem(
+                        f"bounds.{gain.name}",
+                        f"must be two rising numbers inside {gain.lower:g} … {gain.upper:g}, got {low:g} … {high:g}",
+                    )
+                )
         if problems:
-            raise InputError("These bounds cannot be used.", hint="Choose bounds inside the experiment's own.",
-                             problems=tuple(problems))
-        return PolicySpace(tuple(
-            replace(gain, lower=bounds[gain.name][0], upper=bounds[gain.name][1]) if gain.name in bounds else gain
-            for gain in self.gains))
+            raise InputError(
+                "These bounds cannot be used.",
+                hint="Choose bounds inside the experiment's own.",
+                problems=tuple(problems),
+            )
+        return PolicySpace(
+            tuple(
+                replace(gain, lower=bounds[gain.name][0], upper=bounds[gain.name][1]) if gain.name in bounds else gain
+                for gain in self.gains
+            )
+        )

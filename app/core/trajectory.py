@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 Samples = NDArray[np.float64]
 
-CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType({
-    "altitude_m": "m",
-    "climb_rate_m_s": "m/s",
-    "set_point_m": "m",
-    "reference_m": "m",
-    "thrust": "1",
-    "feed_forward": "1",
-    "feedback": "1",
-    "battery_v": "V",
-})
+CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "altitude_m": "m",
+        "climb_rate_m_s": "m/s",
+        "set_point_m": "m",
+        "reference_m": "m",
+        "thrust": "1",
+        "feed_forward": "1",
+        "feedback": "1",
+        "battery_v": "V",
+    }
+)
 """Known channels. Thrust and its two parts are shares of full command (the autopilot's 9600 counts)."""
 
 
@@ -45,8 +47,12 @@ class Trajectory:
 
     def as_stored(self) -> "Trajectory":
         """The trajectory as the database gives it back: every number rounded to single precision."""
-        return Trajectory(_single(self.time_s), {name: _single(values) for name, values in self.channels.items()},
-                          self.source, self.clock)
+        return Trajectory(
+            _single(self.time_s),
+            {name: _single(values) for name, values in self.channels.items()},
+            self.source,
+            self.clock,
+        )
 
 
 def _single(values: Samples) -> Samples:

@@ -29,8 +29,9 @@ def read_loop_trace(path: Path) -> LoopTrace:
             with io.TextIOWrapper(stream, encoding="utf-8", newline="") as text:
                 return _read(path.name, text)
     except OSError as error:
-        raise InputError(f"{path} could not be read: {error.strerror or error}.",
-                         hint="Give a readable trace file, .csv or .csv.gz.") from error
+        raise InputError(
+            f"{path} could not be read: {error.strerror or error}.", hint="Give a readable trace file, .csv or .csv.gz."
+        ) from error
     except (EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path.name} is damaged or not a text file: {error}.", hint=_HINT) from error
 

@@ -20,7 +20,8 @@ def flight(time_s: Samples, altitude_m: Samples) -> Trajectory:
 def test_a_constant_altitude_scores_its_distance(altitude: float, step_s: float) -> None:
     time_s = np.arange(-1.0, 12.0, step_s)
     assert mean_absolute_error(time_s, np.full_like(time_s, altitude), three, 0.0, 10.0) == pytest.approx(
-        abs(3.0 - altitude), abs=1e-9)
+        abs(3.0 - altitude), abs=1e-9
+    )
 
 
 def test_uneven_samples_are_weighted_by_the_time_they_stand_for() -> None:
@@ -50,16 +51,19 @@ def test_gaps_of_a_quarter_second_are_allowed_even_in_single_precision() -> None
     require_scorable(flight(time_s, time_s).as_stored(), "altitude_m", 0.1, 32.6)
 
 
-@pytest.mark.parametrize(("change", "reason"), [
-    (lambda t, z: (np.delete(t, [40, 41]), np.delete(z, [40, 41])), r"time_s: has a gap of 0\.3 s after 3\.900 s"),
-    (lambda t, z: (t[3:], z[3:]), r"time_s: must cover 0 … 10 s .* got 0\.3 … 10"),
-    (lambda t, z: (t[:-4], z[:-4]), r"time_s: must cover 0 … 10 s"),
-    (lambda t, z: (t[:0], z[:0]), r"time_s: must cover .* got nothing"),
-    (lambda t, z: (t, z[:-1]), r"altitude_m: has 100 samples, the time stamps are 101"),
-    (lambda t, z: (t, np.where(t > 5.0, np.nan, z)), r"altitude_m: is not a finite number at sample 51"),
-    (lambda t, z: (np.where(t == t[7], np.inf, t), z), r"time_s: is not a finite number at sample 7"),
-    (lambda t, z: (np.where(t == t[7], t[6], t), z), r"time_s: must rise, but is 0\.6 s after 0\.6 s at sample 7"),
-])
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda t, z: (np.delete(t, [40, 41]), np.delete(z, [40, 41])), r"time_s: has a gap of 0\.3 s after 3\.900 s"),
+        (lambda t, z: (t[3:], z[3:]), r"time_s: must cover 0 … 10 s .* got 0\.3 … 10"),
+        (lambda t, z: (t[:-4], z[:-4]), r"time_s: must cover 0 … 10 s"),
+        (lambda t, z: (t[:0], z[:0]), r"time_s: must cover .* got nothing"),
+        (lambda t, z: (t, z[:-1]), r"altitude_m: has 100 samples, the time stamps are 101"),
+        (lambda t, z: (t, np.where(t > 5.0, np.nan, z)), r"altitude_m: is not a finite number at sample 51"),
+        (lambda t, z: (np.where(t == t[7], np.inf, t), z), r"time_s: is not a finite number at sample 7"),
+        (lambda t, z: (np.where(t == t[7], t[6], t), z), r"time_s: must rise, but is 0\.6 s after 0\.6 s at sample 7"),
+    ],
+)
 def test_flights_that_cannot_be_scored_are_refused_with_field_and_reason(change, reason: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(TrajectoryError, match=reason):
         require_scorable(flight(*change(*good())), "altitude_m", 0.0, 10.0)

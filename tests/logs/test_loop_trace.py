@@ -22,8 +22,11 @@ def test_plain_and_gzipped_files_read_alike(tmp_path: Path) -> None:
     zipped.write_bytes(gzip.compress(plain.read_bytes()))
     one, other = read_loop_trace(plain), read_loop_trace(zipped)
     assert len(one) == 2
-    assert one.inputs.tolist() == other.inputs.tolist() == [[1, 768, 283, 13, 82, 0, 0, 16384, 0],
-                                                            [0, 768, 283, 13, 82, 0, 0, 16384, 0]]
+    assert (
+        one.inputs.tolist()
+        == other.inputs.tolist()
+        == [[1, 768, 283, 13, 82, 0, 0, 16384, 0], [0, 768, 283, 13, 82, 0, 0, 16384, 0]]
+    )
     assert one.outputs[0].tolist() == [0, 0, 0, 0, 7588, 0, 7588]
 
 
@@ -32,19 +35,22 @@ def test_columns_are_found_by_name_in_any_order(tmp_path: Path) -> None:
     assert read_loop_trace(trace(tmp_path, *reversed_lines)).inputs.tolist() == [[1, 768, 283, 13, 82, 0, 0, 16384, 0]]
 
 
-@pytest.mark.parametrize(("lines", "where"), [
-    ((HEADER.replace("r33", "r34"), ROW), "line 1, r33: column is missing"),
-    ((HEADER + ",extra", ROW + ",0"), "line 1, extra: column is unknown"),
-    ((HEADER, ROW, ROW.replace("283", "28.3")), "line 3, kp: must be a whole number, got '28.3'"),
-    ((HEADER, ROW.replace("768", "")), "line 2, target: must be a whole number, got ''"),
-    ((HEADER, ROW.replace("alt", "hover")), "line 2, mode: must be one of throttle, alt, climb, got 'hover'"),
-    ((HEADER, ROW.replace("16384,0", "16384,2")), "line 2, in_flight: must lie in 0 … 1, got 2"),
-    ((HEADER, ROW.replace("283", "2147483648")), "line 2, kp: must lie in -2147483648 … 2147483647"),
-    ((HEADER, ROW, "1,alt,768"), "line 3, kp: the row has 3 values, the header 18"),
-    ((HEADER, ROW + ",5"), "line 2, thrust: the row has 19 values, the header 18"),
-    ((HEADER,), "holds a header and no rows"),
-    ((), "line 1, step: column is missing"),
-])
+@pytest.mark.parametrize(
+    ("lines", "where"),
+    [
+        ((HEADER.replace("r33", "r34"), ROW), "line 1, r33: column is missing"),
+        ((HEADER + ",extra", ROW + ",0"), "line 1, extra: column is unknown"),
+        ((HEADER, ROW, ROW.replace("283", "28.3")), "line 3, kp: must be a whole number, got '28.3'"),
+        ((HEADER, ROW.replace("768", "")), "line 2, target: must be a whole number, got ''"),
+        ((HEADER, ROW.replace("alt", "hover")), "line 2, mode: must be one of throttle, alt, climb, got 'hover'"),
+        ((HEADER, ROW.replace("16384,0", "16384,2")), "line 2, in_flight: must lie in 0 … 1, got 2"),
+        ((HEADER, ROW.replace("283", "2147483648")), "line 2, kp: must lie in -2147483648 … 2147483647"),
+        ((HEADER, ROW, "1,alt,768"), "line 3, kp: the row has 3 values, the header 18"),
+        ((HEADER, ROW + ",5"), "line 2, thrust: the row has 19 values, the header 18"),
+        ((HEADER,), "holds a header and no rows"),
+        ((), "line 1, step: column is missing"),
+    ],
+)
 def test_malformed_files_are_refused_naming_line_and_column(tmp_path: Path, lines: tuple[str, ...], where: str) -> None:
     with pytest.raises(InputError) as refusal:
         read_loop_trace(trace(tmp_path, *lines))

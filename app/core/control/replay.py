@@ -52,5 +52,8 @@ def replay_trace(trace: LoopTrace) -> Replay:
         computed[row] = (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err, loop.ff_cmd, loop.fb_cmd, thrust)
     difference = np.abs(computed - trace.outputs)
     different = np.flatnonzero(difference.any(axis=1))
-    return Replay(len(trace), {name: int(value) for name, value in zip(OUTPUTS, difference.max(axis=0), strict=True)},
-                  int(different[0]) if different.size else None)
+    return Replay(
+        len(trace),
+        {name: int(value) for name, value in zip(OUTPUTS, difference.max(axis=0), strict=True)},
+        int(different[0]) if different.size else None,
+    )

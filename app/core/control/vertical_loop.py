@@ -128,8 +128,9 @@ def _feedback(state: State, kp: int, ki: int, kd: int, ez: int, ev: int) -> int:
 
 
 @kernel
-def step(state: State, mode: int, target: int, kp: int, ki: int, kd: int, z: int, zd: int, r33: int,
-         in_flight: bool) -> int:
+def step(
+    state: State, mode: int, target: int, kp: int, ki: int, kd: int, z: int, zd: int, r33: int, in_flight: bool
+) -> int:
     """Take one step of 1/512 s and return the thrust command, 0 … 9600. All inputs are 32-bit integers."""
     if mode == THROTTLE:
         state[P], state[V], state[A], state[Z_SUM_ERR] = z << 18, zd >> 2, 0, 0
@@ -167,8 +168,9 @@ class VerticalLoop:
         """Whether the vehicle counts as flying; to be asked exactly once before each step."""
         return detect_flight(self._state, self._thrust)
 
-    def step(self, mode: int, target: int, kp: int, ki: int, kd: int, z: int, zd: int, r33: int,
-             in_flight: bool) -> int:
+    def step(
+        self, mode: int, target: int, kp: int, ki: int, kd: int, z: int, zd: int, r33: int, in_flight: bool
+    ) -> int:
         """One step of 1/512 s in one of `MODES`; returns the thrust command, 0 … 9600."""
         self._thrust = step(self._state, mode, target, kp, ki, kd, z, zd, r33, in_flight)
         return self._thrust

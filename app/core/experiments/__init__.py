@@ -16,6 +16,9 @@ EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType({experiment.name
 def get_experiment(name: str) -> Experiment:
     """Raises InputError when there is no experiment of that name."""
     if name not in EXPERIMENTS:
-        raise InputError("There is no such experiment.", hint=f"Choose one of: {', '.join(EXPERIMENTS)}.",
-                         problems=(Problem("experiment", f"unknown name {name!r}"),))
+        raise InputError(
+            "There is no such experiment.",
+            hint=f"Choose one of: {', '.join(EXPERIMENTS)}.",
+            problems=(Problem("experiment", f"unknown name {name!r}"),),
+        )
     return EXPERIMENTS[name]

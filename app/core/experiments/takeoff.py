@@ -30,11 +30,13 @@ class Takeoff:
     title: Final = "Takeoff to 3 m"
     output: Final = "altitude_m"
     error_unit: Final = "m"
-    space: Final = PolicySpace((
-        _gain("kp", "Proportional gain", 4000, 283),
-        _gain("ki", "Integral gain", 1073, 13),
-        _gain("kd", "Derivative gain", 409, 82),
-    ))
+    space: Final = PolicySpace(
+        (
+            _gain("kp", "Proportional gain", 4000, 283),
+            _gain("ki", "Integral gain", 1073, 13),
+            _gain("kd", "Derivative gain", 409, 82),
+        )
+    )
     model_parameters: Final = (
         ModelParameter("hover_throttle", "Hover throttle", "of full", 0.63, lower=0.3, upper=0.95, prior_sd=0.05),
         ModelParameter("start_latency_s", "Start latency", "s", 0.0, lower=0.0, upper=1.0, prior_sd=0.15),

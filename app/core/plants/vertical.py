@@ -86,8 +86,18 @@ def rollout(gains: Counts, model: Samples, target: int, state: State, altitude: 
     start(state, 0, 0)
     for i in range(len(altitude)):
         in_flight = detect_flight(state, command)
-        command = step(state, ALT, target, kp, ki, kd, measured(-height, POSITION_BITS),
-                       measured(-climb, SPEED_BITS), LEVEL, in_flight)
+        command = step(
+            state,
+            ALT,
+            target,
+            kp,
+            ki,
+            kd,
+            measured(-height, POSITION_BITS),
+            measured(-climb, SPEED_BITS),
+            LEVEL,
+            in_flight,
+        )
         altitude[i] = height
         if wants_detail:
             detail[0, i] = climb

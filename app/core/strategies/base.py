@@ -9,7 +9,7 @@ from app.core.experiments.base import Experiment
 from app.core.policy import PolicySpace
 from app.core.trajectory import Trajectory
 
-Kind = Literal["start", "step", "shorter step", "none"]
+Kind = Literal["start", "step", "shorter step", "manual", "none"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,8 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """The next gain set. Kind `none` means that the strategy has nothing better to offer (`gains` is the best flown).
+    """The next gain set. Kind `none` means that the strategy has nothing better to offer, `manual` that the operator
+    chooses; `gains` is then the best flown.
 
     `predicted` is the corrected model's output for these gains on the experiment's grid.
     """

@@ -31,7 +31,8 @@ def test_limit_stays_within_its_bounds_and_changes_nothing_inside(value: int, on
     assert limited == value or not low <= value <= high
 
 
-@pytest.mark.parametrize(("value", "bits", "expected"), [(1.5, 8, 384), (-1.999, 0, -1), (-0.00390624, 8, 0),
-                                                          (4.0, 16, 262144)])
+@pytest.mark.parametrize(
+    ("value", "bits", "expected"), [(1.5, 8, 384), (-1.999, 0, -1), (-0.00390624, 8, 0), (4.0, 16, 262144)]
+)
 def test_fix_truncates_toward_zero(value: float, bits: int, expected: int) -> None:
     assert fix(value, bits) == expected

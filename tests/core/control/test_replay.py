@@ -42,8 +42,9 @@ def test_one_wrong_number_is_found_with_its_row_and_size() -> None:
     assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0) | {"fb_cmd": 9}
 
 
-@pytest.mark.parametrize("path", [path for path in TRACES if not path.name.startswith("wild")],
-                         ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", [path for path in TRACES if not path.name.startswith("wild")], ids=lambda path: path.name
+)
 def test_in_flight_is_detected_when_the_recorded_autopilot_detected_it(path: Path) -> None:
     """Within one step: the recorder summed 0.05 s in floating point, the detector here counts exactly."""
     trace = read_loop_trace(path)
@@ -55,7 +56,7 @@ def test_in_flight_is_detected_when_the_recorded_autopilot_detected_it(path: Pat
         detected.append(loop.detect_flight())
         assert loop.step(*row) == thrust
     assert abs(detected.index(True) - column(trace, "in_flight").index(1)) <= 1
-    assert all(detected[detected.index(True):])
+    assert all(detected[detected.index(True) :])
 
 
 def test_gains_that_wrap_the_integrator_turn_full_up_into_full_down_and_are_reported() -> None:

@@ -17,12 +17,28 @@ from app.core.trajectory import Trajectory
 TAKEOFF = Takeoff()
 TWIN_MODEL = np.array([0.61, 0.3, 0.05, 0.0])
 
-JSBSIM = [((283, 13, 82), 0.3267), ((285, 44, 82), 0.1873), ((286, 102, 82), 0.1515), ((499, 177, 42), 0.1788),
-          ((324, 116, 75), 0.1467), ((1624, 1356, 195), 0.0928), ((1644, 1365, 155), 0.0925),
-          ((1649, 1365, 175), 0.0919), ((1652, 1365, 195), 0.0929)]
-TWIN = [((283, 13, 82), 0.5236), ((286, 60, 81), 0.2341), ((301, 133, 65), 0.2325), ((301, 135, 59), 0.2579),
-        ((301, 134, 62), 0.2437), ((1624, 1356, 195), 0.1189), ((1599, 1366, 130), 0.1281), ((1612, 1361, 163), 0.1211),
-        ((1567, 1037, 173), 0.1181)]
+JSBSIM = [
+    ((283, 13, 82), 0.3267),
+    ((285, 44, 82), 0.1873),
+    ((286, 102, 82), 0.1515),
+    ((499, 177, 42), 0.1788),
+    ((324, 116, 75), 0.1467),
+    ((1624, 1356, 195), 0.0928),
+    ((1644, 1365, 155), 0.0925),
+    ((1649, 1365, 175), 0.0919),
+    ((1652, 1365, 195), 0.0929),
+]
+TWIN = [
+    ((283, 13, 82), 0.5236),
+    ((286, 60, 81), 0.2341),
+    ((301, 133, 65), 0.2325),
+    ((301, 135, 59), 0.2579),
+    ((301, 134, 62), 0.2437),
+    ((1624, 1356, 195), 0.1189),
+    ((1599, 1366, 130), 0.1281),
+    ((1612, 1361, 163), 0.1211),
+    ((1567, 1037, 173), 0.1181),
+]
 PAPARAZZI = [("283_13_82", 0.3297), ("1624_1356_195", 0.0987)]
 
 
@@ -31,8 +47,9 @@ def gains(*values: float) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]"
 
 
 @pytest.mark.parametrize(("flown", "measured"), JSBSIM)
-def test_the_nominal_model_agrees_with_the_simulated_ardrone_within_4_mm(flown: tuple[int, ...],
-                                                                         measured: float) -> None:
+def test_the_nominal_model_agrees_with_the_simulated_ardrone_within_4_mm(
+    flown: tuple[int, ...], measured: float
+) -> None:
     assert TAKEOFF.error(TAKEOFF.simulate(gains(*flown), TAKEOFF.nominal_model)) == pytest.approx(measured, abs=0.004)
 
 
@@ -67,8 +84,15 @@ def test_a_batch_gives_what_single_runs_give() -> None:
 
 def test_a_run_has_every_channel_on_the_grid_and_stays_above_ground() -> None:
     run = TAKEOFF.simulate(gains(283, 13, 82), TWIN_MODEL)
-    assert set(run.channels) == {"altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "feed_forward",
-                                 "feedback"}
+    assert set(run.channels) == {
+        "altitude_m",
+        "climb_rate_m_s",
+        "set_point_m",
+        "reference_m",
+        "thrust",
+        "feed_forward",
+        "feedback",
+    }
     assert len(run) == 16_693
     assert run.time_s[-1] >= 32.6 > run.time_s[-2]
     assert run["altitude_m"].min() == 0.0
@@ -107,8 +131,12 @@ def test_bounds_defaults_and_scales_are_those_of_the_method() -> None:
     assert space.lower.tolist() == [0, 0, 0]
     assert space.scale.tolist() == pytest.approx([400, 107.3, 40.9])
     assert space.default.tolist() == [283, 13, 82]
-    assert [parameter.name for parameter in TAKEOFF.model_parameters] == ["hover_throttle", "start_latency_s",
-                                                                         "motor_lag_s", "drag_1_s"]
+    assert [parameter.name for parameter in TAKEOFF.model_parameters] == [
+        "hover_throttle",
+        "start_latency_s",
+        "motor_lag_s",
+        "drag_1_s",
+    ]
 
 
 def test_experiments_are_found_by_name_and_unknown_ones_are_refused_with_the_choices() -> None:

@@ -1,0 +1,15 @@
+"""The gains of a campaign's first flight."""
+
+from app.core.definition import Definition
+from app.core.experiments.base import Experiment
+from app.core.policy import PolicySpace
+from app.core.strategies.simplex import model_optimum
+
+
+def start_gains(definition: Definition, experiment: Experiment, space: PolicySpace) -> dict[str, float]:
+    """The experiment's default gains, the given ones, or the nominal model's optimum searched from the default."""
+    if definition.start.kind == "given" and definition.start.gains is not None:
+        return space.check(definition.start.gains, field="start.gains")
+    if definition.start.kind == "simplex":
+        return space.mapping(model_optimum(experiment, space, space.nearest(space.default)).gains)
+    return space.mapping(space.default)

@@ -1,0 +1,54 @@
+"""The simple model, corrected by what one flight showed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.core.definition import Flight
+from app.core.experiments.base import Experiment, Matrix
+from app.core.policy import Vector
+from app.core.trajectory import Samples, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectedModel:
+    """Model output plus a bias over time, outside the control loop: ŷ(t; gains) = model(t; gains) + b(t).
+
+    `bias` lies on the experiment's grid, shape (n,).
+    """
+
+    experiment: Experiment
+    model: Vector
+    bias: Samples
+
+    def outputs(self, gains: Matrix) -> Matrix:
+        """Gains (k, g) → predicted outputs (k, n)."""
+        return self.experiment.outputs(gains, self.model) + self.bias
+
+    def errors(self, gains: Matrix) -> Vector:
+        """Gains (k, g) → predicted errors (k,)."""
+        return self.experiment.errors(self.outputs(gains))
+
+    def predict(self, gains: Vector) -> tuple[Trajectory, float]:
+        """Predicted output of one policy and its error."""
+        outputs = self.outputs(gains[np.newaxis])
+        trajectory = Trajectory(self.experiment.grid_s, {self.experiment.output: outputs[0]}, "model", "simulation")
+        return trajectory, float(self.experiment.errors(outputs)[0])
+
+
+def nominal(experiment: Experiment) -> CorrectedModel:
+    """What is known before the first flight: no correction."""
+    return CorrectedModel(experiment, experiment.nominal_model, np.zeros_like(experiment.grid_s))
+
+
+def corrected_by(experiment: Experiment, flight: Flight) -> CorrectedModel:
+    """b(t) = measured(t) − model(t; flown gains), the measured flight taken as the database keeps it.
+
+    Beyond the flight's samples its nearest one holds.
+    """
+    measured = flight.trajectory.as_stored()
+    on_grid = np.interp(experiment.grid_s, measured.time_s, measured[experiment.output])
+    flown = experiment.space.vector(flight.gains)[np.newaxis]
+    return CorrectedModel(
+        experiment, experiment.nominal_model, on_grid - experiment.outputs(flown, experiment.nominal_model)[0]
+    )

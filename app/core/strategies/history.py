@@ -1,0 +1,24 @@
+"""Questions that strategies ask of the flights so far."""
+
+from collections.abc import Sequence
+
+from app.core.definition import Flight
+from app.core.policy import Gains
+
+
+def best_flight(flights: Sequence[Flight]) -> Flight:
+    """The valid flight with the lowest error, the earliest of equals. At least one flight must be valid."""
+    return min(
+        (flight for flight in flights if flight.error is not None and flight.outcome == "valid"),
+        key=lambda flight: (flight.error, flight.number),
+    )
+
+
+def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
+    """Whether these gains were flown before, to the end or not."""
+    return any(dict(flight.gains) == dict(gains) for flight in flights)
+
+
+def describe(gains: Gains) -> str:
+    """`kp 283, ki 13, kd 82`."""
+    return ", ".join(f"{name} {value:g}" for name, value in gains.items())

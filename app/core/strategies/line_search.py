@@ -1,0 +1,42 @@
+"""Trying step sizes along one direction on a model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.core.policy import PolicySpace, Vector
+from app.core.strategies.base import LadderStep
+from app.core.strategies.bias import CorrectedModel
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Flyable gains at every length from `base` along `direction` (gains per unit of length), each gain held within
+    `low` … `high`; all of shape (n,)."""
+
+    space: PolicySpace
+    base: Vector
+    direction: Vector
+    low: Vector
+    high: Vector
+
+    def at(self, length: float) -> Vector:
+        return np.clip(self.space.nearest(self.base + length * self.direction), self.low, self.high)
+
+    def clipped(self, length: float) -> tuple[str, ...]:
+        """The gains that a bound or step limit stops at this length."""
+        wanted = self.base + length * self.direction
+        stopped = (np.rint(wanted) < self.low) | (np.rint(wanted) > self.high)
+        return tuple(name for name, is_stopped in zip(self.space.names, stopped, strict=True) if is_stopped)
+
+
+def try_lengths(line: Line, lengths: Sequence[float], model: CorrectedModel) -> tuple[LadderStep, ...]:
+    """The model's error at each length, in the order of `lengths`."""
+    candidates = np.array([line.at(length) for length in lengths])
+    return tuple(
+        LadderStep(
+            length=length, gains=line.space.mapping(gains), predicted_error=float(error), clipped=line.clipped(length)
+        )
+        for length, gains, error in zip(lengths, candidates, model.errors(candidates), strict=True)
+    )

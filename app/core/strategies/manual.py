@@ -1,0 +1,37 @@
+"""The operator's own gains, through the same checks."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment
+from app.core.policy import PolicySpace
+from app.core.strategies.base import Explanation, Proposal, Strategy
+from app.core.strategies.bias import corrected_by
+from app.core.strategies.history import best_flight, describe
+
+
+def propose(_definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+    """The best flown gains, for the operator to change. At least one flight must be valid."""
+    best = best_flight(flights)
+    trajectory, error = corrected_by(experiment, best).predict(space.vector(best.gains))
+    summary = (
+        f"You choose the next gains. The best so far are those of flight {best.number} ({describe(best.gains)}), "
+        f"error {best.error:.4f} {experiment.error_unit}."
+    )
+    return Proposal(
+        kind="manual",
+        gains=dict(best.gains),
+        predicted=trajectory,
+        predicted_error=error,
+        explanation=Explanation(summary=summary, base_flight=best.number),
+    )
+
+
+MANUAL: Final = Strategy(
+    name="manual",
+    title="By hand",
+    line="You choose every gain set; bounds and step limits are checked as for any other.",
+    options=(),
+    propose=propose,
+)

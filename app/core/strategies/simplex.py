@@ -1,0 +1,92 @@
+"""Nelder–Mead on the nominal model alone: the paper's starting point, also a strategy."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import minimize
+
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment
+from app.core.policy import PolicySpace, Vector
+from app.core.strategies.base import Explanation, Proposal, Strategy
+from app.core.strategies.bias import nominal
+from app.core.strategies.history import best_flight, describe, was_flown
+
+EVALUATIONS: Final = 300
+
+
+def _first_steps(space: PolicySpace, start: Vector) -> Vector:
+    """0.3·gain + 20 upward, or downward where the bounds leave more room there."""
+    step = 0.3 * start + 20.0
+    up, down = np.minimum(step, space.upper - start), np.minimum(step, start - space.lower)
+    return np.where(up >= down, up, -down)
+
+
+@dataclass(frozen=True, slots=True)
+class Optimum:
+    """Where the search on the model ended: gains of shape (n,), the model's error there, evaluations spent."""
+
+    gains: Vector
+    error: float
+    evaluations: int
+
+
+def model_optimum(experiment: Experiment, space: PolicySpace, start: Vector) -> Optimum:
+    """Nelder–Mead within the bounds, with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's own),
+    first steps 0.3·gain + 20, 300 evaluations; gains are rounded before each run of the model."""
+    model = nominal(experiment)
+
+    def error(gains: Vector) -> float:
+        return float(model.errors(space.nearest(gains)[np.newaxis])[0])
+
+    simplex = np.vstack((start, start + np.diag(_first_steps(space, start))))
+    found = minimize(
+        error,
+        start,
+        method="Nelder-Mead",
+        bounds=list(zip(space.lower, space.upper, strict=True)),
+        options={"initial_simplex": simplex, "maxfev": EVALUATIONS, "xatol": 0.0, "fatol": 0.0},
+    )
+    return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev))
+
+
+def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+    """The nominal model's optimum, or as far towards it as the step limit lets the best flight go. At least one flight
+    must be valid."""
+    start = space.vector(definition.start.gains) if definition.start.gains else space.nearest(space.default)
+    optimum = model_optimum(experiment, space, start)
+    base = best_flight(flights)
+    low, high = space.reachable(space.vector(base.gains), definition.step_fraction)
+    target = np.clip(optimum.gains, low, high)
+    is_flown = was_flown(space.mapping(target), flights)
+    gains = space.vector(base.gains) if is_flown else target
+    trajectory, error = nominal(experiment).predict(gains)
+    stopped = tuple(name for name, is_stopped in zip(space.names, target != optimum.gains, strict=True) if is_stopped)
+    found = (
+        f"{optimum.evaluations} runs of the nominal model end at {describe(space.mapping(optimum.gains))}, "
+        f"model error {optimum.error:.4f} {experiment.error_unit}."
+    )
+    summary = f"{found} That was flown; the model alone offers nothing more." if is_flown else found
+    return Proposal(
+        kind="none" if is_flown else "step",
+        gains=space.mapping(gains),
+        predicted=trajectory,
+        predicted_error=error,
+        explanation=Explanation(
+            summary=summary,
+            base_flight=base.number,
+            clipped=stopped,
+            notes=("Flights do not change this strategy's model.",),
+        ),
+    )
+
+
+SIMPLEX: Final = Strategy(
+    name="simplex",
+    title="Simplex on the model",
+    line="Nelder–Mead on the nominal model alone, then that one set is flown.",
+    options=(),
+    propose=propose,
+)
