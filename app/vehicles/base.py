@@ -76,8 +76,9 @@ class Vehicle(Protocol):
         """Write every gain and return what was read back."""
         ...
 
-    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None],
-            should_abort: Callable[[], str | None]) -> FlightRecord:
+    def fly(
+        self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: Callable[[], str | None]
+    ) -> FlightRecord:
         """Take off with the staged gains and record until the manoeuvre is over.
 
         `on_sample` gets telemetry at 50 Hz of vehicle time while it happens; `should_abort` is asked at least as often

@@ -1,8 +1,8 @@
 """Errors of vehicles.
 
-    GainlineError
-    └── VehicleError          a vehicle could not do what was asked
-        └── SafeGainsError    it may still hold experimental gains: to be quarantined
+GainlineError
+└── VehicleError          a vehicle could not do what was asked
+    └── SafeGainsError    it may still hold experimental gains: to be quarantined
 """
 
 from app.core.errors import GainlineError

@@ -8,9 +8,11 @@ from app.vehicles.kinds import Options, VehicleKind
 
 
 def _open(_options: Options, _safe_gains: Gains) -> NoReturn:
-    raise VehicleError("This vehicle flies elsewhere, so this program cannot fly it.",
-                       hint="Fly the proposed gains yourself, then upload the flight's log as CSV with the columns "
-                            "time_s and altitude_m.")
+    raise VehicleError(
+        "This vehicle flies elsewhere, so this program cannot fly it.",
+        hint="Fly the proposed gains yourself, then upload the flight's log as CSV with the columns "
+        "time_s and altitude_m.",
+    )
 
 
 IMPORT: Final = VehicleKind(

@@ -35,8 +35,16 @@ THRUST: Final = 4
 FEED_FORWARD: Final = 5
 FEEDBACK: Final = 6
 BATTERY: Final = 7
-CHANNELS: Final = ("altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "feed_forward", "feedback",
-                   "battery_v")
+CHANNELS: Final = (
+    "altitude_m",
+    "climb_rate_m_s",
+    "set_point_m",
+    "reference_m",
+    "thrust",
+    "feed_forward",
+    "feedback",
+    "battery_v",
+)
 """Columns of a record's rows."""
 
 ENTERED: Final = STATE_SIZE
@@ -53,8 +61,15 @@ COMMAND_SIZE: Final = 5
 
 
 @kernel
-def control(autopilot: Integers, command: Integers, altitude_m: float, climb_m_s: float, cosine_of_tilt: float,
-            may_enter: bool, row: Rows) -> float:
+def control(
+    autopilot: Integers,
+    command: Integers,
+    altitude_m: float,
+    climb_m_s: float,
+    cosine_of_tilt: float,
+    may_enter: bool,
+    row: Rows,
+) -> float:
     """One step of the autopilot on what it senses, rounded to its integers; returns the thrust, a share of full.
 
     Until `may_enter` the motors rest and the loop is not entered. Writes the row's reference, thrust and its parts, and
@@ -69,8 +84,18 @@ def control(autopilot: Integers, command: Integers, altitude_m: float, climb_m_s
         start(autopilot[:STATE_SIZE], z, zd)
         autopilot[ENTERED] = 1
     in_flight = detect_flight(autopilot, autopilot[LAST_THRUST])
-    thrust = step(autopilot, command[MODE], command[TARGET], command[KP], command[KI], command[KD], z, zd,
-                  measured(cosine_of_tilt, R33_BITS), in_flight)
+    thrust = step(
+        autopilot,
+        command[MODE],
+        command[TARGET],
+        command[KP],
+        command[KI],
+        command[KD],
+        z,
+        zd,
+        measured(cosine_of_tilt, R33_BITS),
+        in_flight,
+    )
     autopilot[LAST_THRUST] = thrust
     row[REFERENCE] = -autopilot[Z_REF] / (1 << POSITION_BITS)
     row[THRUST] = thrust / FULL_THRUST
@@ -80,8 +105,16 @@ def control(autopilot: Integers, command: Integers, altitude_m: float, climb_m_s
 
 
 @kernel
-def fly_simple_model(autopilot: Integers, command: Integers, plant: Rows, model: Rows, datum_m: float,
-                     gusts_m_s2: Rows, resting_steps: int, rows: Rows) -> None:
+def fly_simple_model(
+    autopilot: Integers,
+    command: Integers,
+    plant: Rows,
+    model: Rows,
+    datum_m: float,
+    gusts_m_s2: Rows,
+    resting_steps: int,
+    rows: Rows,
+) -> None:
     """Advance the simple vertical model by as many steps as `rows` is long, writing a row before each.
 
     `plant` is altitude (m), climb rate (m/s) and thrust (share of full); `model` hover throttle, motor lag (s) and drag

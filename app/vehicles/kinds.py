@@ -36,8 +36,11 @@ class VehicleKind:
         """The options completed with the defaults. Raises InputError naming every unknown or impossible one."""
         known = {option.name: option for option in self.options}
         names = ", ".join(known) or "none"
-        problems = [Problem(f"{field}.{name}", f"is not an option of {self.name} ({names})")
-                    for name in options if name not in known]
+        problems = [
+            Problem(f"{field}.{name}", f"is not an option of {self.name} ({names})")
+            for name in options
+            if name not in known
+        ]
         complete: dict[str, OptionValue] = {}
         for name, option in known.items():
             value, reason = _accept(option, options.get(name, option.default))
@@ -47,8 +50,11 @@ class VehicleKind:
         if not problems:
             problems = [Problem(f"{field}.{p.field}", p.reason) for p in self.conflicts(complete)]
         if problems:
-            raise InputError(f"These options do not suit the vehicle {self.name}.", problems=tuple(problems),
-                             hint="Correct the named options, or leave them out to get their defaults.")
+            raise InputError(
+                f"These options do not suit the vehicle {self.name}.",
+                problems=tuple(problems),
+                hint="Correct the named options, or leave them out to get their defaults.",
+            )
         return complete
 
 

@@ -14,15 +14,17 @@ from app.vehicles.jsbsim.kind import JSBSIM
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.twin import TWIN
 
-VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
-    {kind.name: kind for kind in (JSBSIM, TWIN, IMPORT)})
+VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType({kind.name: kind for kind in (JSBSIM, TWIN, IMPORT)})
 
 
 def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:
     """Raises InputError when there is no vehicle of that kind."""
     if kind not in VEHICLE_KINDS:
-        raise InputError("There is no such vehicle.", hint=f"Choose one of: {', '.join(VEHICLE_KINDS)}.",
-                         problems=(Problem(field, f"unknown kind {kind!r}"),))
+        raise InputError(
+            "There is no such vehicle.",
+            hint=f"Choose one of: {', '.join(VEHICLE_KINDS)}.",
+            problems=(Problem(field, f"unknown kind {kind!r}"),),
+        )
     return VEHICLE_KINDS[kind]
 
 
@@ -55,5 +57,7 @@ def _restore(vehicle: Vehicle) -> None:
     wanted = dict(vehicle.safe_gains)
     held = vehicle.stage(wanted)
     if held != wanted:
-        raise SafeGainsError(f"The vehicle holds {held} instead of its safe gains {wanted}.",
-                             hint="Do not fly it. Set its gains by hand, read them back, then release it.")
+        raise SafeGainsError(
+            f"The vehicle holds {held} instead of its safe gains {wanted}.",
+            hint="Do not fly it. Set its gains by hand, read them back, then release it.",
+        )

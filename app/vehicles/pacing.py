@@ -15,9 +15,11 @@ class Pacer:
     def __init__(self, speed: float | None) -> None:
         """Raises InputError unless `speed` is a positive finite number or None."""
         if speed is not None and not (math.isfinite(speed) and speed > 0.0):
-            raise InputError("This flight cannot be paced.",
-                             problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
-                             hint="Give simulated time over wall time, such as 10; nothing means as fast as possible.")
+            raise InputError(
+                "This flight cannot be paced.",
+                problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
+                hint="Give simulated time over wall time, such as 10; nothing means as fast as possible.",
+            )
         self._speed = speed
         self._start_s = time.monotonic()
 

@@ -6,7 +6,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
-from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S
+from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S, THROTTLE
 from app.core.errors import GainsError, Problem
 from app.core.policy import Gains
 from app.core.trajectory import Trajectory
@@ -50,8 +50,13 @@ class SimulatedVehicle:
 
     is_real: Final = False
 
-    def __init__(self, kind: str, safe_gains: Gains, settings: Mapping[str, OptionValue],
-                 launch: Callable[[FlightOrder], Simulation]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        safe_gains: Gains,
+        settings: Mapping[str, OptionValue],
+        launch: Callable[[FlightOrder], Simulation],
+    ) -> None:
         self.kind: Final = kind
         self.safe_gains: Final[Gains] = _counts(safe_gains)
         self._settings = dict(settings)
@@ -66,8 +71,9 @@ class SimulatedVehicle:
         self._staged = True
         return dict(self._held)
 
-    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None],
-            should_abort: ShouldAbort) -> FlightRecord:
+    def fly(
+        self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: ShouldAbort
+    ) -> FlightRecord:
         """Take off to 3 m with the staged gains, holding simulated time back to the order's speed.
 
         `should_abort` is asked every 20 ms of vehicle time. An abort ends the flight there: the safe gains are set and
@@ -76,19 +82,25 @@ class SimulatedVehicle:
         broke down.
         """
         if not self._staged:
-            raise VehicleError("No gains were staged for this flight, so it was not started.",
-                               hint="Stage the gains, compare what is read back, then fly.")
+            raise VehicleError(
+                "No gains were staged for this flight, so it was not started.",
+                hint="Stage the gains, compare what is read back, then fly.",
+            )
         try:
             simulation = self._launch(order)
             rows: list[Rows] = []
             reason = self._take_off(simulation, rows, Pacer(order.speed), on_sample, should_abort)
             self._restore()
             if reason is not None:
-                rows.extend(self._land(simulation, landed=not rows or bool(rows[-1][-1, ALTITUDE] <= _LANDED_M)))
+                rows.extend(self._land(simulation, rows[-1]) if rows else [self._stay(simulation)])
         finally:
             self._restore()
-        return FlightRecord(trajectory=self._trajectory(rows), ending="completed" if reason is None else "aborted",
-                            reason=reason or "", settings=self._settings)
+        return FlightRecord(
+            trajectory=self._trajectory(rows),
+            ending="completed" if reason is None else "aborted",
+            reason=reason or "",
+            settings=self._settings,
+        )
 
     def close(self) -> None:
         """Nothing is held open between flights."""
@@ -97,8 +109,14 @@ class SimulatedVehicle:
         self._held = dict(self.safe_gains)
         self._staged = False
 
-    def _take_off(self, simulation: Simulation, rows: list[Rows], pacer: Pacer, on_sample: Callable[[Sample], None],
-                  should_abort: ShouldAbort) -> str | None:
+    def _take_off(
+        self,
+        simulation: Simulation,
+        rows: list[Rows],
+        pacer: Pacer,
+        on_sample: Callable[[Sample], None],
+        should_abort: ShouldAbort,
+    ) -> str | None:
         """Fill `rows` until the manoeuvre is over; the reason of an abort, or None."""
         command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
         for first, last in _slices():
@@ -109,15 +127,18 @@ class SimulatedVehicle:
             on_sample(_sample(first, rows[-1][0]))
         return None
 
-    def _land(self, simulation: Simulation, *, landed: bool) -> Iterator[Rows]:
+    def _stay(self, simulation: Simulation) -> Rows:
+        """Aborted before anything moved: the one instant on the ground."""
+        return _flown(simulation, 1, self._command(THROTTLE, 0), 0.0)
+
+    def _land(self, simulation: Simulation, last: Rows) -> Iterator[Rows]:
         """Descend until the vehicle stands on the ground, half a minute at most, as fast as it can be computed."""
         command = self._command(CLIMB, fix(-_LANDING_RATE_M_S, SPEED_BITS))
         for _ in range(round(_LANDING_S * RATE_HZ) // _LANDING_SLICE):
-            if landed:
+            if last[-1, ALTITUDE] <= _LANDED_M:
                 return
-            rows = _flown(simulation, _LANDING_SLICE, command, 0.0)
-            landed = bool(rows[-1, ALTITUDE] <= _LANDED_M)
-            yield rows
+            last = _flown(simulation, _LANDING_SLICE, command, 0.0)
+            yield last
 
     def _command(self, mode: int, target: int) -> Integers:
         command = np.empty(COMMAND_SIZE, dtype=np.int64)
@@ -125,7 +146,7 @@ class SimulatedVehicle:
         return command
 
     def _trajectory(self, rows: list[Rows]) -> Trajectory:
-        record = np.concatenate([np.empty((0, len(CHANNELS))), *rows])
+        record = np.concatenate(rows)
         time_s = np.arange(len(record), dtype=np.float64) * STEP_S
         channels = {name: np.ascontiguousarray(record[:, i]) for i, name in enumerate(CHANNELS)}
         return Trajectory(time_s, channels, self.kind, "simulation")
@@ -141,25 +162,37 @@ def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: f
     rows = simulation.advance(steps, command)
     rows[:, CHANNELS.index("set_point_m")] = set_point_m
     if not np.isfinite(rows).all():
-        raise VehicleError("The simulation broke down: the vehicle's state is no longer a number.",
-                           hint="These gains or options throw the vehicle about; choose milder ones.")
+        raise VehicleError(
+            "The simulation broke down: the vehicle's state is no longer a number.",
+            hint="These gains or options throw the vehicle about; choose milder ones.",
+        )
     return rows
 
 
 def _sample(step: int, row: Rows) -> Sample:
     values = dict(zip(CHANNELS, row.tolist(), strict=True))
-    return Sample(time_s=step * STEP_S, altitude_m=values["altitude_m"], climb_rate_m_s=values["climb_rate_m_s"],
-                  set_point_m=values["set_point_m"], reference_m=values["reference_m"], thrust=values["thrust"],
-                  battery_v=values["battery_v"])
+    return Sample(
+        time_s=step * STEP_S,
+        altitude_m=values["altitude_m"],
+        climb_rate_m_s=values["climb_rate_m_s"],
+        set_point_m=values["set_point_m"],
+        reference_m=values["reference_m"],
+        thrust=values["thrust"],
+        battery_v=values["battery_v"],
+    )
 
 
 def _counts(gains: Gains) -> dict[str, float]:
     problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in GAIN_NAMES]
-    problems.extend(Problem(f"gains.{name}", reason) for name in GAIN_NAMES
-                    if (reason := _refusal(gains.get(name))) is not None)
+    problems.extend(
+        Problem(f"gains.{name}", reason) for name in GAIN_NAMES if (reason := _refusal(gains.get(name))) is not None
+    )
     if problems:
-        raise GainsError("The vehicle cannot hold these gains.", problems=tuple(problems),
-                         hint=f"Send {', '.join(GAIN_NAMES)} as whole numbers of counts.")
+        raise GainsError(
+            "The vehicle cannot hold these gains.",
+            problems=tuple(problems),
+            hint=f"Send {', '.join(GAIN_NAMES)} as whole numbers of counts.",
+        )
     return {name: int(gains[name]) for name in GAIN_NAMES}
 
 

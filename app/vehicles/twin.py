@@ -28,8 +28,9 @@ class _TwinFlight:
     def __init__(self, options: dict[str, float], seed: int) -> None:
         flight, gust = streams(seed, 2)
         thrust, start, datum = flight.standard_normal(3) * options["scatter"]
-        self._model = np.array([options["hover_throttle"] / (1.0 + _THRUST_SD * thrust), options["motor_lag_s"],
-                                options["drag_1_s"]])
+        self._model = np.array(
+            [options["hover_throttle"] / (1.0 + _THRUST_SD * thrust), options["motor_lag_s"], options["drag_1_s"]]
+        )
         self._datum_m = float(_DATUM_SD_M * datum)
         self._gusts = gusts(gust, MOST_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=_GUST_CORRELATION_S)
         self._resting = round(max(options["start_latency_s"] + _START_SD_S * start, 0.0) * RATE_HZ)
@@ -40,8 +41,16 @@ class _TwinFlight:
     def advance(self, steps: int, command: Integers) -> Rows:
         rows = np.empty((steps, len(CHANNELS)))
         rows[:, BATTERY] = _BATTERY_V
-        fly_simple_model(self._autopilot, command, self._plant, self._model, self._datum_m,
-                         self._gusts[self._done:self._done + steps], max(self._resting - self._done, 0), rows)
+        fly_simple_model(
+            self._autopilot,
+            command,
+            self._plant,
+            self._model,
+            self._datum_m,
+            self._gusts[self._done : self._done + steps],
+            max(self._resting - self._done, 0),
+            rows,
+        )
         self._done += steps
         return rows
 
@@ -58,10 +67,17 @@ TWIN: Final = VehicleKind(
     is_real=False,
     can_fly=True,
     options=(
-        VehicleOption(name="scatter", title="Flight-to-flight scatter, as a multiple of the real drone's", unit="×",
-                      default=1.0, lower=0.0, upper=5.0),
-        VehicleOption(name="hover_throttle", title="Hover throttle", unit="of full", default=0.61, lower=0.3,
-                      upper=0.95),
+        VehicleOption(
+            name="scatter",
+            title="Flight-to-flight scatter, as a multiple of the real drone's",
+            unit="×",
+            default=1.0,
+            lower=0.0,
+            upper=5.0,
+        ),
+        VehicleOption(
+            name="hover_throttle", title="Hover throttle", unit="of full", default=0.61, lower=0.3, upper=0.95
+        ),
         VehicleOption(name="motor_lag_s", title="Motor lag", unit="s", default=0.05, lower=0.0, upper=0.3),
         VehicleOption(name="start_latency_s", title="Start latency", unit="s", default=0.3, lower=0.0, upper=2.0),
         VehicleOption(name="drag_1_s", title="Drag", unit="1/s", default=0.0, lower=0.0, upper=1.0),

@@ -44,8 +44,11 @@ _log = logging.getLogger(__name__)
 class _Logger(jsbsim.FGLogger):
     """JSBSim's messages into Python's log instead of standard output; banners and echoes are dropped."""
 
-    _LEVELS: Final = {jsbsim.LogLevel.WARN: logging.WARNING, jsbsim.LogLevel.ERROR: logging.ERROR,
-                      jsbsim.LogLevel.FATAL: logging.CRITICAL}
+    _LEVELS: Final = {
+        jsbsim.LogLevel.WARN: logging.WARNING,
+        jsbsim.LogLevel.ERROR: logging.ERROR,
+        jsbsim.LogLevel.FATAL: logging.CRITICAL,
+    }
 
     def __init__(self) -> None:
         super().__init__()
@@ -98,9 +101,16 @@ class JsbsimFlight:
     def __init__(self, options: dict[str, float], seed: int) -> None:
         noise, *directions = streams(seed, 4)
         self._noise_m = noise.normal(0.0, options["altitude_noise_m"], MOST_STEPS)
-        self._gusts_ft_s = [
-            gusts(direction, MOST_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=_GUST_CORRELATION_S).tolist()
-            for direction in directions] if options["gust_m_s"] > 0.0 else []
+        self._gusts_ft_s = (
+            [
+                gusts(
+                    direction, MOST_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=_GUST_CORRELATION_S
+                ).tolist()
+                for direction in directions
+            ]
+            if options["gust_m_s"] > 0.0
+            else []
+        )
         self._fdm = new_aircraft()
         self._configure(options)
         self._resting_steps = round(options["start_latency_s"] * RATE_HZ)
@@ -118,10 +128,19 @@ class JsbsimFlight:
         cosine_of_tilt = self._property("attitude/cosine-of-tilt").get_double_value
         set_thrust = self._property("motors/thrust-norm").set_double_value
         run, autopilot, done, resting = self._fdm.run, self._autopilot, self._done, self._resting_steps
-        for i, (row, noise_m) in enumerate(zip(rows, self._noise_m[done:done + steps].tolist(), strict=True)):
+        for i, (row, noise_m) in enumerate(zip(rows, self._noise_m[done : done + steps].tolist(), strict=True)):
             altitude_m = altitude_ft() * _FOOT_M - self._ground_m
-            set_thrust(control(autopilot, command, altitude_m + noise_m, sink_ft_s() * -_FOOT_M, cosine_of_tilt(),
-                               done + i >= resting, row))
+            set_thrust(
+                control(
+                    autopilot,
+                    command,
+                    altitude_m + noise_m,
+                    sink_ft_s() * -_FOOT_M,
+                    cosine_of_tilt(),
+                    done + i >= resting,
+                    row,
+                )
+            )
             if self._sags or self._gusts_ft_s:
                 self._exchange(done + i, row)
             if altitude_m > _CLEAR_OF_GROUND_M:

@@ -23,8 +23,13 @@ def _cannot_lift(options: Options) -> tuple[Problem, ...]:
     share = float(options["mass_kg"]) * GRAVITY_M_S2 / (FULL_THRUST_N * strength)
     if share <= _HIGHEST_HOVER:
         return ()
-    return (Problem("mass_kg", f"is too much for these motors and this battery: it takes {share:.0%} of full thrust, "
-                               f"at most {_HIGHEST_HOVER:.0%} leaves room to control"),)
+    return (
+        Problem(
+            "mass_kg",
+            f"is too much for these motors and this battery: it takes {share:.0%} of full thrust, "
+            f"at most {_HIGHEST_HOVER:.0%} leaves room to control",
+        ),
+    )
 
 
 JSBSIM: Final = VehicleKind(
@@ -34,20 +39,50 @@ JSBSIM: Final = VehicleKind(
     is_real=False,
     can_fly=True,
     options=(
-        VehicleOption(name="thrust_scale", title="Thrust, as a multiple of the data sheet's", unit="×", default=1.0,
-                      lower=0.7, upper=1.5),
+        VehicleOption(
+            name="thrust_scale",
+            title="Thrust, as a multiple of the data sheet's",
+            unit="×",
+            default=1.0,
+            lower=0.7,
+            upper=1.5,
+        ),
         VehicleOption(name="mass_kg", title="Mass", unit="kg", default=MASS_KG, lower=0.3, upper=0.6),
         VehicleOption(name="motor_lag_s", title="Motor lag", unit="s", default=0.0, lower=0.0, upper=0.15),
         VehicleOption(name="start_latency_s", title="Start latency", unit="s", default=0.0, lower=0.0, upper=2.0),
         VehicleOption(name="wind_m_s", title="Steady wind", unit="m/s", default=0.0, lower=0.0, upper=10.0),
-        VehicleOption(name="wind_from_deg", title="Direction the wind comes from, clockwise from north", unit="°",
-                      default=0.0, lower=0.0, upper=360.0),
-        VehicleOption(name="gust_m_s", title="Gusts in each direction, root mean square", unit="m/s", default=0.0,
-                      lower=0.0, upper=3.0),
-        VehicleOption(name="altitude_noise_m", title="Noise of the measured altitude, standard deviation", unit="m",
-                      default=0.0, lower=0.0, upper=0.1),
-        VehicleOption(name="battery_sag", title="Share of the voltage lost under full load", unit="of full",
-                      default=0.0, lower=0.0, upper=0.2),
+        VehicleOption(
+            name="wind_from_deg",
+            title="Direction the wind comes from, clockwise from north",
+            unit="°",
+            default=0.0,
+            lower=0.0,
+            upper=360.0,
+        ),
+        VehicleOption(
+            name="gust_m_s",
+            title="Gusts in each direction, root mean square",
+            unit="m/s",
+            default=0.0,
+            lower=0.0,
+            upper=3.0,
+        ),
+        VehicleOption(
+            name="altitude_noise_m",
+            title="Noise of the measured altitude, standard deviation",
+            unit="m",
+            default=0.0,
+            lower=0.0,
+            upper=0.1,
+        ),
+        VehicleOption(
+            name="battery_sag",
+            title="Share of the voltage lost under full load",
+            unit="of full",
+            default=0.0,
+            lower=0.0,
+            upper=0.2,
+        ),
     ),
     open=_open,
     conflicts=_cannot_lift,

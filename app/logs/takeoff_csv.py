@@ -1,0 +1,183 @@
+"""Reader of takeoffs flown elsewhere: CSV with the columns time_s, altitude_m and optionally more.
+
+UTF-8 (a byte order mark is fine), commas between values, decimal points, lines ending in LF or CRLF; one header line,
+then one line a sample. `time_s` counts from the command and rises strictly; altitude is positive up. Of further columns,
+the channels that the program knows are kept; others are left in the file. Gaps are read as they are: whoever scores the
+flight judges them.
+"""
+
+import csv
+import io
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.core.errors import Problem, TrajectoryError
+from app.core.trajectory import CHANNEL_UNITS, Samples, Trajectory
+
+MAX_ROWS: Final = 200_000
+MIN_ROWS: Final = 20
+
+_REQUIRED: Final = ("time_s", "altitude_m")
+_MAX_LINE_BYTES: Final = 4096
+_LARGEST: Final = 1e6
+_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
+_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+
+_FORMAT_HINT: Final = (
+    "Save the flight as CSV in UTF-8 with the header time_s,altitude_m, commas between values and "
+    "decimal points, time in seconds since the command, altitude in metres up."
+)
+_ROW_HINT: Final = "Correct or remove the named line and upload the file again; nothing was stored."
+
+
+def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
+    """Read a whole file, in memory bounded by 200 000 rows however long it is.
+
+    Raises TrajectoryError naming the line and the column of the first thing wrong, and what to do about it.
+    """
+    lines = _Lines(io.BytesIO(stream) if isinstance(stream, bytes) else stream)
+    reader = csv.reader(lines, strict=True)
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        columns = _columns(header)
+        values, numbers = _read_rows(reader, header, columns, lines)
+    except csv.Error as error:
+        raise _refused(f"line {lines.number}", f"is not a line of CSV: {error}", _ROW_HINT) from error
+    time_s, *channels = (np.array(column, dtype=np.float64) for column in values)
+    _require_rows(len(time_s))
+    _require_rising_when_stored(time_s, numbers)
+    return Trajectory(time_s, dict(zip(columns[1:], channels, strict=True)), source="csv", clock="vehicle")
+
+
+class _Lines:
+    """Text lines of a byte stream, each of bounded length, counted."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self.number = 0
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        raw = self._stream.readline(_MAX_LINE_BYTES + 1)
+        if not raw:
+            raise StopIteration
+        self.number += 1
+        if self.number > MAX_ROWS + 1:
+            raise _refused(
+                f"line {self.number}",
+                f"is one too many: a flight may have at most {MAX_ROWS} rows",
+                "Cut the log to the takeoff, or keep every tenth row: 50 a second are plenty.",
+            )
+        if self.number == 1:
+            if raw.startswith(_UTF_16):
+                raise _refused("line 1", "is text in UTF-16, not UTF-8", _FORMAT_HINT)
+            raw = raw.removeprefix(_BYTE_ORDER_MARK)
+        return self._decode(raw)
+
+    def _decode(self, raw: bytes) -> str:
+        where = f"line {self.number}"
+        if b"\0" in raw:
+            raise _refused(where, "holds bytes that are not text", _FORMAT_HINT)
+        if len(raw) > _MAX_LINE_BYTES:
+            raise _refused(where, f"is longer than {_MAX_LINE_BYTES} bytes", _FORMAT_HINT)
+        try:
+            return raw.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise _refused(where, f"is not UTF-8 text (byte {error.start + 1})", _FORMAT_HINT) from error
+
+
+def _columns(header: Sequence[str]) -> list[str]:
+    """The columns to keep, time first."""
+    if not header:
+        raise TrajectoryError("The file is empty.", hint=_FORMAT_HINT, problems=(Problem("line 1", "is missing"),))
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise _refused("line 1", f"has its columns separated by {name}, not commas", _FORMAT_HINT)
+    problems = [Problem(f"line 1, column {name}", "is missing") for name in _REQUIRED if name not in header]
+    problems += [
+        Problem(f"line 1, column {name}", "appears twice")
+        for name in sorted(set(header))
+        if header.count(name) > 1 and name in (*_REQUIRED, *CHANNEL_UNITS)
+    ]
+    if problems:
+        found = ", ".join(header[:10])
+        raise TrajectoryError(
+            f"The header is not that of a flight; it reads: {found}.", hint=_FORMAT_HINT, problems=tuple(problems)
+        )
+    return ["time_s", *(name for name in CHANNEL_UNITS if name in header)]
+
+
+def _read_rows(
+    reader: Iterator[list[str]], header: Sequence[str], columns: Sequence[str], lines: _Lines
+) -> tuple[list["array[float]"], "array[int]"]:
+    """The kept columns' values, and the line each row stood on. Empty lines are skipped."""
+    places = [header.index(name) for name in columns]
+    values = [array("d") for _ in columns]
+    numbers = array("L")
+    last_s = -math.inf
+    for row in reader:
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(header):
+            raise _refused(
+                f"line {lines.number}", f"has {len(row)} values where the header names {len(header)} columns", _ROW_HINT
+            )
+        numbers_of_row = [_number(row[place], lines.number, name) for place, name in zip(places, columns, strict=True)]
+        if numbers_of_row[0] <= last_s:
+            raise _refused(
+                f"line {lines.number}, column time_s",
+                f"must rise, but {numbers_of_row[0]:g} s follows {last_s:g} s",
+                _ROW_HINT,
+            )
+        last_s = numbers_of_row[0]
+        for column, value in zip(values, numbers_of_row, strict=True):
+            column.append(value)
+        numbers.append(lines.number)
+    return values, numbers
+
+
+def _number(text: str, line: int, column: str) -> float:
+    where = f"line {line}, column {column}"
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise _refused(where, f"is not a number: {text.strip()[:40]!r}", _ROW_HINT) from error
+    if not math.isfinite(value) or "_" in text:
+        raise _refused(where, f"is not a finite number: {text.strip()[:40]!r}", _ROW_HINT)
+    if abs(value) > _LARGEST:
+        raise _refused(
+            where,
+            f"is beyond anything measured in a takeoff: {value:g}",
+            "Count time from the command and use metres and seconds.",
+        )
+    return value
+
+
+def _require_rows(rows: int) -> None:
+    if rows < MIN_ROWS:
+        raise TrajectoryError(
+            f"The file holds {rows} {'sample' if rows == 1 else 'samples'}; a flight needs at least {MIN_ROWS}.",
+            hint="Upload the whole takeoff, from the command to 32.6 s after it.",
+            problems=(Problem("time_s", "has too few rows"),),
+        )
+
+
+def _require_rising_when_stored(time_s: Samples, numbers: "array[int]") -> None:
+    """Trajectories are kept in single precision; time stamps must stay apart there."""
+    stored = time_s.astype(np.float32)
+    if (late := np.flatnonzero(np.diff(stored) <= 0.0)).size:
+        raise _refused(
+            f"line {numbers[int(late[0]) + 1]}, column time_s",
+            "is too close to the line before to be told apart",
+            "Count time from the command, and keep at most a few thousand rows a second.",
+        )
+
+
+def _refused(field: str, reason: str, hint: str) -> TrajectoryError:
+    return TrajectoryError("This file cannot be read as a flight.", hint=hint, problems=(Problem(field, reason),))
