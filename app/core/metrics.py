@@ -27,13 +27,18 @@ def mean_absolute_error(time_s: Samples, values: Samples, set_point: SetPoint, s
     return float(np.trapezoid(deviations, instants)) / (stop_s - start_s)
 
 
-def require_scorable(trajectory: Trajectory, channel: str, start_s: float, stop_s: float) -> None:
+def require_scorable(
+    trajectory: Trajectory, channel: str, start_s: float, stop_s: float, *, accept_gaps: bool = False
+) -> None:
     """Raise TrajectoryError unless `channel` can be scored over [start_s, stop_s].
 
     It must be there, finite, with rising time stamps, and nowhere in the window further than 0.25 s from one sample to
-    the next, the ends of the window included.
+    the next, the ends of the window included; `accept_gaps` lets gaps inside the record pass.
     """
-    if problem := _problem(trajectory, channel, start_s, stop_s):
+    problem = _problem(trajectory, channel) or _uncovered(trajectory.time_s, start_s, stop_s)
+    if problem is None and not accept_gaps:
+        problem = _gap(trajectory.time_s, start_s, stop_s)
+    if problem is not None:
         raise TrajectoryError(
             "This flight cannot be scored.",
             problems=(problem,),
@@ -41,7 +46,7 @@ def require_scorable(trajectory: Trajectory, channel: str, start_s: float, stop_
         )
 
 
-def _problem(trajectory: Trajectory, channel: str, start_s: float, stop_s: float) -> Problem | None:
+def _problem(trajectory: Trajectory, channel: str) -> Problem | None:
     time_s = trajectory.time_s
     if channel not in trajectory.channels:
         return Problem(channel, f"is not among the recorded channels ({', '.join(trajectory.channels)})")
@@ -54,13 +59,17 @@ def _problem(trajectory: Trajectory, channel: str, start_s: float, stop_s: float
     if (np.diff(time_s) <= 0.0).any():
         late = int(np.argmax(np.diff(time_s) <= 0.0)) + 1
         return Problem("time_s", f"must rise, but is {time_s[late]:g} s after {time_s[late - 1]:g} s at sample {late}")
-    return _gap(time_s, start_s, stop_s)
+    return None
 
 
-def _gap(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
+def _uncovered(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
     if not time_s.size or time_s[0] > start_s + MAX_GAP_S or time_s[-1] < stop_s - MAX_GAP_S:
         covered = f"{time_s[0]:g} … {time_s[-1]:g} s" if time_s.size else "nothing"
         return Problem("time_s", f"must cover {start_s:g} … {stop_s:g} s from the command on, got {covered}")
+    return None
+
+
+def _gap(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
     first = max(int(np.searchsorted(time_s, start_s, side="right")) - 1, 0)
     last = int(np.searchsorted(time_s, stop_s, side="left"))
     gaps = np.diff(time_s[first : last + 1])

@@ -69,6 +69,9 @@ class Experiment(Protocol):
         """Performance of outputs given on `grid_s`: (k, n) → (k,)."""
         ...
 
-    def error(self, trajectory: Trajectory) -> float:
-        """Performance of a recorded flight on its own time stamps. Raises TrajectoryError when it cannot be scored."""
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
+        """Performance of a recorded flight on its own time stamps. Raises TrajectoryError when it cannot be scored.
+
+        `accept_gaps`: somebody has looked at the gaps inside the record and counts the flight all the same.
+        """
         ...

@@ -74,9 +74,9 @@ class Takeoff:
         time_s = self.grid_s
         return np.array([mean_absolute_error(time_s, row, self.set_point, 0.0, WINDOW_S) for row in outputs])
 
-    def error(self, trajectory: Trajectory) -> float:
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same of a recorded flight. Raises TrajectoryError when it has gaps or does not cover the window."""
-        require_scorable(trajectory, self.output, 0.0, WINDOW_S)
+        require_scorable(trajectory, self.output, 0.0, WINDOW_S, accept_gaps=accept_gaps)
         return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, WINDOW_S)
 
 
