@@ -1,11 +1,14 @@
 """Settings, and the only reader of the environment: every field is also a variable, `GAINLINE_DATA_DIR` and so on."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from app.core.errors import InputError, Problem
 
 APP: Final = Path(__file__).resolve().parent
 CHECKOUT: Final = APP.parent
@@ -30,8 +33,9 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="GAINLINE_", frozen=True, extra="forbid")
 
-    data_dir: Path = Field(default_factory=default_data_dir,
-                           description="folder of the database and of the worker's socket")
+    data_dir: Path = Field(
+        default_factory=default_data_dir, description="folder of the database and of the worker's socket"
+    )
     host: str = Field(default="127.0.0.1", description="address of the dashboard")
     port: int = Field(default=8000, ge=0, le=65535, description="port of the dashboard; 0 takes a free one")
     ui_dir: Path = Field(default_factory=default_ui_dir, description="folder of the built dashboard")
@@ -42,3 +46,20 @@ class Settings(BaseSettings):
     @property
     def database_file(self) -> Path:
         return self.data_dir / "gainline.sqlite3"
+
+
+def read_settings(given: Mapping[str, str | int | Path]) -> Settings:
+    """The environment's settings with `given` in place of them. Raises InputError naming what cannot be used."""
+    try:
+        return Settings.model_validate(given)
+    except ValidationError as error:
+        problems = tuple(Problem(_spoken(str(entry["loc"][0]), given), entry["msg"]) for entry in error.errors())
+        raise InputError(
+            "These settings cannot be used.",
+            problems=problems,
+            hint="Correct the named option or variable; docs/operations.md lists them all.",
+        ) from error
+
+
+def _spoken(field: str, given: Mapping[str, str | int | Path]) -> str:
+    return f"--{field.replace('_', '-')}" if field in given else f"GAINLINE_{field.upper()}"

@@ -4,17 +4,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from app.campaigns.schemas import NewCampaign
+from app.core.checking import problems_of
+from app.core.definition import Definition
 from app.errors import InputError, NotFoundError, Problem
 from app.schemas import Text
+from app.vehicles.base import OptionValue
+from app.vehicles.open import check_options
 
 PRESETS_DIR: Final = Path(__file__).parent / "presets"
 MAX_FILE_BYTES: Final = 2**20
+
+_CORE: Final = TypeAdapter(Definition)
 
 
 class CampaignFile(NewCampaign):
@@ -39,17 +45,41 @@ def read_campaign_file(path: Path) -> CampaignFile:
     """Read and check a campaign file. Raises InputError with the line of everything that is wrong."""
     document = _load(path)
     try:
-        return CampaignFile.model_validate(document)
+        file = CampaignFile.model_validate(document)
     except ValidationError as error:
         problems = tuple(_located(document, entry["loc"], entry["msg"]) for entry in error.errors())
-        raise InputError(f"{path.name} does not describe a campaign.", problems=problems,
-                         hint="Mend the named lines; docs/api.md lists the fields.") from error
+        raise _no_campaign(path, problems) from error
+    try:
+        check_campaign(file)
+    except InputError as error:
+        problems = tuple(_located(document, problem.field.split("."), problem.reason) for problem in error.problems)
+        raise _no_campaign(path, problems) from error
+    return file
 
 
-def name_lines(path: Path, problems: Sequence[Problem]) -> tuple[Problem, ...]:
-    """The same problems with the line of the file that each is about, for checks made after reading."""
-    document = _load(path)
-    return tuple(_located(document, problem.field.split("."), problem.reason) for problem in problems)
+def check_campaign(file: CampaignFile) -> tuple[Definition, dict[str, OptionValue]]:
+    """The campaign as the mathematics needs it, and its vehicle's complete options.
+
+    Raises InputError naming every field that cannot be used.
+    """
+    definition = _CORE.validate_python(file.definition.model_dump())
+    problems = [Problem(f"definition.{problem.field}", problem.reason) for problem in problems_of(definition)]
+    options: dict[str, OptionValue] = {}
+    try:
+        options = check_options(file.vehicle.kind, file.vehicle.options)
+    except InputError as error:
+        problems.extend(error.problems)
+    if problems:
+        raise InputError("This campaign cannot be used.", problems=tuple(problems), hint="Correct the named settings.")
+    return definition, options
+
+
+def _no_campaign(path: Path, problems: tuple[Problem, ...]) -> InputError:
+    return InputError(
+        f"{path.name} does not describe a campaign.",
+        problems=problems,
+        hint="Mend the named lines; docs/campaign-files.md lists the fields.",
+    )
 
 
 def _load(path: Path) -> CommentedMap:
@@ -58,17 +88,25 @@ def _load(path: Path) -> CommentedMap:
             raise InputError(f"{path.name} is larger than 1 MiB.", hint="Give a campaign file, not a flight record.")
         document = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"{path} could not be read: {error.strerror or error}.",
-                         hint=f"Give a YAML file, or a preset: {', '.join(preset_names())}.") from error
+        raise InputError(
+            f"{path} could not be read: {error.strerror or error}.",
+            hint=f"Give a YAML file, or a preset: {', '.join(preset_names())}.",
+        ) from error
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark is not None else 1
-        raise InputError(f"{path.name} is not YAML.", problems=(Problem(f"line {line}", str(error.problem)),),
-                         hint="Mend the named line.") from error
+        raise InputError(
+            f"{path.name} is not YAML.",
+            problems=(Problem(f"line {line}", str(error.problem)),),
+            hint="Mend the named line.",
+        ) from error
     except (YAMLError, UnicodeDecodeError) as error:
         raise InputError(f"{path.name} is not YAML: {error}.", hint="Give a UTF-8 YAML file.") from error
     if not isinstance(document, CommentedMap):
-        raise InputError(f"{path.name} does not describe a campaign.", hint="Start it with `name: …` on line 1.",
-                         problems=(Problem("line 1", "must hold fields, `name: …` and so on"),))
+        raise InputError(
+            f"{path.name} does not describe a campaign.",
+            hint="Start it with `name: …` on line 1.",
+            problems=(Problem("line 1", "must hold fields, `name: …` and so on"),),
+        )
     return document
 
 
@@ -103,5 +141,6 @@ def with_settings(file: CampaignFile, settings: Mapping[tuple[str, ...], object]
         return CampaignFile.model_validate(document)
     except ValidationError as error:
         problems = tuple(Problem(".".join(map(str, entry["loc"])), entry["msg"]) for entry in error.errors())
-        raise InputError("These settings do not make a campaign.", problems=problems,
-                         hint="Correct the named settings.") from error
+        raise InputError(
+            "These settings do not make a campaign.", problems=problems, hint="Correct the named settings."
+        ) from error

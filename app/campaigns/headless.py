@@ -54,8 +54,9 @@ class Watcher:
     landed: Callable[[HeadlessTrial], None] = field(default=lambda _trial: None)
 
 
-def fly_campaign(definition: Definition, vehicle: str, options: Mapping[str, OptionValue],
-                 watcher: Watcher) -> HeadlessCampaign:
+def fly_campaign(
+    definition: Definition, vehicle: str, options: Mapping[str, OptionValue], watcher: Watcher
+) -> HeadlessCampaign:
     """Fly proposals as fast as possible until the campaign's own rule ends it.
 
     The definition must have been checked. Raises GainsError when the strategy proposes what the gate refuses, and
@@ -77,32 +78,52 @@ def fly_campaign(definition: Definition, vehicle: str, options: Mapping[str, Opt
         trials.append(trial)
         watcher.landed(trial)
         if trial.outcome != "invalid":
-            history.append(Flight(number=number, gains=proposal.gains, trajectory=record.trajectory.as_stored(),
-                                  error=trial.error, outcome=trial.outcome))
+            history.append(
+                Flight(
+                    number=number,
+                    gains=proposal.gains,
+                    trajectory=record.trajectory.as_stored(),
+                    error=trial.error,
+                    outcome=trial.outcome,
+                )
+            )
 
 
 def _judge(definition: Definition, history: Sequence[Flight], proposal: Proposal) -> StopVerdict:
     return verdict(definition.stop, [flight.error for flight in history], proposal.kind)
 
 
-def _require_flyable(definition: Definition, experiment: Experiment, proposal: Proposal,
-                     history: Sequence[Flight]) -> None:
+def _require_flyable(
+    definition: Definition, experiment: Experiment, proposal: Proposal, history: Sequence[Flight]
+) -> None:
     space = experiment.space.narrowed(definition.bounds)
     gate = check_policy(definition, experiment, space, proposal.gains, history)
     if not gate.passed:
-        raise GainsError("The proposed gains were refused before flight.",
-                         problems=tuple(Problem(check.name, check.sentence) for check in gate.checks if not check.passed),
-                         hint="Widen the bounds or the step limit of the campaign, or start from other gains.")
+        failed = tuple(Problem(check.name, check.sentence) for check in gate.checks if not check.passed)
+        raise GainsError(
+            "The proposed gains were refused before flight.",
+            problems=failed,
+            hint="Widen the bounds or the step limit of the campaign, or start from other gains.",
+        )
 
 
-def _fly(vehicle: str, options: Mapping[str, OptionValue], experiment: Experiment, definition: Definition,
-         number: int, proposal: Proposal, watcher: Watcher) -> FlightRecord:
+def _fly(
+    vehicle: str,
+    options: Mapping[str, OptionValue],
+    experiment: Experiment,
+    definition: Definition,
+    number: int,
+    proposal: Proposal,
+    watcher: Watcher,
+) -> FlightRecord:
     safe_gains = experiment.space.mapping(experiment.space.default)
     with open_vehicle(vehicle, options, safe_gains=safe_gains) as controlled:
         held = controlled.stage(proposal.gains)
         if held != proposal.gains:
-            raise VehicleError(f"The vehicle holds {held} instead of {proposal.gains}; nothing was flown.",
-                               hint="Read its gains back by hand before flying it again.")
+            raise VehicleError(
+                f"The vehicle holds {held} instead of {proposal.gains}; nothing was flown.",
+                hint="Read its gains back by hand before flying it again.",
+            )
         order = FlightOrder(seed=flight_seed(definition.seed, number))
         return controlled.fly(order, on_sample=watcher.sampled, should_abort=lambda: None)
 
@@ -116,5 +137,12 @@ def _assess(experiment: Experiment, number: int, proposal: Proposal, record: Fli
             error = experiment.error(record.trajectory.as_stored())
         except TrajectoryError as refused:
             outcome, reason = "invalid", str(refused)
-    return HeadlessTrial(number=number, kind=proposal.kind, gains=proposal.gains, outcome=outcome, error=error,
-                         predicted_error=proposal.predicted_error, reason=reason)
+    return HeadlessTrial(
+        number=number,
+        kind=proposal.kind,
+        gains=proposal.gains,
+        outcome=outcome,
+        error=error,
+        predicted_error=proposal.predicted_error,
+        reason=reason,
+    )

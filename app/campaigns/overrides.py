@@ -1,0 +1,103 @@
+"""Changes to a campaign file from the command line: `--vehicle`, `--strategy`, `--start`, `--set name=value`."""
+
+from collections.abc import Mapping, Sequence
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from app.campaigns.files import CampaignFile, with_settings
+from app.core.experiments import get_experiment
+from app.core.strategies import STRATEGIES
+from app.errors import InputError, Problem
+from app.vehicles.open import get_kind
+
+Path = tuple[str, ...]
+
+
+def override(
+    file: CampaignFile,
+    *,
+    vehicle: str | None = None,
+    strategy: str | None = None,
+    start: str | None = None,
+    seed: int | None = None,
+    max_flights: int | None = None,
+    settings: Sequence[str] = (),
+) -> CampaignFile:
+    """The file with what was given on the command line in place of its own.
+
+    Another vehicle or strategy starts from its default options. Raises InputError naming what cannot be used.
+    """
+    chosen: dict[Path, object] = {}
+    if vehicle is not None and vehicle != file.vehicle.kind:
+        chosen |= {("vehicle", "kind"): vehicle, ("vehicle", "options"): {}}
+    if strategy is not None and strategy != file.definition.strategy:
+        chosen |= {("definition", "strategy"): strategy, ("definition", "options"): {}}
+    if start is not None:
+        chosen[("definition", "start")] = _start(start, file.definition.experiment)
+    if seed is not None:
+        chosen[("definition", "seed")] = seed
+    if max_flights is not None:
+        chosen[("definition", "stop", "max_flights")] = max_flights
+    changed = with_settings(file, chosen)
+    return with_settings(changed, _assignments(changed, settings)) if settings else changed
+
+
+def _start(text: str, experiment: str) -> Mapping[str, object]:
+    if text in ("default", "simplex"):
+        return {"kind": text}
+    names = get_experiment(experiment).space.names
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != len(names):
+        raise InputError(
+            "The start cannot be used.",
+            problems=(Problem("--start", f"cannot be {text!r}"),),
+            hint=f"Give default, simplex, or the gains {','.join(names)} as numbers: 283,13,82.",
+        )
+    return {"kind": "given", "gains": dict(zip(names, values, strict=True))}
+
+
+def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[Path, object]:
+    known = _known(file)
+    chosen: dict[Path, object] = {}
+    problems: list[Problem] = []
+    for setting in settings:
+        name, separator, text = setting.partition("=")
+        if name not in known:
+            problems.append(Problem(f"--set {name}", f"is not a setting here; there are {', '.join(sorted(known))}"))
+        elif not separator or not text:
+            problems.append(Problem(f"--set {name}", "needs a value, as in name=value"))
+        else:
+            chosen[known[name]] = _value(text)
+    if problems:
+        raise InputError(
+            "These settings cannot be used.",
+            problems=tuple(problems),
+            hint="Settings belong to the chosen vehicle, strategy and stop rule.",
+        )
+    return chosen
+
+
+def _known(file: CampaignFile) -> dict[str, Path]:
+    """Where each setting's value goes, by the name used on the command line."""
+    strategy = STRATEGIES.get(file.definition.strategy)
+    return {
+        "first_step_fraction": ("definition", "first_step_fraction"),
+        "step_fraction": ("definition", "step_fraction"),
+        "stop": ("definition", "stop", "kind"),
+        "improvement": ("definition", "stop", "improvement"),
+        **{option.name: ("vehicle", "options", option.name) for option in get_kind(file.vehicle.kind).options},
+        **{option.name: ("definition", "options", option.name) for option in (strategy.options if strategy else ())},
+    }
+
+
+def _value(text: str) -> object:
+    """A YAML scalar: number, true/false, or text."""
+    try:
+        value: object = YAML(typ="safe", pure=True).load(text)
+    except YAMLError:
+        return text
+    return value if isinstance(value, bool | int | float) else text

@@ -1,0 +1,165 @@
+"""The `gainline` command. Each command imports what it needs when it runs, so that help comes at once."""
+
+from collections.abc import Callable
+from enum import StrEnum
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ParamSpec
+
+import typer
+
+from app.core.errors import GainlineError
+
+if TYPE_CHECKING:
+    from app.settings import Settings
+
+P = ParamSpec("P")
+
+app = typer.Typer(
+    name="gainline",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Tune a drone's controller gains in a handful of flights.",
+)
+controller = typer.Typer(no_args_is_help=True, help="Check the replica of the autopilot's vertical loop.")
+app.add_typer(controller, name="controller")
+
+JsonOut = Annotated[Path | None, typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.")]
+DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [default: GAINLINE_DATA_DIR]")]
+
+
+class Reproducible(StrEnum):
+    """What `gainline reproduce` knows."""
+
+    TABLE1 = "table1"
+    TABLE2 = "table2"
+
+
+def plainly(command: Callable[P, None]) -> Callable[P, None]:
+    """The command, with the program's own errors said in words and exit code 1."""
+
+    @wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            command(*args, **kwargs)
+        except GainlineError as error:
+            from app.commands.console import show_error
+
+            show_error(error)
+            raise typer.Exit(1) from error
+
+    return run
+
+
+@app.command()
+@plainly
+def serve(
+    host: Annotated[
+        str | None, typer.Option(help="Address to listen on.  [default: GAINLINE_HOST, else 127.0.0.1]")
+    ] = None,
+    port: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help="Port; 0 takes a free one.  [default: GAINLINE_PORT, else 8000]"),
+    ] = None,
+    data_dir: DataDir = None,
+    worker: Annotated[bool, typer.Option(help="Start the worker that flies and computes beside the server.")] = True,
+) -> None:
+    """Serve the dashboard and its API until it is stopped."""
+    from app.serve import serve as run
+
+    run(_settings(host=host, port=port, data_dir=data_dir), with_worker=worker)
+
+
+@app.command()
+@plainly
+def worker(data_dir: DataDir = None) -> None:
+    """Fly and compute for a server that was started with --no-worker."""
+    from app.worker import run_worker
+
+    run_worker(_settings(data_dir=data_dir))
+
+
+@app.command()
+@plainly
+def run(
+    campaign: Annotated[
+        str,
+        typer.Argument(
+            metavar="PRESET|FILE.yaml", show_default=False, help="A preset, as ardrone-takeoff, or a campaign file."
+        ),
+    ],
+    vehicle: Annotated[str | None, typer.Option(help="jsbsim or twin.", show_default=False)] = None,
+    strategy: Annotated[str | None, typer.Option(help="How the next gains are found.", show_default=False)] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="default|simplex|KP,KI,KD", show_default=False, help="Where the first flight's gains come from."
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            show_default=False,
+            help=(
+                "A setting of the vehicle (scatter=0, wind_m_s=3), the strategy (scaled=false) or the stop rule "
+                "(improvement=0.02). Repeatable."
+            ),
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random.", show_default=False)] = None,
+    max_flights: Annotated[
+        int | None, typer.Option(min=1, max=200, help="Flights at most.", show_default=False)
+    ] = None,
+    json_out: JsonOut = None,
+) -> None:
+    """Fly a whole campaign on a simulation, without the dashboard, and print its table."""
+    from app.commands.campaign import run_campaign
+
+    run_campaign(
+        campaign,
+        vehicle=vehicle,
+        strategy=strategy,
+        start=start,
+        seed=seed,
+        max_flights=max_flights,
+        settings=settings or [],
+        json_out=json_out,
+    )
+
+
+@app.command()
+@plainly
+def reproduce(
+    what: Annotated[Reproducible, typer.Argument(help="Which table of the paper.")], json_out: JsonOut = None
+) -> None:
+    """Fly the gain sets of the paper's tables and print published, measured and their ratio."""
+    from app.commands.reproductions import reproduce_table
+
+    reproduce_table(what.value, json_out)
+
+
+@controller.command()
+@plainly
+def replay(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recorded runs, .csv or .csv.gz.")],
+    json_out: JsonOut = None,
+) -> None:
+    """Replay recorded runs through the replica; exit code 1 on any difference or malformed file."""
+    from app.commands.controller import replay_files
+
+    if not replay_files(files, json_out):
+        raise typer.Exit(1)
+
+
+def _settings(**given: str | int | Path | None) -> "Settings":
+    """The environment's settings with what was given on the command line in place of them."""
+    from app.settings import read_settings
+
+    return read_settings({name: value for name, value in given.items() if value is not None})
+
+
+if __name__ == "__main__":
+    app()

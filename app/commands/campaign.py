@@ -1,0 +1,163 @@
+"""`gainline run`: a whole campaign, headless."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+from app.campaigns.files import CampaignFile, check_campaign, preset_names, read_campaign_file, read_preset
+from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly_campaign
+from app.campaigns.overrides import override
+from app.commands.console import console, table, write_json
+from app.core.definition import Definition
+from app.core.experiments import get_experiment
+from app.core.experiments.base import Experiment
+from app.core.strategies.base import Proposal
+from app.errors import InputError, Problem
+from app.vehicles.base import OptionValue, Sample
+from app.vehicles.open import get_kind
+
+
+def run_campaign(
+    source: str,
+    *,
+    vehicle: str | None,
+    strategy: str | None,
+    start: str | None,
+    seed: int | None,
+    max_flights: int | None,
+    settings: Sequence[str],
+    json_out: Path | None,
+) -> None:
+    """Fly the campaign of a preset or file and print its table. Raises InputError for what cannot be flown."""
+    file = override(
+        _read(source),
+        vehicle=vehicle,
+        strategy=strategy,
+        start=start,
+        seed=seed,
+        max_flights=max_flights,
+        settings=settings,
+    )
+    definition, options = check_campaign(file)
+    _require_wings(file)
+    experiment = get_experiment(definition.experiment)
+    out = console(json_out)
+    with _Display(definition, experiment) as display:
+        campaign = fly_campaign(definition, file.vehicle.kind, options, display.watcher)
+    _print(out, file, experiment, campaign)
+    write_json(json_out, _document(file, definition, options, campaign))
+
+
+def _read(source: str) -> CampaignFile:
+    return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
+
+
+def _require_wings(file: CampaignFile) -> None:
+    kind = get_kind(file.vehicle.kind)
+    if not kind.can_fly or kind.is_real:
+        raise InputError(
+            f"{kind.title} cannot be flown from the command line.",
+            problems=(Problem("vehicle.kind", f"{kind.name} is not a simulation"),),
+            hint="Choose --vehicle jsbsim or --vehicle twin, or use the dashboard.",
+        )
+
+
+class _Display:
+    """One line of progress for the flight in the air, on standard error; flown ones stay in its text."""
+
+    def __init__(self, definition: Definition, experiment: Experiment) -> None:
+        self._progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[note]}"),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
+        self._limit = definition.stop.max_flights
+        self._unit = experiment.error_unit
+        self.watcher = Watcher(proposed=self._proposed, sampled=self._sampled, landed=self._landed)
+
+    def __enter__(self) -> "_Display":
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def _proposed(self, number: int, proposal: Proposal) -> None:
+        self._progress.update(
+            self._task,
+            completed=0.0,
+            note="",
+            description=f"flight {number} of at most {self._limit}, {_gains(proposal.gains)}",
+        )
+
+    def _sampled(self, sample: Sample) -> None:
+        self._progress.update(self._task, completed=sample.time_s, note=f"{sample.altitude_m:.2f} m")
+
+    def _landed(self, trial: HeadlessTrial) -> None:
+        self._progress.console.print(
+            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} ({trial.outcome})",
+            highlight=False,
+        )
+        self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
+
+
+def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: HeadlessCampaign) -> None:
+    names = experiment.space.names
+    unit = experiment.error_unit
+    best = campaign.best
+    rows = [
+        (
+            f"run {trial.number}",
+            _number(trial.error),
+            _number(trial.predicted_error),
+            *(f"{trial.gains[name]:g}" for name in names),
+            trial.kind,
+            "best"
+            if best is not None and trial.number == best.number
+            else ""
+            if trial.outcome == "valid"
+            else trial.outcome,
+        )
+        for trial in campaign.trials
+    ]
+    out.print(table(("run #", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
+    out.print(f"Stopped: {campaign.stopped_because}")
+    if best is not None:
+        out.print(f"Best: {_error(best.error, unit)} with {_gains(best.gains)}, flight {best.number}.")
+
+
+def _document(
+    file: CampaignFile, definition: Definition, options: Mapping[str, OptionValue], campaign: HeadlessCampaign
+) -> dict[str, object]:
+    best = campaign.best
+    return {
+        "name": file.name,
+        "vehicle": {"kind": file.vehicle.kind, "options": dict(options)},
+        "definition": asdict(definition),
+        "definition_digest": definition.digest(),
+        "trials": [{**asdict(trial), "gains": dict(trial.gains)} for trial in campaign.trials],
+        "best": None if best is None else best.number,
+        "stopped_because": campaign.stopped_because,
+    }
+
+
+def _gains(gains: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.4f}"
+
+
+def _error(value: float | None, unit: str) -> str:
+    return "no error" if value is None else f"{value:.4f} {unit}"

@@ -1,0 +1,84 @@
+"""Campaign files: what ships, and what is wrong by line."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+
+from app.campaigns.files import check_campaign, preset_names, read_campaign_file, read_preset
+from app.errors import InputError, NotFoundError
+from app.vehicles.open import VEHICLE_KINDS
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "campaign.yaml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_is_a_campaign_that_can_be_created(name: str) -> None:
+    definition, _ = check_campaign(read_preset(name))
+    assert definition.experiment == "takeoff"
+
+
+def test_a_name_is_all_that_a_campaign_file_needs(tmp_path: Path) -> None:
+    file = read_campaign_file(written(tmp_path, "name: Tuesday\n"))
+    assert (file.vehicle.kind, file.definition.strategy, file.definition.stop.max_flights) == ("jsbsim", "gradient", 7)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("name: x\nvehicle:\n  kind: jsbsim\n  colour: red\n", "line 4, vehicle.colour"),
+        ("name: x\ndefinition:\n  seed: -4\n", "line 3, definition.seed"),
+        ("name: x\ndefinition:\n  bounds:\n    kp: [1, .nan]\n", "line 4, definition.bounds.kp.1"),
+        ("name: x\ndefinition:\n  bounds:\n    kp: [10, 5]\n", "line 4, definition.bounds.kp"),
+        ("name: x\n\ndefinition:\n  strategy: prayer\n", "line 4, definition.strategy"),
+        ("name: x\ndefinition:\n  stop: {max_flights: 0}\n", "line 3, definition.stop.max_flights"),
+        ("name: x\nvehicle:\n  kind: twin\n  options: {wind: 3}\n", "line 4, vehicle.options.wind"),
+        ("vehicle: {kind: twin}\n", "line 1, name"),
+        ("name: x\nname: y\n", "line 2"),
+        ("name: [x\n", "line 2"),
+        ("- name\n", "line 1"),
+        ("", "line 1"),
+    ],
+)
+def test_what_is_wrong_is_named_by_line_and_field(tmp_path: Path, text: str, named: str) -> None:
+    with pytest.raises(InputError) as refused:
+        read_campaign_file(written(tmp_path, text))
+    assert named in [problem.field for problem in refused.value.problems]
+
+
+def test_a_file_that_is_not_there_is_said_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="No such file"):
+        read_campaign_file(tmp_path / "absent.yaml")
+
+
+def test_a_binary_file_is_not_yaml(tmp_path: Path) -> None:
+    path = tmp_path / "record.yaml"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match="not YAML"):
+        read_campaign_file(path)
+
+
+def test_an_unknown_preset_is_not_found() -> None:
+    with pytest.raises(NotFoundError):
+        read_preset("ardrone-landing")
+
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "campaign-files.md").read_text(encoding="utf-8")
+
+
+def test_the_documented_example_holds_the_defaults_and_names_every_field(tmp_path: Path) -> None:
+    example = DOCUMENT.split("```yaml\n")[1].split("```")[0]
+    documented, _ = check_campaign(read_campaign_file(written(tmp_path, example)))
+    default, _ = check_campaign(read_campaign_file(written(tmp_path, "name: x\n")))
+    assert replace(documented, options={}, bounds={}) == default
+    assert [field.name for field in fields(documented) if f"  {field.name}: " not in example.replace(":\n", ": ")] == []
+
+
+def test_every_vehicle_option_is_documented() -> None:
+    named = {(kind.name, option.name) for kind in VEHICLE_KINDS.values() for option in kind.options}
+    rows = [row.split("|") for row in DOCUMENT.splitlines() if row.startswith("| ") and "`" in row]
+    assert {(row[1].strip(), row[2].split("`")[1]) for row in rows} == named

@@ -1,0 +1,63 @@
+"""`gainline controller replay` on the recorded runs, as they are and spoilt."""
+
+import csv
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from app.cli import app
+
+TRACES = sorted((Path(__file__).parents[1] / "data" / "vertical_loop").glob("*.csv.gz"))
+
+
+def replay(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, ["controller", "replay", *map(str, arguments)])
+
+
+def spoilt(tmp_path: Path, *, line: int, column: str, value: str) -> Path:
+    """The first trace with one value replaced; lines count from 1, the header is line 1."""
+    with gzip.open(TRACES[0], "rt", newline="") as recorded:
+        rows = list(csv.reader(recorded))
+    rows[line - 1][rows[0].index(column)] = value
+    path = tmp_path / "spoilt.csv"
+    with path.open("w", newline="") as out:
+        csv.writer(out).writerows(rows)
+    return path
+
+
+def test_all_seven_recorded_runs_replay_without_a_difference(tmp_path: Path) -> None:
+    out = tmp_path / "replay.json"
+    result = replay(*TRACES, "--json", out)
+    files = json.loads(out.read_text())["files"]
+    assert result.exit_code == 0
+    assert len(files) == 7
+    assert [file["rows"] for file in files] == [8192, 6144, 8192, 6144, 6144, 8192, 6144]
+    assert {value for file in files for value in file["largest_difference"].values()} == {0}
+
+
+def test_a_difference_is_measured_and_fails_the_command(tmp_path: Path) -> None:
+    path = spoilt(tmp_path, line=1002, column="thrust", value="123")
+    out = tmp_path / "replay.json"
+    result = replay(path, "--json", out)
+    (file,) = json.loads(out.read_text())["files"]
+    assert result.exit_code == 1
+    assert file["largest_difference"]["thrust"] > 0
+    assert file["largest_difference"]["ff_cmd"] == 0
+    assert file["first_different_row"] == 1000
+
+
+@pytest.mark.parametrize(("column", "value"), [("z", "1.5"), ("mode", "hover"), ("thrust", ""), ("ki", "99999999999")])
+def test_a_malformed_value_is_named_by_line_and_column(tmp_path: Path, column: str, value: str) -> None:
+    result = replay(spoilt(tmp_path, line=17, column=column, value=value))
+    assert result.exit_code == 1
+    assert f"line 17, {column}" in result.stderr
+
+
+def test_the_other_files_are_still_replayed_when_one_is_missing(tmp_path: Path) -> None:
+    result = replay(tmp_path / "absent.csv", TRACES[0])
+    assert result.exit_code == 1
+    assert "absent.csv" in result.stderr
+    assert "exact" in result.stdout

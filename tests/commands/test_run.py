@@ -1,0 +1,142 @@
+"""`gainline run` and `gainline reproduce`: the real commands on real simulations.
+
+Expected errors are bounds: of the project's reference measurement and of the paper's best flights (Tables 1 and 2).
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from app.cli import app
+
+RUN_ON_TWIN = ("run", "ardrone-takeoff", "--vehicle", "twin", "--set", "scatter=0")
+
+
+def gainline(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def flown(tmp_path: Path, *arguments: str) -> dict[str, Any]:
+    out = tmp_path / "campaign.json"
+    result = gainline(*arguments, "--json", out)
+    assert result.exit_code == 0, result.output
+    document: dict[str, Any] = json.loads(out.read_text())
+    return document
+
+
+def errors(campaign: dict[str, Any]) -> list[float]:
+    return [trial["error"] for trial in campaign["trials"]]
+
+
+def test_the_gradient_tunes_the_jsbsim_drone_by_the_fourth_flight(tmp_path: Path) -> None:
+    campaign = flown(tmp_path, "run", "ardrone-takeoff", "--vehicle", "jsbsim", "--strategy", "gradient")
+    assert campaign["trials"][0]["gains"] == {"kp": 283, "ki": 13, "kd": 82}
+    assert errors(campaign)[0] == pytest.approx(0.3267, rel=0.015)
+    assert min(errors(campaign)[:4]) <= 0.1000
+    assert len(campaign["trials"]) <= 7
+    assert "did not improve by more than 5%" in campaign["stopped_because"]
+
+
+def test_the_raw_gradient_beats_the_papers_best_simulated_flight_within_seven(tmp_path: Path) -> None:
+    campaign = flown(tmp_path, "run", "ardrone-takeoff", "--set", "scaled=false")
+    assert min(errors(campaign)[:7]) <= 0.1521
+
+
+def test_the_simplex_start_is_near_the_best_from_the_first_flight(tmp_path: Path) -> None:
+    assert min(errors(flown(tmp_path, "run", "ardrone-takeoff", "--start", "simplex"))) <= 0.0940
+
+
+@pytest.mark.parametrize(("start", "limit"), [("default", 0.1400), ("simplex", 0.1250)])
+def test_a_hover_throttle_the_model_gets_wrong_is_overcome_on_the_twin(
+    tmp_path: Path, start: str, limit: float
+) -> None:
+    campaign = flown(tmp_path, *RUN_ON_TWIN, "--start", start)
+    assert min(errors(campaign)[:7]) <= limit
+
+
+def test_the_same_seed_gives_the_same_campaign_and_another_seed_another(tmp_path: Path) -> None:
+    noisy = ("run", "ardrone-takeoff", "--vehicle", "twin", "--max-flights", "3")
+    first, again, other = (flown(tmp_path, *noisy, "--seed", seed) for seed in ("4", "4", "5"))
+    assert first == again
+    assert errors(first) != errors(other)
+
+
+def test_given_gains_start_the_campaign_and_the_budget_ends_it(tmp_path: Path) -> None:
+    campaign = flown(tmp_path, *RUN_ON_TWIN, "--start", "286,60,81", "--max-flights", "1")
+    assert campaign["trials"][0]["gains"] == {"kp": 286, "ki": 60, "kd": 81}
+    assert errors(campaign) == [pytest.approx(0.2341, rel=0.01)]
+    assert campaign["stopped_because"] == "All 1 flights of the budget are flown."
+
+
+def test_the_table_has_a_row_for_each_run(tmp_path: Path) -> None:
+    result = gainline(*RUN_ON_TWIN, "--max-flights", "2")
+    assert result.exit_code == 0
+    assert [line.split()[:5] for line in result.stdout.splitlines() if line.startswith(" run 1")] == [
+        ["run", "1", "0.5235", "0.3264", "283"]
+    ]
+
+
+def test_json_can_go_to_standard_output_alone() -> None:
+    result = gainline(*RUN_ON_TWIN, "--max-flights", "1", "--json", "-")
+    assert json.loads(result.stdout)["trials"][0]["number"] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--vehicle", "balloon"), "vehicle.kind"),
+        (("--vehicle", "import"), "vehicle.kind"),
+        (("--strategy", "prayer"), "definition.strategy"),
+        (("--set", "wind=3"), "--set wind"),
+        (("--set", "wind_m_s"), "--set wind_m_s"),
+        (("--set", "wind_m_s=-3"), "vehicle.options.wind_m_s"),
+        (("--set", "wind_m_s=.nan"), "vehicle.options.wind_m_s"),
+        (("--set", "scaled=maybe"), "definition.options.scaled"),
+        (("--start", "1,2"), "--start"),
+        (("--start", "-1,13,82"), "definition.start.gains.kp"),
+        (("--start", "283,13.5,82"), "definition.start.gains.ki"),
+        (("--start", "283,13,410"), "definition.start.gains.kd"),
+        (("--start", "nan,13,82"), "definition.start.gains.kp"),
+        (("--json", "/nowhere/out.json", "--max-flights", "1"), "--json"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_by_name(arguments: tuple[str, ...], named: str) -> None:
+    result = gainline("run", "ardrone-takeoff", *arguments)
+    assert result.exit_code == 1
+    assert f"  {named}: " in result.stderr
+
+
+def test_an_unknown_preset_names_those_there_are() -> None:
+    result = gainline("run", "ardrone-landing")
+    assert result.exit_code == 1
+    assert "ardrone-takeoff, ardrone-takeoff-twin, ardrone-takeoff-import" in result.stderr
+
+
+REFERENCE = {
+    "table1": ("jsbsim", 0.015, [0.3267, 0.1873, 0.1515, 0.1788, 0.1467, 0.0928, 0.0925, 0.0919, 0.0929]),
+    "table2": ("twin", 0.01, [0.5236, 0.2341, 0.2325, 0.2579, 0.2437, 0.1189, 0.1281, 0.1211]),
+}
+
+
+@pytest.mark.parametrize("table", REFERENCE)
+def test_a_table_of_the_paper_is_flown_again_within_the_reference(tmp_path: Path, table: str) -> None:
+    vehicle, tolerance, reference = REFERENCE[table]
+    out = tmp_path / "rows.json"
+    assert gainline("reproduce", table, "--json", out).exit_code == 0
+    rows = [row for row in json.loads(out.read_text())["rows"] if row["vehicle"] == vehicle]
+    assert [row["measured"] for row in rows] == pytest.approx(reference, rel=tolerance)
+    assert {row["table"] for row in rows} == {int(table[-1])}
+
+
+def test_table_1_keeps_the_papers_order_and_its_best(tmp_path: Path) -> None:
+    out = tmp_path / "rows.json"
+    assert gainline("reproduce", "table1", "--json", out).exit_code == 0
+    rows = [row for row in json.loads(out.read_text())["rows"] if row["vehicle"] == "jsbsim"]
+    by_error = sorted(rows, key=lambda row: float(row["measured"]))
+    assert [tuple(row["gains"].values()) for row in by_error[-5:]] == [
+        (324, 116, 75), (286, 102, 82), (499, 177, 42), (285, 44, 82), (283, 13, 82),
+    ]  # fmt: skip
+    assert by_error[0]["gains"] == {"kp": 1649, "ki": 1365, "kd": 175}
