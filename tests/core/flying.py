@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
+import pytest
+from numba import config
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.takeoff import Takeoff
@@ -12,6 +14,10 @@ from app.core.stopping import verdict
 from app.core.strategies.base import Proposal
 
 TAKEOFF = Takeoff()
+
+compiled_only = pytest.mark.skipif(
+    bool(vars(config)["DISABLE_JIT"]), reason="flies hundreds of takeoffs; the kernels have their own tests uncompiled"
+)
 ARDRONE = (0.6315, 0.0, 0.0, 0.02)
 """Close to the simulated AR.Drone: errors within 4 % of its own at every gain set of the paper's Table 1."""
 TWIN = (0.61, 0.3, 0.05, 0.0)

@@ -69,6 +69,14 @@ def test_flights_that_cannot_be_scored_are_refused_with_field_and_reason(change,
         require_scorable(flight(*change(*good())), "altitude_m", 0.0, 10.0)
 
 
+def test_gaps_that_a_person_accepts_are_bridged_but_the_window_must_still_be_covered() -> None:
+    time_s, altitude_m = good()
+    holed = flight(np.delete(time_s, [40, 41]), np.delete(altitude_m, [40, 41]))
+    require_scorable(holed, "altitude_m", 0.0, 10.0, accept_gaps=True)
+    with pytest.raises(TrajectoryError, match="must cover"):
+        require_scorable(holed, "altitude_m", 0.0, 11.0, accept_gaps=True)
+
+
 def test_a_flight_without_the_scored_channel_is_refused() -> None:
     with pytest.raises(TrajectoryError, match=r"altitude_m: is not among the recorded channels \(thrust\)"):
         require_scorable(Trajectory(good()[0], {"thrust": good()[1]}, "csv", "vehicle"), "altitude_m", 0.0, 10.0)

@@ -1,0 +1,31 @@
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.core.definition import Definition, flight_seed
+
+
+def test_the_digest_changes_with_every_field_and_only_then() -> None:
+    one = Definition()
+    others = [
+        replace(one, strategy="manual"),
+        replace(one, seed=2),
+        replace(one, bounds={"kp": (1, 2)}),
+        replace(one, options={"scaled": False}),
+        replace(one, step_fraction=0.5),
+    ]
+    assert len({one.digest(), *(other.digest() for other in others)}) == 6
+    assert one.digest() == Definition().digest()
+    assert len(one.digest()) == 64
+
+
+@given(st.integers(0, 2**64), st.integers(1, 200))
+def test_flight_seeds_repeat_and_are_32_bit(seed: int, number: int) -> None:
+    assert flight_seed(seed, number) == flight_seed(seed, number)
+    assert 0 <= flight_seed(seed, number) < 2**32
+
+
+def test_flight_seeds_differ_between_flights_and_campaigns() -> None:
+    seeds = {flight_seed(seed, number) for seed in range(20) for number in range(1, 21)}
+    assert len(seeds) == 400

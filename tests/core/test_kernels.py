@@ -1,0 +1,53 @@
+"""Where machine code is kept: a folder for each state of the sources, and none where nothing can be written."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.core import kernels
+
+ROLLOUT = """
+import numpy as np
+from app.core.experiments.takeoff import Takeoff
+run = Takeoff().simulate(np.array([1600.0, 1023.0, 127.0]), np.array([0.61, 0.3, 0.05, 0.02]))
+print(run["altitude_m"].tobytes().hex()[-4000:])
+"""
+
+
+def output(**environment: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", ROLLOUT], capture_output=True, text=True, check=True, env=os.environ | environment
+    )
+    return done.stdout
+
+
+def test_compiled_and_interpreted_rollouts_are_equal_bit_for_bit() -> None:
+    assert output(NUMBA_DISABLE_JIT="0") == output(NUMBA_DISABLE_JIT="1")
+
+
+def test_a_cache_folder_of_the_operators_choice_is_used(tmp_path: Path) -> None:
+    output(NUMBA_DISABLE_JIT="0", NUMBA_CACHE_DIR=str(tmp_path))
+    (folder,) = tmp_path.iterdir()
+    assert folder.name.startswith("kernels-")
+    assert list(folder.rglob("*.nbi"))
+
+
+def test_where_nothing_can_be_kept_kernels_are_compiled_for_each_process(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    assert not kernels._use_cache(blocked / "kernels")
+
+
+def test_each_state_of_the_sources_has_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "control").mkdir()
+    (tmp_path / "plants").mkdir()
+    source = tmp_path / "control" / "loop.py"
+    monkeypatch.setattr(kernels, "_HERE", tmp_path)
+    names = []
+    for text in ("one", "two", "one"):
+        source.write_text(text)
+        names.append(kernels._cache_folder().name)
+    assert names[0] == names[2] != names[1]
