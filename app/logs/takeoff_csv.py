@@ -1,9 +1,9 @@
 """Reader of takeoffs flown elsewhere: CSV with the columns time_s, altitude_m and optionally more.
 
 UTF-8 (a byte order mark is fine), commas between values, decimal points, lines ending in LF or CRLF; one header line,
-then one line a sample. `time_s` counts from the command and rises strictly; altitude is positive up. Of further columns,
-the channels that the program knows are kept; others are left in the file. Gaps are read as they are: whoever scores the
-flight judges them.
+then one line a sample. `time_s` counts from the command and rises strictly; altitude is positive up. Of further
+columns, the channels that the program knows are kept; others are left in the file. Gaps are read as they are: whoever
+scores the flight judges them.
 """
 
 import csv

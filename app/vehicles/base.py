@@ -76,6 +76,10 @@ class Vehicle(Protocol):
         """Write every gain and return what was read back."""
         ...
 
+    def read_gains(self) -> dict[str, float]:
+        """What the vehicle holds now."""
+        ...
+
     def fly(
         self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: Callable[[], str | None]
     ) -> FlightRecord:

@@ -69,6 +69,10 @@ class SimulatedVehicle:
         hold; nothing is changed then."""
         self._held = _counts(gains)
         self._staged = True
+        return self.read_gains()
+
+    def read_gains(self) -> dict[str, float]:
+        """What the vehicle holds now."""
         return dict(self._held)
 
     def fly(

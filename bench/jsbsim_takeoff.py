@@ -1,0 +1,59 @@
+"""How long one takeoff of the simulated AR.Drone takes, against JSBSim alone, both in one run.
+
+    ./dev exec python -m bench.jsbsim_takeoff
+
+JSBSim alone means the bare stepping loop of the same aircraft over the same time, with no other work in Python; the
+takeoff is a whole flight as the program flies it, the loading of the aircraft and the settling on the ground included.
+Times them in turns and prints the best of each and their ratio; exits 1 when the ratio is above 3.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Final
+
+from app.core.experiments import get_experiment
+from app.vehicles.base import FlightOrder, Vehicle
+from app.vehicles.jsbsim.flight import new_aircraft
+from app.vehicles.open import open_vehicle
+from app.vehicles.simulated import STEPS
+
+ROUNDS: Final = 15
+LIMIT: Final = 3.0
+GAINS: Final = {"kp": 1600, "ki": 1023, "kd": 127}
+
+
+def bare() -> float:
+    run = new_aircraft().run
+    start = time.perf_counter()
+    for _ in range(STEPS):
+        run()
+    return time.perf_counter() - start
+
+
+def takeoff(vehicle: Vehicle) -> float:
+    vehicle.stage(GAINS)
+    start = time.perf_counter()
+    vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_abort=lambda: None)
+    return time.perf_counter() - start
+
+
+def best(*runs: Callable[[], float]) -> list[float]:
+    """The shortest time of each, s, taken in turns so that a busy machine disturbs all alike."""
+    rounds = [[run() for run in runs] for _ in range(ROUNDS)]
+    return [min(times) for times in zip(*rounds, strict=True)]
+
+
+def main() -> int:
+    space = get_experiment("takeoff").space
+    with open_vehicle("jsbsim", {}, safe_gains=space.mapping(space.default)) as vehicle:
+        takeoff(vehicle)  # compiles
+        alone_s, flight_s = best(bare, lambda: takeoff(vehicle))
+    ratio = flight_s / alone_s
+    print(f"JSBSim alone, {STEPS} steps: {alone_s * 1e3:.1f} ms")
+    print(f"One takeoff of {STEPS / 512:.1f} s:   {flight_s * 1e3:.1f} ms, {ratio:.2f} × that (limit {LIMIT:g})")
+    return 0 if ratio <= LIMIT else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,21 @@
+from pathlib import Path
+
+import pytest
+
+from app.core.trajectory import CHANNEL_UNITS
+from app.vehicles.open import VEHICLE_KINDS
+
+PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def test_every_vehicle_and_option_is_described_with_its_default(kind: str) -> None:
+    assert f"## `{kind}`" in PAGE
+    for option in VEHICLE_KINDS[kind].options:
+        start, limits = f"| `{option.name}` | {option.default:g}", f"| {option.lower:g} … {option.upper:g} |"
+        assert any(line.startswith(start) and limits in line for line in PAGE.splitlines()), option.name
+
+
+def test_every_column_of_an_uploaded_flight_is_described() -> None:
+    for name in ("time_s", *CHANNEL_UNITS):
+        assert f"`{name}`" in PAGE

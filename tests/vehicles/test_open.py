@@ -1,0 +1,98 @@
+from collections.abc import Mapping
+
+import pytest
+
+import app.vehicles.open as opening
+from app.core.errors import InputError
+from app.core.policy import Gains
+from app.vehicles.base import Vehicle
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.open import VEHICLE_KINDS, check_options, get_kind, open_vehicle
+from app.vehicles.simulated import SimulatedVehicle, Simulation
+from tests.vehicles.flying import SAFE, TUNED
+
+
+class StubbornVehicle(SimulatedVehicle):
+    """A vehicle that takes experimental gains and then keeps them."""
+
+    closed = False
+
+    def read_gains(self) -> dict[str, float]:
+        return dict(TUNED)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def opened_stubborn(_options: Options, safe_gains: Gains) -> Vehicle:
+    def launch(_order: object) -> Simulation:
+        raise VehicleError("It does not fly.", hint="It is a test.")
+
+    return StubbornVehicle("stubborn", safe_gains, {}, launch)
+
+
+STUBBORN = VehicleKind(
+    name="stubborn", title="Stubborn", line="", is_real=False, can_fly=True, options=(), open=opened_stubborn
+)
+
+
+def test_a_vehicle_that_keeps_experimental_gains_is_reported_loudly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opening, "VEHICLE_KINDS", {**VEHICLE_KINDS, "stubborn": STUBBORN})
+    held: list[Vehicle] = []
+    with (
+        pytest.raises(SafeGainsError, match="instead of its safe gains"),
+        open_vehicle("stubborn", {}, safe_gains=SAFE) as vehicle,
+    ):
+        held.append(vehicle)
+    assert isinstance(held[0], StubbornVehicle)
+    assert held[0].closed
+
+
+def test_a_flight_made_elsewhere_cannot_be_flown_here() -> None:
+    with pytest.raises(VehicleError) as refusal, open_vehicle("import", {}, safe_gains=SAFE):
+        pass
+    assert "flies elsewhere" in refusal.value.message
+    assert "time_s and altitude_m" in refusal.value.hint
+    assert not VEHICLE_KINDS["import"].can_fly
+
+
+def test_an_unknown_kind_names_the_field_and_the_choices() -> None:
+    with pytest.raises(InputError) as refusal:
+        get_kind("balloon")
+    assert refusal.value.problems[0].field == "vehicle.kind"
+    assert "jsbsim, twin, import" in refusal.value.hint
+
+
+def test_options_are_completed_with_their_defaults() -> None:
+    options = check_options("twin", {"scatter": 0})
+    assert options == {"scatter": 0.0, "hover_throttle": 0.61, "motor_lag_s": 0.05, "start_latency_s": 0.3,
+                       "drag_1_s": 0.0}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"scatter": -0.1}, "must lie in 0 … 5 ×, got -0.1"),
+        ({"scatter": float("nan")}, "must be a finite number"),
+        ({"scatter": "much"}, "must be a number, got 'much'"),
+        ({"scatter": True}, "must be a number, got True"),
+        ({"scatter": None}, "must be a number, got None"),
+    ],
+)
+def test_an_impossible_option_is_refused_with_its_reason(options: Mapping[str, object], reason: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        check_options("twin", options, field="campaign.vehicle")
+    assert [(p.field, p.reason) for p in refusal.value.problems] == [("campaign.vehicle.options.scatter", reason)]
+
+
+def test_every_wrong_option_is_named_at_once() -> None:
+    with pytest.raises(InputError) as refusal:
+        check_options("jsbsim", {"mass_kg": 9, "colour": "red", "wind_m_s": -1})
+    assert {problem.field.rpartition(".")[2] for problem in refusal.value.problems} == {"mass_kg", "colour", "wind_m_s"}
+
+
+@pytest.mark.parametrize("kind", VEHICLE_KINDS)
+def test_every_default_option_is_within_its_own_range(kind: str) -> None:
+    options = VEHICLE_KINDS[kind].options
+    assert check_options(kind, {option.name: option.default for option in options}) == check_options(kind, {})
