@@ -1,17 +1,33 @@
 import "@mantine/core/styles.css";
-import { Container, MantineProvider, Title } from "@mantine/core";
+import "./theme/tokens.css";
+import { MantineProvider } from "@mantine/core";
+import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
+import { BrowserRouter } from "react-router";
+import { App } from "./app";
+import { retries } from "./lib/problems";
+import { theme } from "./theme/theme";
 
 const root = document.getElementById("root");
 if (root === null) throw new Error("index.html has no #root");
 
+// The event stream says when an answer has become doubtful, so nothing is asked for twice without need.
+const queries = new QueryClient({
+  defaultOptions: {
+    queries: { staleTime: Infinity, retry: retries, networkMode: "always" },
+    mutations: { networkMode: "always" },
+  },
+});
+
 createRoot(root).render(
   <StrictMode>
-    <MantineProvider defaultColorScheme="auto">
-      <Container component="main" py="xl">
-        <Title order={1}>Gainline</Title>
-      </Container>
+    <MantineProvider theme={theme} defaultColorScheme="auto">
+      <QueryClientProvider client={queries}>
+        <BrowserRouter>
+          <App />
+        </BrowserRouter>
+      </QueryClientProvider>
     </MantineProvider>
   </StrictMode>,
 );

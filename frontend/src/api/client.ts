@@ -1,0 +1,32 @@
+/** The generated client, set up once: same origin, a key for every POST, problem documents as errors. */
+
+import { randomKey } from "../lib/ids";
+import { ApiError, problemFrom } from "../lib/problems";
+import { client } from "./generated/client.gen";
+
+client.setConfig({ baseUrl: "" });
+
+client.interceptors.request.use((request) => {
+  if (request.method === "POST") request.headers.set("Idempotency-Key", randomKey());
+  return request;
+});
+
+interface Outcome<Data> {
+  data?: Data | undefined;
+  error?: unknown;
+  response?: Response | undefined;
+}
+
+/** The answer of a generated call; throws ApiError for a refusal and for a server that cannot be reached. */
+export async function answer<Data>(call: Promise<Outcome<Data>>): Promise<Data> {
+  let outcome: Outcome<Data>;
+  try {
+    outcome = await call;
+  } catch {
+    throw new ApiError(problemFrom(undefined, undefined));
+  }
+  const { data, error, response } = outcome;
+  if (response === undefined) throw new ApiError(problemFrom(undefined, undefined));
+  if (!response.ok) throw new ApiError(problemFrom(response.status, error));
+  return data as Data;
+}

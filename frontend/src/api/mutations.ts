@@ -1,0 +1,156 @@
+/** Everything that pages do. The event stream makes the answers doubtful; what comes back is put in at once. */
+
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { answer } from "./client";
+import {
+  archiveCampaign,
+  type Campaign,
+  cancelTrial,
+  classifyTrial,
+  cloneCampaign,
+  computeProposal,
+  createCampaign,
+  createTrial,
+  editCampaign,
+  finishCampaign,
+  flyTrial,
+  type NewCampaignInput,
+  type NewTrial,
+  type Trial,
+  uploadTrajectory,
+} from "./generated";
+
+function useSettled() {
+  const queries = useQueryClient();
+  return {
+    campaign: (campaign: Campaign): void => {
+      queries.setQueryData(["campaign", campaign.id], campaign);
+      void queries.invalidateQueries({ queryKey: ["campaigns"] });
+    },
+    ofCampaign: (campaignId: number): Promise<void> =>
+      queries.invalidateQueries({ queryKey: ["campaign", campaignId] }),
+    trial: (trial: Trial): Promise<unknown> => {
+      queries.setQueryData(["trial", trial.id], trial);
+      return Promise.all([
+        queries.invalidateQueries({ queryKey: ["campaign", trial.campaign_id] }),
+        queries.invalidateQueries({ queryKey: ["flying"] }),
+      ]);
+    },
+  };
+}
+
+export function useCreateCampaign() {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: (body: NewCampaignInput) => answer(createCampaign({ body })),
+    onSuccess: settled.campaign,
+  });
+}
+
+/** Plan a trial of a proposal or of gains of one's own, and fly it if the body says so. */
+export function useCreateTrial(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: (body: NewTrial) => answer(createTrial({ path: { campaign_id: campaignId }, body })),
+    onSuccess: settled.trial,
+    onError: () => settled.ofCampaign(campaignId),
+  });
+}
+
+export function useFlyTrial(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: ({ trialId, speed }: { trialId: number; speed: number | null }) =>
+      answer(flyTrial({ path: { trial_id: trialId }, body: { speed } })),
+    onSuccess: settled.trial,
+    onError: () => settled.ofCampaign(campaignId),
+  });
+}
+
+export function useCancelTrial() {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: (trialId: number) => answer(cancelTrial({ path: { trial_id: trialId } })),
+    onSuccess: settled.trial,
+  });
+}
+
+export interface Classing {
+  trial: Trial;
+  outcome: "valid" | "aborted" | "invalid";
+  reason: string;
+}
+
+export function useClassify() {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: ({ trial, outcome, reason }: Classing) =>
+      answer(classifyTrial({ path: { trial_id: trial.id }, body: { version: trial.version, outcome, reason } })),
+    onSuccess: settled.trial,
+    onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),
+  });
+}
+
+/** Hand in the record of a flight made elsewhere; the proposal becomes a trial first when none is planned. */
+export function useUploadRecord(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: async ({ file, trialId, proposalId }: { file: File; trialId?: number; proposalId?: number }) => {
+      const planned =
+        trialId ??
+        (await answer(createTrial({ path: { campaign_id: campaignId }, body: { proposal_id: proposalId ?? null } })))
+          .id;
+      return answer(uploadTrajectory({ path: { trial_id: planned }, body: file }));
+    },
+    onSuccess: settled.trial,
+    onError: () => settled.ofCampaign(campaignId),
+  });
+}
+
+export function useRecompute(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: () => answer(computeProposal({ path: { campaign_id: campaignId } })),
+    onSuccess: () => settled.ofCampaign(campaignId),
+  });
+}
+
+export function useFinish(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: () => answer(finishCampaign({ path: { campaign_id: campaignId }, body: {} })),
+    onSuccess: settled.campaign,
+  });
+}
+
+export function useArchive(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: () => answer(archiveCampaign({ path: { campaign_id: campaignId } })),
+    onSuccess: settled.campaign,
+  });
+}
+
+export function useClone(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: (vehicleKind?: string) =>
+      answer(
+        cloneCampaign({
+          path: { campaign_id: campaignId },
+          body: vehicleKind === undefined ? {} : { vehicle: { kind: vehicleKind } },
+        }),
+      ),
+    onSuccess: settled.campaign,
+  });
+}
+
+export function useRename(campaign: Campaign) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: (name: string) =>
+      answer(editCampaign({ path: { campaign_id: campaign.id }, body: { version: campaign.version, name } })),
+    onSuccess: settled.campaign,
+    onError: () => settled.ofCampaign(campaign.id),
+  });
+}

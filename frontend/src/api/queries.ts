@@ -1,0 +1,86 @@
+/** Everything that pages read. Keys are what `lib/events.ts` makes doubtful. */
+
+import { keepPreviousData, useInfiniteQuery, useQuery } from "@tanstack/react-query";
+import { answer } from "./client";
+import {
+  type CampaignState,
+  getCampaign,
+  getCampaignFigure,
+  getCatalogue,
+  getFlightFigure,
+  getProposal,
+  getTrial,
+  listCampaigns,
+  listTrials,
+  type Sort,
+} from "./generated";
+
+export type Theme = "light" | "dark";
+export type FigureName = "takeoffs" | "errors" | "gains";
+
+export interface CampaignFilter {
+  search: string;
+  state: CampaignState[];
+  vehicle: string[];
+  sort: Sort;
+}
+
+export function useCatalogue() {
+  return useQuery({ queryKey: ["catalogue"], queryFn: () => answer(getCatalogue()), staleTime: Infinity });
+}
+
+const PAGE_SIZE = 24;
+
+export function useCampaigns(filter: CampaignFilter) {
+  return useInfiniteQuery({
+    queryKey: ["campaigns", filter],
+    queryFn: ({ pageParam }) =>
+      answer(listCampaigns({ query: { ...filter, limit: PAGE_SIZE, ...(pageParam ? { cursor: pageParam } : {}) } })),
+    initialPageParam: "",
+    getNextPageParam: (page) => page.next_cursor,
+    placeholderData: keepPreviousData,
+  });
+}
+
+export function useCampaign(campaignId: number) {
+  return useQuery({
+    queryKey: ["campaign", campaignId],
+    queryFn: () => answer(getCampaign({ path: { campaign_id: campaignId } })),
+  });
+}
+
+export function useProposal(campaignId: number) {
+  return useQuery({
+    queryKey: ["campaign", campaignId, "proposal"],
+    queryFn: () => answer(getProposal({ path: { campaign_id: campaignId } })),
+  });
+}
+
+export function useTrials(campaignId: number) {
+  return useQuery({
+    queryKey: ["campaign", campaignId, "trials"],
+    queryFn: () => answer(listTrials({ path: { campaign_id: campaignId } })),
+  });
+}
+
+export function useTrial(trialId: number) {
+  return useQuery({ queryKey: ["trial", trialId], queryFn: () => answer(getTrial({ path: { trial_id: trialId } })) });
+}
+
+export function useCampaignFigure(campaignId: number, name: FigureName, theme: Theme) {
+  return useQuery({
+    queryKey: ["campaign", campaignId, "figure", name, theme],
+    queryFn: () => answer(getCampaignFigure({ path: { campaign_id: campaignId, name }, query: { theme } })),
+    placeholderData: keepPreviousData,
+  });
+}
+
+export function useFlightFigure(trialId: number, theme: Theme) {
+  return useQuery({
+    queryKey: ["trial", trialId, "figure", theme],
+    queryFn: () => answer(getFlightFigure({ path: { trial_id: trialId }, query: { theme } })),
+    placeholderData: keepPreviousData,
+  });
+}
+
+export const recordCsv = (trialId: number): string => `/api/trials/${trialId}/trajectory.csv`;

@@ -1,0 +1,21 @@
+import { Route, Routes } from "react-router";
+import { AppFrame } from "./components/AppFrame";
+import { CampaignPage } from "./pages/CampaignPage";
+import { CampaignsPage } from "./pages/CampaignsPage";
+import { FlightPage } from "./pages/FlightPage";
+import { NewCampaignPage } from "./pages/NewCampaignPage";
+import { NotFoundPage } from "./pages/NotFoundPage";
+
+export function App() {
+  return (
+    <Routes>
+      <Route element={<AppFrame />}>
+        <Route index element={<CampaignsPage />} />
+        <Route path="new" element={<NewCampaignPage />} />
+        <Route path="campaigns/:campaignId" element={<CampaignPage />} />
+        <Route path="campaigns/:campaignId/flights/:trialId" element={<FlightPage />} />
+        <Route path="*" element={<NotFoundPage />} />
+      </Route>
+    </Routes>
+  );
+}

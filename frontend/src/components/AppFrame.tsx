@@ -1,0 +1,92 @@
+import { useQueryClient } from "@tanstack/react-query";
+import { useEffect, useRef } from "react";
+import { Link, Outlet, useMatch } from "react-router";
+import { followEvents } from "../api/events";
+import { useAbort, useFlying } from "../api/flying";
+import { useCampaign } from "../api/queries";
+import { abortTargets, isWriting } from "../lib/abort";
+import { ConnectionNotice, ConnectionState } from "./ConnectionState";
+import { FlyingBar } from "./FlyingBar";
+import classes from "./Frame.module.css";
+import { ThemeSwitch } from "./ThemeSwitch";
+import { VehicleBadge } from "./VehicleBadge";
+
+/** Space ends the flight, whatever has the focus, unless somebody is writing. */
+function useSpaceAborts(targets: readonly number[], press: (trialIds: readonly number[]) => void): void {
+  const latest = useRef({ targets, press });
+  latest.current = { targets, press };
+  useEffect(() => {
+    function onKey(event: KeyboardEvent): void {
+      if (event.code !== "Space" || isWriting(event.target) || latest.current.targets.length === 0) return;
+      event.preventDefault();
+      event.stopPropagation();
+      if (!event.repeat && event.type === "keydown") latest.current.press(latest.current.targets);
+    }
+    // A button acts on the release of Space, so that must not get through either.
+    document.addEventListener("keydown", onKey, { capture: true });
+    document.addEventListener("keyup", onKey, { capture: true });
+    return () => {
+      document.removeEventListener("keydown", onKey, { capture: true });
+      document.removeEventListener("keyup", onKey, { capture: true });
+    };
+  }, []);
+}
+
+function useEventStream(flying: boolean): void {
+  const queries = useQueryClient();
+  const flies = useRef(flying);
+  flies.current = flying;
+  useEffect(() => followEvents(queries, () => flies.current), [queries]);
+}
+
+function CampaignVehicle({ campaignId }: { campaignId: number }) {
+  const vehicle = useCampaign(campaignId).data?.vehicle;
+  return vehicle === undefined ? null : <VehicleBadge isReal={vehicle.is_real} title={vehicle.title} />;
+}
+
+export function AppFrame() {
+  const onPage = useMatch("/campaigns/:campaignId/*");
+  const campaignId = onPage ? Number(onPage.params.campaignId) : null;
+  const flying = useFlying();
+  const abort = useAbort(flying);
+  useEventStream(flying.length > 0);
+  useSpaceAborts(
+    abortTargets(flying, campaignId).map(({ trialId }) => trialId),
+    abort.press,
+  );
+  return (
+    <>
+      <a href="#main" className={classes["skip"]}>
+        Skip to the content
+      </a>
+      <header className={classes["header"]}>
+        <div className={classes["bar"]} data-flying={flying.length > 0 || undefined}>
+          <Link to="/" className={classes["home"]} aria-label="Gainline, all campaigns">
+            <img src="/icon.svg" alt="" width={32} height={32} />
+            <span className={classes["homeName"]}>Gainline</span>
+          </Link>
+          <div className={classes["vehicle"]}>
+            {campaignId !== null && Number.isInteger(campaignId) && <CampaignVehicle campaignId={campaignId} />}
+          </div>
+          <div className={classes["spacer"]} />
+          <div className={classes["flights"]}>
+            {flying.map((one) => (
+              <FlyingBar key={one.trialId} flying={one} abort={abort} />
+            ))}
+          </div>
+          <ConnectionState />
+          <ThemeSwitch />
+        </div>
+        {abort.trouble !== null && (
+          <p className={classes["trouble"]} role="alert">
+            <strong>The abort has not reached the worker yet; it is sent again.</strong> {abort.trouble}
+          </p>
+        )}
+        <ConnectionNotice />
+      </header>
+      <main id="main" className={classes["main"]} tabIndex={-1}>
+        <Outlet />
+      </main>
+    </>
+  );
+}

@@ -1,0 +1,37 @@
+import { Link } from "react-router";
+import type { CampaignSummary } from "../api/types";
+import { progress } from "../lib/campaigns";
+import { count, withUnit } from "../lib/format";
+import { campaignWords } from "../lib/states";
+import classes from "./CampaignCard.module.css";
+import { Sparkline } from "./Sparkline";
+import { StateBadge } from "./StateBadge";
+import { VehicleBadge } from "./VehicleBadge";
+
+/** A campaign at a glance: what it reached, how its curves look, what to do next. */
+export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
+  const { id, name, state, outcome, vehicle, best, flights, next_action, spark } = campaign;
+  return (
+    <li className={classes["card"]}>
+      <div className={classes["top"]}>
+        <VehicleBadge isReal={vehicle.is_real} title={vehicle.title} />
+        <StateBadge words={campaignWords(state, outcome)} />
+      </div>
+      <h2 className={classes["name"]}>
+        <Link to={`/campaigns/${id}`}>{name}</Link>
+      </h2>
+      <Sparkline curves={spark} />
+      <dl className={`${classes["figures"]} numbers`}>
+        <div>
+          <dt>Best error</dt>
+          <dd>{withUnit(best?.error, "m")}</dd>
+        </div>
+        <div>
+          <dt>{count(flights, "flight")}</dt>
+          <dd className={classes["progress"]}>{progress(campaign) ?? " "}</dd>
+        </div>
+      </dl>
+      <p className={classes["next"]}>{next_action}</p>
+    </li>
+  );
+}

@@ -1,0 +1,78 @@
+import { ActionIcon, Anchor, Button, TextInput } from "@mantine/core";
+import { IconPencil } from "@tabler/icons-react";
+import { useState } from "react";
+import { Link } from "react-router";
+import { useRename } from "../api/mutations";
+import type { Campaign } from "../api/types";
+import { count } from "../lib/format";
+import { problemOf } from "../lib/problems";
+import { settingsOf } from "../lib/settings";
+import { campaignWords } from "../lib/states";
+import classes from "./CampaignHeader.module.css";
+import { StateBadge } from "./StateBadge";
+
+/** Name, state, and the settings that proposals depend on. */
+export function CampaignHeader({ campaign }: { campaign: Campaign }) {
+  const [renaming, setRenaming] = useState(false);
+  return (
+    <header className={classes["header"]}>
+      <Anchor component={Link} to="/" className={classes["back"]}>
+        All campaigns
+      </Anchor>
+      {renaming ? (
+        <Rename campaign={campaign} onClose={() => setRenaming(false)} />
+      ) : (
+        <div className={classes["line"]}>
+          <h1 className={classes["name"]}>{campaign.name}</h1>
+          <ActionIcon color="gray" aria-label="Rename the campaign" title="Rename" onClick={() => setRenaming(true)}>
+            <IconPencil size={18} color="var(--dim)" />
+          </ActionIcon>
+        </div>
+      )}
+      <div className={classes["facts"]}>
+        <StateBadge words={campaignWords(campaign.state, campaign.outcome)} />
+        <span>{count(campaign.trials.flown, "flight")}</span>
+        <details className={classes["settings"]}>
+          <summary>Settings</summary>
+          <dl>
+            {settingsOf(campaign).map(([title, value]) => (
+              <div key={title}>
+                <dt>{title}</dt>
+                <dd>{value}</dd>
+              </div>
+            ))}
+          </dl>
+        </details>
+      </div>
+    </header>
+  );
+}
+
+function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void }) {
+  const [name, setName] = useState(campaign.name);
+  const rename = useRename(campaign);
+  return (
+    <form
+      className={classes["rename"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        rename.mutate(name, { onSuccess: onClose });
+      }}
+    >
+      <TextInput
+        aria-label="Name of the campaign"
+        value={name}
+        maxLength={120}
+        data-autofocus
+        error={problemOf(rename.error)?.detail ?? problemOf(rename.error)?.title}
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <Button type="submit" loading={rename.isPending} disabled={name.trim() === ""}>
+        Rename
+      </Button>
+      <Button variant="default" onClick={onClose}>
+        Cancel
+      </Button>
+    </form>
+  );
+}

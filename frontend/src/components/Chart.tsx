@@ -1,0 +1,89 @@
+import { useEffect, useRef, useState } from "react";
+import { clickedTrial, type PlotlyFigure, traceWithRole, withLive } from "../lib/traces";
+import { liveNow } from "../live/store";
+import classes from "./Chart.module.css";
+import { CONFIG, drawLive, loadPlotly } from "./plotly";
+
+interface PlotlyElement extends HTMLDivElement {
+  on?(event: "plotly_click", listener: (event: { points: { curveNumber: number }[] }) => void): void;
+  removeAllListeners?(event: string): void;
+}
+
+interface Props {
+  figure: PlotlyFigure;
+  /** What the chart shows, for those who cannot see it; the data table says the rest. */
+  label: string;
+  height: number;
+  liveTrial?: number | null;
+  onChoose?: (trial: number) => void;
+}
+
+const coarse = window.matchMedia("(pointer: coarse)");
+
+/** Brushing zooms with a mouse; a finger has to be able to scroll the page. */
+function layoutFor(layout: Record<string, unknown>): Record<string, unknown> {
+  return { ...layout, autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
+}
+
+export function Chart({ figure, label, height, liveTrial = null, onChoose }: Props) {
+  const element = useRef<PlotlyElement>(null);
+  const [drawn, setDrawn] = useState(false);
+  const [broken, setBroken] = useState<string | null>(null);
+  const queue = useRef<Promise<unknown>>(Promise.resolve());
+
+  useEffect(() => {
+    const target = element.current;
+    if (target === null) return;
+    let wanted = true;
+    queue.current = queue.current.then(async () => {
+      try {
+        const plotly = await loadPlotly();
+        if (!wanted) return;
+        await plotly.react(target, withLive(figure.data, liveNow(liveTrial)), layoutFor(figure.layout), CONFIG);
+        target.removeAllListeners?.("plotly_click");
+        target.on?.("plotly_click", ({ points }) => {
+          const trial = clickedTrial(figure.data, points[0]?.curveNumber ?? -1);
+          if (trial !== null) onChoose?.(trial);
+        });
+        setDrawn(true);
+        setBroken(null);
+      } catch (error) {
+        setBroken(error instanceof Error ? error.message : String(error));
+      }
+    });
+    return () => {
+      wanted = false;
+    };
+  }, [figure, liveTrial, onChoose]);
+
+  useEffect(() => {
+    const target = element.current;
+    const trace = traceWithRole(figure.data, "live");
+    if (target === null || !drawn || liveTrial === null || trace < 0) return;
+    return drawLive(target, trace, liveTrial);
+  }, [drawn, liveTrial, figure]);
+
+  useEffect(() => {
+    const target = element.current;
+    if (target === null || !drawn) return;
+    const observer = new ResizeObserver(() => void loadPlotly().then((plotly) => plotly.Plots.resize(target)));
+    observer.observe(target);
+    return () => observer.disconnect();
+  }, [drawn]);
+
+  useEffect(() => {
+    const target = element.current;
+    return () => void loadPlotly().then((plotly) => target && plotly.purge(target));
+  }, []);
+
+  return (
+    // biome-ignore lint/a11y/useSemanticElements: a fieldset is for forms; this groups a drawing's parts under one name
+    <div role="group" aria-label={label} className={classes["frame"]} style={{ height }}>
+      {broken !== null && (
+        <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table still works.</p>
+      )}
+      {!drawn && broken === null && <div className={classes["waiting"]} aria-hidden />}
+      <div ref={element} className={classes["plot"]} data-drawn={drawn || undefined} />
+    </div>
+  );
+}

@@ -1,0 +1,72 @@
+import { ActionIcon } from "@mantine/core";
+import { IconChartLine, IconTable } from "@tabler/icons-react";
+import { type ReactNode, useMemo, useState } from "react";
+import type { FigureCard } from "../api/types";
+import type { PlotlyFigure } from "../lib/traces";
+import { Chart } from "./Chart";
+import { DataTable } from "./DataTable";
+import { Panel } from "./Panel";
+import classes from "./Panel.module.css";
+import { Trouble } from "./Trouble";
+
+interface Props {
+  title: string;
+  card: FigureCard | undefined;
+  error: unknown;
+  height: number;
+  /** What the page adds to the figure as it came. */
+  dressed?: (figure: PlotlyFigure) => PlotlyFigure;
+  liveTrial?: number | null;
+  onChoose?: (trial: number) => void;
+  tools?: ReactNode;
+  className?: string | undefined;
+}
+
+/** One figure with its table one tap away; says so when there is nothing to draw yet or drawing failed. */
+export function FigurePanel({ title, card, error, height, dressed, liveTrial, onChoose, tools, className }: Props) {
+  const [asTable, setAsTable] = useState(false);
+  const raw = card?.figure;
+  const figure = useMemo(() => {
+    if (!raw) return null;
+    const drawn = raw as unknown as PlotlyFigure;
+    return dressed === undefined ? drawn : dressed(drawn);
+  }, [raw, dressed]);
+  const Icon = asTable ? IconChartLine : IconTable;
+  const other = asTable ? `${title}: show the chart` : `${title}: show the numbers as a table`;
+  return (
+    <Panel
+      title={title}
+      className={className}
+      tools={
+        <>
+          {!asTable && tools}
+          {card?.table && (
+            <ActionIcon color="gray" aria-label={other} title={other} onClick={() => setAsTable(!asTable)}>
+              <Icon size={20} color="var(--dim)" />
+            </ActionIcon>
+          )}
+        </>
+      }
+    >
+      {card === undefined && error !== null && <Trouble error={error} />}
+      {card !== undefined && card.state !== "ready" && (
+        <div className={classes["waiting"]} style={{ height }}>
+          {card.reason}
+        </div>
+      )}
+      {card === undefined && error === null && <div style={{ height }} aria-busy="true" />}
+      {figure !== null && asTable && card?.table && (
+        <DataTable table={card.table} label={`${title}, numbers`} height={height} />
+      )}
+      {figure !== null && !asTable && (
+        <Chart
+          figure={figure}
+          label={`${title}. ${card?.summary ?? ""}`}
+          height={height}
+          liveTrial={liveTrial ?? null}
+          {...(onChoose === undefined ? {} : { onChoose })}
+        />
+      )}
+    </Panel>
+  );
+}

@@ -1,0 +1,87 @@
+import { Button, Menu } from "@mantine/core";
+import { IconArchive, IconCopy } from "@tabler/icons-react";
+import { useNavigate } from "react-router";
+import { useArchive, useClone } from "../api/mutations";
+import { useCatalogue } from "../api/queries";
+import type { Campaign, Trial } from "../api/types";
+import { percentChange, signed, withUnit } from "../lib/format";
+import { bestOf } from "../lib/nextStep";
+import { campaignWords } from "../lib/states";
+import classes from "./NextFlight.module.css";
+import { Panel } from "./Panel";
+import { Trouble } from "./Trouble";
+
+interface Props {
+  campaign: Campaign;
+  trials: readonly Trial[];
+  onChoose: (trialNumber: number) => void;
+}
+
+/** The campaign's result, and what to do with it. */
+export function FinishedCard({ campaign, trials, onChoose }: Props) {
+  const navigate = useNavigate();
+  const clone = useClone(campaign.id);
+  const archive = useArchive(campaign.id);
+  const kinds = useCatalogue().data?.vehicle_kinds ?? [];
+  const best = bestOf(campaign, trials);
+  const first = trials.find((trial) => trial.state === "valid");
+  const change = percentChange(best?.error, first?.error);
+  const cloneTo = (kind?: string): void =>
+    clone.mutate(kind, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
+  return (
+    <Panel title={campaignWords("finished", campaign.outcome).word}>
+      <div className={classes["stack"]}>
+        <p className={classes["quiet"]}>{campaign.stop_reason}</p>
+        {best !== null && (
+          <div className={`${classes["best"]} numbers`}>
+            <p>Best: flight {best.number}</p>
+            <p className={classes["figure"]}>{withUnit(best.error, "m")}</p>
+            <p>
+              {Object.entries(best.gains)
+                .map(([name, value]) => `${name} ${value}`)
+                .join("  ·  ")}
+            </p>
+            {first && change !== null && best.id !== first.id && (
+              <p>
+                {signed(change)} % on flight {first.number} ({withUnit(first.error, "m")})
+              </p>
+            )}
+          </div>
+        )}
+        {best !== null && (
+          <Button variant="default" onClick={() => onChoose(best.number)}>
+            Look at flight {best.number}
+          </Button>
+        )}
+        <Menu width="target" position="bottom-start">
+          <Menu.Target>
+            <Button leftSection={<IconCopy size={20} aria-hidden />} loading={clone.isPending}>
+              Clone this campaign
+            </Button>
+          </Menu.Target>
+          <Menu.Dropdown>
+            <Menu.Label c="var(--dim)">The same settings, on</Menu.Label>
+            {kinds.map((kind) => (
+              <Menu.Item key={kind.name} mih={48} onClick={() => cloneTo(kind.name)}>
+                {kind.title}
+              </Menu.Item>
+            ))}
+          </Menu.Dropdown>
+        </Menu>
+        {campaign.actions.includes("archive") && (
+          <Button
+            variant="subtle"
+            color="gray"
+            c="var(--dim)"
+            leftSection={<IconArchive size={18} aria-hidden />}
+            loading={archive.isPending}
+            onClick={() => archive.mutate()}
+          >
+            Archive
+          </Button>
+        )}
+        <Trouble error={clone.error ?? archive.error} />
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,35 @@
+import { IconOctagonFilled } from "@tabler/icons-react";
+import type { FlyingCampaign, useAbort } from "../api/flying";
+import { withUnit } from "../lib/format";
+import { useLiveFlight } from "../live/store";
+import classes from "./Frame.module.css";
+
+/** Readings of one flight under way, and the button that ends it: one tap, no question. */
+export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: ReturnType<typeof useAbort> }) {
+  const live = useLiveFlight(flying.trialId);
+  const asked = abort.asked.has(flying.trialId);
+  const time = live?.timeS.at(-1);
+  return (
+    <section className={classes["flight"]} aria-label={`Flying: ${flying.name}`}>
+      <span className={classes["flightName"]} title={flying.name}>
+        {flying.name} · flight {flying.trialNumber}
+      </span>
+      <span className={classes["pulse"]} aria-hidden />
+      <span className={`${classes["readings"]} numbers`}>
+        {time === undefined ? (
+          <span>{live?.phase === "staging" ? "setting gains" : "flying"}</span>
+        ) : (
+          <>
+            <span className={classes["big"]}>{withUnit(live?.altitudeM.at(-1), "m", 2)}</span>
+            <span>{withUnit(time, "s", 1)}</span>
+          </>
+        )}
+      </span>
+      <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
+        <IconOctagonFilled size={20} aria-hidden />
+        {asked ? "ABORTING" : "ABORT"}
+        {!asked && <kbd>Space</kbd>}
+      </button>
+    </section>
+  );
+}

@@ -1,0 +1,34 @@
+import type { Proposal } from "../api/types";
+import { gainText, signed } from "../lib/format";
+import classes from "./NextFlight.module.css";
+
+/** Gains now and next, with the change of each. */
+export function GainTable({ changes }: { changes: Proposal["changes"] }) {
+  return (
+    <table className={classes["gains"]}>
+      <caption className="visually-hidden">Gains now and proposed</caption>
+      <thead>
+        <tr>
+          <th scope="col">Gain</th>
+          <th scope="col">Now</th>
+          <th scope="col">Next</th>
+          <th scope="col" className={classes["delta"]}>
+            Change
+          </th>
+        </tr>
+      </thead>
+      <tbody>
+        {Object.entries(changes).map(([name, { now, next, delta }]) => (
+          <tr key={name}>
+            <th scope="row">{name}</th>
+            <td className={classes["now"]}>{gainText(now)}</td>
+            <td className={classes["next"]}>{gainText(next)}</td>
+            <td className={classes["delta"]} data-same={delta === 0 || undefined}>
+              {delta === 0 ? "same" : signed(delta, Number.isInteger(delta) ? 0 : 2)}
+            </td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

@@ -1,0 +1,62 @@
+import { Button } from "@mantine/core";
+import { IconPlaneDeparture } from "@tabler/icons-react";
+import { useCancelTrial, useFlyTrial } from "../api/mutations";
+import type { Campaign, Trial } from "../api/types";
+import { gainText, withUnit } from "../lib/format";
+import { speedOf } from "../lib/nextStep";
+import { ImportRecord } from "./ImportRecord";
+import classes from "./NextFlight.module.css";
+import { Panel } from "./Panel";
+import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
+import { Trouble } from "./Trouble";
+
+/** A trial that is planned and has not flown: fly it, hand in its record, or give it up. */
+export function PlannedCard({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
+  const [speed, setSpeed] = useSpeed();
+  const fly = useFlyTrial(campaign.id);
+  const cancel = useCancelTrial();
+  return (
+    <Panel title={`Flight ${trial.number} is planned`}>
+      <div className={classes["stack"]}>
+        <dl className={`${classes["big"]} numbers`}>
+          {Object.entries(trial.gains).map(([name, value]) => (
+            <div key={name} className={classes["reading"]}>
+              <dt>{name}</dt>
+              <dd>{gainText(value)}</dd>
+            </div>
+          ))}
+          <div className={classes["reading"]}>
+            <dt>Predicted error</dt>
+            <dd>{withUnit(trial.predicted_error, "m")}</dd>
+          </div>
+        </dl>
+        {trial.flight?.problem && <Trouble error={new Error(trial.flight.problem)} />}
+        {campaign.vehicle.can_fly ? (
+          <>
+            <Button
+              size="lg"
+              leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+              loading={fly.isPending}
+              disabled={!trial.actions.includes("fly")}
+              onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
+            >
+              Fly it
+            </Button>
+            <SpeedSwitch value={speed} onChange={setSpeed} />
+          </>
+        ) : (
+          <ImportRecord campaign={campaign} trialId={trial.id} />
+        )}
+        <Button
+          variant="default"
+          loading={cancel.isPending}
+          disabled={!trial.actions.includes("cancel")}
+          onClick={() => cancel.mutate(trial.id)}
+        >
+          Give it up
+        </Button>
+        <Trouble error={fly.error ?? cancel.error} />
+      </div>
+    </Panel>
+  );
+}

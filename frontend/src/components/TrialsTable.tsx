@@ -1,0 +1,78 @@
+import { IconStarFilled } from "@tabler/icons-react";
+import type { Campaign, Trial } from "../api/types";
+import { gainText, NOTHING, withUnit } from "../lib/format";
+import { trialWords, wasFlown } from "../lib/states";
+import { StateBadge } from "./StateBadge";
+import classes from "./TrialsTable.module.css";
+
+interface Props {
+  campaign: Campaign;
+  trials: readonly Trial[];
+  shown: number | null;
+  onChoose: (trialNumber: number) => void;
+}
+
+/** The campaign's flights like the paper's Table 1: gains, error, prediction, and what came of each. */
+export function TrialsTable({ campaign, trials, shown, onChoose }: Props) {
+  const names = Object.keys(trials[0]?.gains ?? {});
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+    <section className={classes["scroll"]} aria-label="All flights" tabIndex={0}>
+      <table className={classes["table"]}>
+        <thead>
+          <tr>
+            <th scope="col">Flight</th>
+            {names.map((name) => (
+              <th key={name} scope="col">
+                {name}
+              </th>
+            ))}
+            <th scope="col">Error</th>
+            <th scope="col">Predicted</th>
+            <th scope="col" className={classes["text"]}>
+              State
+            </th>
+            <th scope="col" className={classes["text"]}>
+              Verdict
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {trials.map((trial) => {
+            const best = trial.id === campaign.best?.trial_id;
+            return (
+              <tr key={trial.id} data-best={best || undefined} data-shown={trial.number === shown || undefined}>
+                <th scope="row">
+                  {wasFlown(trial.state) ? (
+                    <button
+                      type="button"
+                      aria-pressed={trial.number === shown}
+                      aria-label={`Flight ${trial.number}${best ? ", best" : ""}`}
+                      onClick={() => onChoose(trial.number)}
+                    >
+                      {trial.number}
+                      {best && <IconStarFilled size={15} aria-hidden />}
+                    </button>
+                  ) : (
+                    <span>{trial.number}</span>
+                  )}
+                </th>
+                {names.map((name) => (
+                  <td key={name}>{gainText(trial.gains[name] ?? Number.NaN)}</td>
+                ))}
+                <td className={classes["error"]}>{withUnit(trial.error, "m")}</td>
+                <td>{withUnit(trial.predicted_error, "m")}</td>
+                <td className={classes["text"]}>
+                  <StateBadge words={trialWords(trial.state)} />
+                </td>
+                <td className={`${classes["text"]} ${classes["verdict"]}`}>
+                  {trial.verdict || trial.reason || NOTHING}
+                </td>
+              </tr>
+            );
+          })}
+        </tbody>
+      </table>
+    </section>
+  );
+}

@@ -1,0 +1,104 @@
+import { Anchor, Button } from "@mantine/core";
+import { IconDownload } from "@tabler/icons-react";
+import { Link } from "react-router";
+import { recordCsv } from "../api/queries";
+import type { Trial } from "../api/types";
+import { gainText, signed, withUnit } from "../lib/format";
+import { trialWords } from "../lib/states";
+import { compared } from "../lib/verdict";
+import { Classify } from "./Classify";
+import { Panel } from "./Panel";
+import { StateBadge } from "./StateBadge";
+import { Time } from "./Time";
+import classes from "./Verdict.module.css";
+
+interface Props {
+  trial: Trial;
+  trials: readonly Trial[];
+  isBest: boolean;
+  /** On the flight's own page there is no link to that page. */
+  own?: boolean;
+}
+
+function Change({ percent }: { percent: number | null }) {
+  if (percent === null) return null;
+  const words = percent < 0 ? "lower" : "higher";
+  return (
+    <small data-better={percent < 0 || undefined}>
+      {signed(percent)} % {Math.abs(percent) < 0.5 ? "" : words}
+    </small>
+  );
+}
+
+/** What happened in a flight: against the best before it, against its prediction, and what it counts for. */
+export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
+  const { bestBefore, againstBest, againstPrediction } = compared(trial, trials);
+  return (
+    <Panel
+      title={`Flight ${trial.number}${isBest ? " · best so far" : ""}`}
+      tools={<StateBadge words={trialWords(trial.state)} />}
+    >
+      <p className={classes["sentence"]}>{trial.verdict || trial.reason}</p>
+      {trial.verdict && trial.reason && <p className={classes["reason"]}>{trial.reason}</p>}
+      <dl className={`${classes["figures"]} numbers`}>
+        <div>
+          <dt>Error</dt>
+          <dd>{withUnit(trial.error, "m")}</dd>
+        </div>
+        <div>
+          <dt>Predicted</dt>
+          <dd>
+            {withUnit(trial.predicted_error, "m")} <Change percent={againstPrediction} />
+          </dd>
+        </div>
+        <div>
+          <dt>{bestBefore ? `Best before, flight ${bestBefore.number}` : "Best before"}</dt>
+          <dd>
+            {withUnit(bestBefore?.error, "m")} <Change percent={againstBest} />
+          </dd>
+        </div>
+        <div>
+          <dt>Overshoot</dt>
+          <dd>{withUnit(trial.overshoot_m, "m", 2)}</dd>
+        </div>
+        <div>
+          <dt>Gains</dt>
+          <dd className={classes["gains"]}>
+            {Object.entries(trial.gains)
+              .map(([name, value]) => `${name} ${gainText(value)}`)
+              .join("  ")}
+          </dd>
+        </div>
+        <div>
+          <dt>Flown</dt>
+          <dd className={classes["gains"]}>
+            <Time at={trial.flown_at} />
+          </dd>
+        </div>
+      </dl>
+      <div className={classes["acts"]}>
+        <Classify key={`${trial.id} ${trial.state}`} trial={trial} />
+        {trial.record !== null && (
+          <Button
+            component="a"
+            href={recordCsv(trial.id)}
+            download
+            variant="default"
+            leftSection={<IconDownload size={18} aria-hidden />}
+          >
+            Record as CSV
+          </Button>
+        )}
+        {!own && (
+          <Anchor
+            component={Link}
+            to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`}
+            className={classes["link"]}
+          >
+            Open the flight
+          </Anchor>
+        )}
+      </div>
+    </Panel>
+  );
+}

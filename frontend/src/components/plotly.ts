@@ -1,0 +1,42 @@
+/** The chart library as a chunk of its own, fetched when the first chart is drawn. */
+
+import type Plotly from "plotly.js-cartesian-dist-min";
+import type { LiveFlight } from "../lib/live";
+import { paced } from "../lib/pace";
+import { onLive } from "../live/store";
+
+let loading: Promise<typeof Plotly> | undefined;
+
+export function loadPlotly(): Promise<typeof Plotly> {
+  loading ??= import("plotly.js-cartesian-dist-min").then((module) => module.default);
+  return loading;
+}
+
+/** Nothing leaves this machine: Plotly's own upload and edit buttons stay out. */
+export const CONFIG = {
+  displaylogo: false,
+  showSendToCloud: false,
+  plotlyServerURL: "",
+  doubleClick: "reset",
+  modeBarButtons: [["toImage", "resetScale2d"]],
+} as const;
+
+const SHORTEST_REDRAW_MS = 90;
+
+/** Grow the chart's live trace as telemetry of a trial comes; returns the function that ends it. */
+export function drawLive(chart: HTMLElement, trace: number, trialId: number): () => void {
+  let latest: LiveFlight | null = null;
+  const drawing = paced(async () => {
+    if (latest === null || latest.timeS.length === 0) return;
+    const plotly = await loadPlotly();
+    await plotly.restyle(chart, { x: [latest.timeS], y: [latest.altitudeM], showlegend: true }, [trace]);
+  }, SHORTEST_REDRAW_MS);
+  const unfollow = onLive(trialId, (flight) => {
+    latest = flight;
+    drawing.ask();
+  });
+  return () => {
+    unfollow();
+    drawing.stop();
+  };
+}

@@ -1,0 +1,30 @@
+import { expect, test } from "vitest";
+import { changeFrom, doubtful, doubtfulOnce } from "./events";
+
+test("a changed trial makes its campaign, the lists and what flies doubtful", () => {
+  expect(doubtful({ topic: "trial", entity_id: 9, campaign_id: 4 })).toEqual([
+    ["flying"],
+    ["campaigns"],
+    ["trial", 9],
+    ["campaign", 4],
+  ]);
+});
+
+test("many changes together ask for each answer once", () => {
+  const changes = [
+    { topic: "proposal", entity_id: 1, campaign_id: 4 },
+    { topic: "campaign", entity_id: 4, campaign_id: 4 },
+    { topic: "campaign", entity_id: 4, campaign_id: 4 },
+  ];
+  expect(doubtfulOnce(changes)).toEqual([["flying"], ["campaign", 4], ["campaigns"]]);
+});
+
+test("a line that is no change is left alone", () => {
+  expect(changeFrom('{"topic":"trial","entity_id":9,"campaign_id":null}')).toEqual({
+    topic: "trial",
+    entity_id: 9,
+    campaign_id: null,
+  });
+  expect(changeFrom('{"hello":1}')).toBeNull();
+  expect(changeFrom("3")).toBeNull();
+});

@@ -1,0 +1,32 @@
+/** Which cached answers a change on the server makes doubtful. */
+
+export interface Change {
+  topic: string;
+  entity_id: number;
+  campaign_id: number | null;
+}
+
+export type QueryKey = readonly (string | number)[];
+
+export function doubtful(change: Change): QueryKey[] {
+  const keys: QueryKey[] = [["flying"]];
+  if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
+  if (change.topic === "trial") keys.push(["trial", change.entity_id]);
+  if (change.topic === "job") keys.push(["jobs"]);
+  if (change.campaign_id !== null) keys.push(["campaign", change.campaign_id]);
+  return keys;
+}
+
+/** Each key once, however many changes came together. */
+export function doubtfulOnce(changes: readonly Change[]): QueryKey[] {
+  const keys = new Map(changes.flatMap(doubtful).map((key) => [JSON.stringify(key), key]));
+  return [...keys.values()];
+}
+
+export function changeFrom(json: string): Change | null {
+  const parsed: unknown = JSON.parse(json);
+  if (typeof parsed !== "object" || parsed === null) return null;
+  const { topic, entity_id, campaign_id } = parsed as Record<string, unknown>;
+  if (typeof topic !== "string" || typeof entity_id !== "number") return null;
+  return { topic, entity_id, campaign_id: typeof campaign_id === "number" ? campaign_id : null };
+}

@@ -1,0 +1,33 @@
+import { expect, test } from "vitest";
+import { count, gainText, NOTHING, percentChange, signed, utcTime, withUnit } from "./format";
+
+test("an error is printed to the millimetre, with its unit", () => {
+  expect(withUnit(0.13189333802782058, "m")).toBe("0.132 m");
+  expect(withUnit(null, "m")).toBe(NOTHING);
+  expect(withUnit(Number.NaN, "m")).toBe(NOTHING);
+});
+
+test("a change has a sign, and a change too small to print has both", () => {
+  expect(signed(12.4)).toBe("+12");
+  expect(signed(-12.4, 1)).toBe("−12.4");
+  expect(signed(0.2)).toBe("±0");
+});
+
+test("percent against nothing is nothing", () => {
+  expect(percentChange(0.2, 0.4)).toBe(-50);
+  expect(percentChange(0.2, null)).toBeNull();
+  expect(percentChange(0.2, 0)).toBeNull();
+});
+
+test("whole gains stay whole and others are short", () => {
+  expect(gainText(283)).toBe("283");
+  expect(gainText(0.123456)).toBe("0.1235");
+});
+
+test("a time can be read in UTC", () => {
+  expect(utcTime("2026-11-02T10:00:00.123+01:00")).toBe("2026-11-02 09:00:00 UTC");
+});
+
+test("one flight is singular", () => {
+  expect([count(0, "flight"), count(1, "flight"), count(7, "flight")]).toEqual(["0 flights", "1 flight", "7 flights"]);
+});

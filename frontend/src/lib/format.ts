@@ -1,0 +1,39 @@
+/** Numbers and times as a person reads them: no more digits than the measurement can carry, always with the unit. */
+
+export const NOTHING = "–";
+
+/** Errors are known to about a millimetre: three digits after the point. */
+export function withUnit(value: number | null | undefined, unit: string, digits = 3): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+  return `${value.toFixed(digits)} ${unit}`;
+}
+
+/** Change of `value` against `base` in percent, with its sign; null where there is nothing to compare. */
+export function percentChange(value: number | null | undefined, base: number | null | undefined): number | null {
+  if (value === null || value === undefined || base === null || base === undefined || base === 0) return null;
+  return (100 * (value - base)) / base;
+}
+
+export function signed(value: number, digits = 0): string {
+  const text = Math.abs(value).toFixed(digits);
+  if (Number(text) === 0) return `±${text}`;
+  return `${value > 0 ? "+" : "−"}${text}`;
+}
+
+/** A gain: whole numbers as they are, others with at most four digits after the point. */
+export function gainText(value: number): string {
+  return Number.isInteger(value) ? String(value) : String(Number(value.toFixed(4)));
+}
+
+export function localTime(iso: string | null | undefined): string {
+  if (!iso) return NOTHING;
+  return new Date(iso).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+}
+
+export function utcTime(iso: string): string {
+  return `${new Date(iso).toISOString().slice(0, 19).replace("T", " ")} UTC`;
+}
+
+export function count(number: number, noun: string): string {
+  return `${number} ${noun}${number === 1 ? "" : "s"}`;
+}

@@ -1,0 +1,34 @@
+import { expect, test } from "vitest";
+import { begun, extended, telemetryFrom } from "./live";
+
+const line = JSON.stringify({
+  type: "telemetry",
+  campaign_id: 1,
+  trial_id: 5,
+  time_s: 0.04,
+  samples: [
+    [0.02, 0.1, 0.5, 3, 0.1, 0.8, 11.9],
+    [0.04, 0.2, 0.6, 3, 0.1, 0.9, 11.8],
+  ],
+  error_so_far: 2.9,
+});
+
+test("telemetry grows the curve and updates the readings", () => {
+  const news = telemetryFrom(line);
+  if (news === null) throw new Error("the line above is telemetry");
+  const flight = extended(begun(1, 5), news);
+  expect(flight.timeS).toEqual([0.02, 0.04]);
+  expect(flight.altitudeM).toEqual([0.1, 0.2]);
+  expect([flight.thrust, flight.batteryV, flight.errorSoFar]).toEqual([0.9, 11.8, 2.9]);
+});
+
+test("samples that come twice after a reconnect are drawn once", () => {
+  const news = telemetryFrom(line);
+  if (news === null) throw new Error("the line above is telemetry");
+  expect(extended(extended(begun(1, 5), news), news).timeS).toEqual([0.02, 0.04]);
+});
+
+test("a line that is no telemetry is left alone", () => {
+  expect(telemetryFrom('{"type":"telemetry"}')).toBeNull();
+  expect(telemetryFrom("null")).toBeNull();
+});

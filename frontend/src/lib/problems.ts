@@ -1,0 +1,89 @@
+/** What the server says when it refuses: RFC 9457 problem details, with our hint and the refused fields. */
+
+export interface FieldProblem {
+  field: string;
+  reason: string;
+}
+
+export interface Problem {
+  status: number;
+  title: string;
+  detail: string;
+  hint: string;
+  problems: FieldProblem[];
+}
+
+export class ApiError extends Error {
+  readonly problem: Problem;
+
+  constructor(problem: Problem) {
+    super(problem.detail || problem.title);
+    this.name = "ApiError";
+    this.problem = problem;
+  }
+}
+
+const UNREACHABLE: Problem = {
+  status: 0,
+  title: "The server cannot be reached.",
+  detail: "Nothing was changed.",
+  hint: "Check that Gainline is running; this page catches up by itself.",
+  problems: [],
+};
+
+function text(value: unknown): string {
+  return typeof value === "string" ? value : "";
+}
+
+function fieldProblems(value: unknown): FieldProblem[] {
+  if (!Array.isArray(value)) return [];
+  return value.flatMap((entry: unknown) => {
+    if (typeof entry !== "object" || entry === null) return [];
+    const { field, reason } = entry as Record<string, unknown>;
+    return typeof field === "string" && typeof reason === "string" ? [{ field, reason }] : [];
+  });
+}
+
+/** Whatever a failed request brought, as a problem that can be shown. */
+export function problemFrom(status: number | undefined, body: unknown): Problem {
+  if (status === undefined) return UNREACHABLE;
+  const found = (typeof body === "object" && body !== null ? body : {}) as Record<string, unknown>;
+  return {
+    status,
+    title: text(found["title"]) || `The server answered ${status}.`,
+    detail: text(found["detail"]),
+    hint: text(found["hint"]) || (status >= 500 ? "Try again; if it happens again, look into the server's log." : ""),
+    problems: fieldProblems(found["problems"]),
+  };
+}
+
+export function problemOf(error: unknown): Problem | null {
+  if (error === null || error === undefined) return null;
+  if (error instanceof ApiError) return error.problem;
+  return { ...UNREACHABLE, title: error instanceof Error ? error.message : UNREACHABLE.title };
+}
+
+/** Reason per field. A refused field can stand anywhere below `prefix` (`body.definition.bounds.kp`). */
+export function reasonsByField(problem: Problem | null, fields: readonly string[]): Record<string, string> {
+  const reasons: Record<string, string> = {};
+  for (const { field, reason } of problem?.problems ?? []) {
+    const owner = fields
+      .filter((name) => field === name || field.endsWith(`.${name}`) || `.${field}.`.includes(`.${name}.`))
+      .sort((one, other) => other.length - one.length)[0];
+    if (owner !== undefined) reasons[owner] = reasons[owner] ? `${reasons[owner]}; ${reason}` : reason;
+  }
+  return reasons;
+}
+
+/** The refused fields that none of `fields` shows. */
+export function otherProblems(problem: Problem | null, fields: readonly string[]): FieldProblem[] {
+  return (problem?.problems ?? []).filter(
+    (one) => Object.keys(reasonsByField({ ...UNREACHABLE, problems: [one] }, fields)).length === 0,
+  );
+}
+
+/** Whether a failed reading is worth another try: a server that is away may come back, a refusal stays one. */
+export function retries(failures: number, error: unknown): boolean {
+  const problem = problemOf(error);
+  return failures < 3 && (problem === null || problem.status === 0 || problem.status >= 500);
+}

@@ -1,0 +1,37 @@
+import { expect, test } from "vitest";
+import type { Campaign } from "../api/types";
+import { settingsOf } from "./settings";
+
+const campaign = {
+  definition: {
+    experiment: "takeoff",
+    strategy: "gradient",
+    options: { scaled: false },
+    start: { kind: "given", gains: { kp: 400, ki: 20, kd: 100 } },
+    stop: { kind: "paper", max_flights: 7, improvement: 0.05 },
+    bounds: { kp: [0, 2000] },
+    first_step_fraction: 0.25,
+    step_fraction: 1,
+    seed: 3,
+  },
+  vehicle: { title: "JSBSim", options: { mass_kg: 0.42 } },
+  definition_digest: "0123456789abcdef",
+} as unknown as Campaign;
+
+test("every setting that a proposal depends on is said in words", () => {
+  const rows = Object.fromEntries(settingsOf(campaign));
+  expect(rows).toMatchObject({
+    "Vehicle: mass_kg": "0.42",
+    "Strategy: scaled": "false",
+    Start: "[400 20 100]",
+    "Bounds of kp": "0 … 2000",
+    "Largest step": "25 % of each range until a flight is valid, then 100 %",
+    Seed: "3",
+    "Frozen as": "0123456789ab",
+  });
+  expect(rows["Stop"]).toBe("Two flights in a row less than 5 % better than the best, or 7 flights");
+});
+
+test("a draft is not frozen yet", () => {
+  expect(Object.fromEntries(settingsOf({ ...campaign, definition_digest: null }))).not.toHaveProperty("Frozen as");
+});

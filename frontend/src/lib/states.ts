@@ -1,0 +1,53 @@
+/** What the states are called on a page, and how much they ask for attention. */
+
+import type { CampaignState, TrialState } from "../api/types";
+
+export type Tone = "quiet" | "good" | "busy" | "bad";
+
+export interface StateWords {
+  word: string;
+  tone: Tone;
+}
+
+const CAMPAIGN: Record<CampaignState, StateWords> = {
+  draft: { word: "Preparing", tone: "busy" },
+  ready: { word: "Ready to fly", tone: "quiet" },
+  flying: { word: "Flying", tone: "busy" },
+  deciding: { word: "Between flights", tone: "quiet" },
+  finished: { word: "Finished", tone: "good" },
+  archived: { word: "Archived", tone: "quiet" },
+};
+
+const OUTCOME: Record<string, StateWords> = {
+  converged: { word: "Converged", tone: "good" },
+  budget: { word: "Flight budget used", tone: "good" },
+  stopped: { word: "Stopped by the operator", tone: "quiet" },
+};
+
+export function campaignWords(state: CampaignState, outcome: string | null): StateWords {
+  if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
+  return CAMPAIGN[state];
+}
+
+const TRIAL: Record<TrialState, StateWords> = {
+  planned: { word: "Planned", tone: "quiet" },
+  staged: { word: "Gains set", tone: "busy" },
+  flying: { word: "Flying", tone: "busy" },
+  captured: { word: "To be judged", tone: "busy" },
+  valid: { word: "Valid", tone: "good" },
+  aborted: { word: "Aborted", tone: "bad" },
+  invalid: { word: "Invalid", tone: "bad" },
+  cancelled: { word: "Cancelled", tone: "quiet" },
+  lost: { word: "Lost", tone: "bad" },
+};
+
+export function trialWords(state: TrialState): StateWords {
+  return TRIAL[state];
+}
+
+/** Trials with a flight behind them; the others are plans. */
+const FLOWN: ReadonlySet<TrialState> = new Set<TrialState>(["captured", "valid", "aborted", "invalid", "lost"]);
+
+export function wasFlown(state: TrialState): boolean {
+  return FLOWN.has(state);
+}

@@ -1,0 +1,64 @@
+/** What a page adds to a figure that the server drew: the live curve, and the emphasis on a chosen flight. */
+
+import type { LiveFlight } from "./live";
+
+export interface TraceMeta {
+  role?: string;
+  trial?: number;
+  standing?: string;
+}
+
+export interface Trace {
+  meta?: TraceMeta;
+  x?: unknown[];
+  y?: unknown[];
+  opacity?: number;
+  showlegend?: boolean;
+  line?: Record<string, unknown>;
+  [property: string]: unknown;
+}
+
+export interface PlotlyFigure {
+  data: Trace[];
+  layout: Record<string, unknown>;
+}
+
+export function traceWithRole(traces: readonly Trace[], role: string): number {
+  return traces.findIndex((trace) => trace.meta?.role === role);
+}
+
+/** The `live` trace filled with what has been measured so far; as it was when nothing flies. */
+export function withLive(traces: readonly Trace[], flight: LiveFlight | null): Trace[] {
+  if (flight === null || flight.timeS.length === 0) return [...traces];
+  return traces.map((trace) =>
+    trace.meta?.role === "live" ? { ...trace, x: flight.timeS, y: flight.altitudeM, showlegend: true } : trace,
+  );
+}
+
+const FADED = 0.22;
+
+/** A chosen flight stands out and the other flights step back; goal, prediction and live curve stay. */
+export function withChosen(traces: readonly Trace[], trial: number | null): Trace[] {
+  if (trial === null || !traces.some((trace) => trace.meta?.role === "flight" && trace.meta.trial === trial)) {
+    return [...traces];
+  }
+  return traces.map((trace) => {
+    if (trace.meta?.role !== "flight") return trace;
+    return trace.meta.trial === trial
+      ? { ...trace, line: { ...trace.line, width: 3.5 } }
+      : { ...trace, opacity: FADED };
+  });
+}
+
+/** The flight whose curve was clicked, from Plotly's event. */
+export function clickedTrial(traces: readonly Trace[], curveNumber: number): number | null {
+  const meta = traces[curveNumber]?.meta;
+  return meta?.role === "flight" || meta?.role === "off scale" ? (meta.trial ?? null) : null;
+}
+
+/** The same layout with its first x axis cut to `range`, or as it was for null. */
+export function withTimeRange(layout: Record<string, unknown>, range: readonly [number, number] | null) {
+  if (range === null) return layout;
+  const axis = typeof layout["xaxis"] === "object" && layout["xaxis"] !== null ? layout["xaxis"] : {};
+  return { ...layout, xaxis: { ...axis, range: [...range] }, uirevision: range.join() };
+}

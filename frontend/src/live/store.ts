@@ -1,0 +1,81 @@
+/** What the event stream says, kept outside of React: the state of the connection and the flights under way. */
+
+import { useSyncExternalStore } from "react";
+import { begun, extended, type LiveFlight, type Telemetry } from "../lib/live";
+
+export interface Connection {
+  state: "connecting" | "live" | "away";
+  worker: boolean;
+}
+
+type Listener = () => void;
+
+class Store<Value> {
+  private value: Value;
+  private readonly listeners = new Set<Listener>();
+
+  constructor(value: Value) {
+    this.value = value;
+  }
+
+  readonly get = (): Value => this.value;
+
+  readonly set = (value: Value): void => {
+    this.value = value;
+    for (const listener of this.listeners) listener();
+  };
+
+  readonly subscribe = (listener: Listener): (() => void) => {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  };
+}
+
+const connection = new Store<Connection>({ state: "connecting", worker: true });
+const flights = new Store<ReadonlyMap<number, LiveFlight>>(new Map());
+
+export function setConnection(change: Partial<Connection>): void {
+  const next = { ...connection.get(), ...change };
+  if (next.state !== connection.get().state || next.worker !== connection.get().worker) connection.set(next);
+}
+
+export function takeTelemetry(news: Telemetry): void {
+  const known = flights.get().get(news.trial_id) ?? begun(news.campaign_id, news.trial_id);
+  flights.set(new Map(flights.get()).set(news.trial_id, extended(known, news)));
+}
+
+export function takePhase(campaignId: number, trialId: number, phase: string): void {
+  const known = flights.get().get(trialId) ?? begun(campaignId, trialId);
+  flights.set(new Map(flights.get()).set(trialId, { ...known, phase }));
+}
+
+/** Forget a flight once its record has been drawn. */
+export function forget(trialId: number): void {
+  if (!flights.get().has(trialId)) return;
+  const rest = new Map(flights.get());
+  rest.delete(trialId);
+  flights.set(rest);
+}
+
+export function useConnection(): Connection {
+  return useSyncExternalStore(connection.subscribe, connection.get);
+}
+
+/** The live record of one trial; a new object with every message. */
+export function useLiveFlight(trialId: number | null): LiveFlight | null {
+  return useSyncExternalStore(flights.subscribe, () => liveNow(trialId));
+}
+
+export function liveNow(trialId: number | null): LiveFlight | null {
+  return trialId === null ? null : (flights.get().get(trialId) ?? null);
+}
+
+/** For drawing outside of React: called on every message, returns the function that ends it. */
+export function onLive(trialId: number, draw: (flight: LiveFlight) => void): () => void {
+  const tell = (): void => {
+    const flight = liveNow(trialId);
+    if (flight !== null) draw(flight);
+  };
+  tell();
+  return flights.subscribe(tell);
+}

@@ -1,0 +1,115 @@
+import { SegmentedControl, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { useCallback, useState } from "react";
+import { useParams } from "react-router";
+import { useCampaign, useCampaignFigure, useProposal, useTrials } from "../api/queries";
+import type { Campaign, Trial } from "../api/types";
+import { CampaignHeader } from "../components/CampaignHeader";
+import { FigurePanel } from "../components/FigurePanel";
+import { NextFlightCard } from "../components/NextFlightCard";
+import { Panel } from "../components/Panel";
+import { TrialsTable } from "../components/TrialsTable";
+import { Trouble } from "../components/Trouble";
+import { useTitle } from "../components/useTitle";
+import { VerdictPanel } from "../components/VerdictPanel";
+import { type PlotlyFigure, withChosen, withTimeRange } from "../lib/traces";
+import { shownTrial } from "../lib/verdict";
+import classes from "./CampaignPage.module.css";
+import { NotFoundPage } from "./NotFoundPage";
+
+export function CampaignPage() {
+  const campaignId = Number(useParams()["campaignId"]);
+  return Number.isInteger(campaignId) ? <CampaignById key={campaignId} campaignId={campaignId} /> : <NotFoundPage />;
+}
+
+function CampaignById({ campaignId }: { campaignId: number }) {
+  const campaign = useCampaign(campaignId);
+  const trials = useTrials(campaignId);
+  useTitle(campaign.data?.name ?? "Campaign");
+  const error = campaign.error ?? trials.error;
+  if (campaign.data && trials.data) return <CampaignView campaign={campaign.data} trials={trials.data} />;
+  if (error) return <Trouble error={error} />;
+  return (
+    <div aria-busy="true" className={classes["columns"]}>
+      <Skeleton height={480} radius="md" />
+      <Skeleton height={480} radius="md" />
+    </div>
+  );
+}
+
+const FIRST_SECONDS = [-0.3, 8] as const;
+
+function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure) => PlotlyFigure {
+  return useCallback(
+    (figure) => ({
+      data: withChosen(figure.data, chosen),
+      layout: withTimeRange(figure.layout, span === "first" ? FIRST_SECONDS : null),
+    }),
+    [chosen, span],
+  );
+}
+
+function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readonly Trial[] }) {
+  const theme = useComputedColorScheme("light");
+  const [chosen, setChosen] = useState<number | null>(null);
+  const [span, setSpan] = useState("whole");
+  const next = useProposal(campaign.id);
+  const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme);
+  const errors = useCampaignFigure(campaign.id, "errors", theme);
+  const gains = useCampaignFigure(campaign.id, "gains", theme);
+  const shown = shownTrial(trials, chosen);
+  const choose = useCallback((number: number) => setChosen((before) => (before === number ? null : number)), []);
+  return (
+    <>
+      <CampaignHeader campaign={campaign} />
+      <div className={classes["columns"]}>
+        <FigurePanel
+          title="Takeoff curves"
+          className={classes["curves"]}
+          card={takeoffs.data}
+          error={takeoffs.error}
+          height={440}
+          dressed={useDressed(chosen, span)}
+          liveTrial={campaign.flying?.trial_id ?? null}
+          onChoose={choose}
+          tools={
+            <SegmentedControl
+              aria-label="Time shown"
+              size="sm"
+              value={span}
+              onChange={setSpan}
+              data={[
+                { value: "first", label: "First 8 s" },
+                { value: "whole", label: "Whole flight" },
+              ]}
+            />
+          }
+        />
+        <div className={classes["next"]}>
+          {next.data ? (
+            <NextFlightCard campaign={campaign} next={next.data} trials={trials} onChoose={setChosen} />
+          ) : (
+            <Trouble error={next.error} />
+          )}
+        </div>
+      </div>
+      {shown !== null && (
+        <div className={classes["row"]}>
+          <VerdictPanel trial={shown} trials={trials} isBest={shown.id === campaign.best?.trial_id} />
+        </div>
+      )}
+      <div className={classes["halves"]}>
+        <FigurePanel title="Error per flight" card={errors.data} error={errors.error} height={300} onChoose={choose} />
+        <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={300} />
+      </div>
+      <Panel title="All flights" className={classes["row"]}>
+        {trials.length === 0 ? (
+          <p className={classes["none"]}>
+            Nothing has flown yet. The first flight will stand here with its gains and error.
+          </p>
+        ) : (
+          <TrialsTable campaign={campaign} trials={trials} shown={shown?.number ?? null} onChoose={choose} />
+        )}
+      </Panel>
+    </>
+  );
+}

@@ -1,0 +1,104 @@
+import { Button, SegmentedControl, Select, Skeleton, TextInput } from "@mantine/core";
+import { useDebouncedValue } from "@mantine/hooks";
+import { IconPlus, IconSearch } from "@tabler/icons-react";
+import { useState } from "react";
+import { Link } from "react-router";
+import { useCampaigns, useCatalogue } from "../api/queries";
+import type { Sort } from "../api/types";
+import { CampaignCard } from "../components/CampaignCard";
+import { FirstCampaign } from "../components/FirstCampaign";
+import { Trouble } from "../components/Trouble";
+import { useTitle } from "../components/useTitle";
+import { STATE_FILTERS, type StateFilter, statesFor } from "../lib/campaigns";
+import classes from "./CampaignsPage.module.css";
+
+const SORTS: { value: Sort; label: string }[] = [
+  { value: "-updated", label: "Lately changed" },
+  { value: "-created", label: "Newest" },
+  { value: "created", label: "Oldest" },
+  { value: "name", label: "Name" },
+  { value: "error", label: "Lowest error" },
+];
+
+export function CampaignsPage() {
+  useTitle("Campaigns");
+  const [search, setSearch] = useState("");
+  const [state, setState] = useState<StateFilter>("all");
+  const [vehicle, setVehicle] = useState<string | null>(null);
+  const [sort, setSort] = useState<Sort>("-updated");
+  const [sought] = useDebouncedValue(search.trim(), 200);
+  const kinds = useCatalogue().data?.vehicle_kinds ?? [];
+  const filtered = sought !== "" || state !== "all" || vehicle !== null;
+  const campaigns = useCampaigns({ search: sought, state: statesFor(state), vehicle: vehicle ? [vehicle] : [], sort });
+  const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
+  const total = campaigns.data?.pages[0]?.total ?? 0;
+  if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
+  return (
+    <>
+      <div className={classes["head"]}>
+        <h1 className={classes["title"]}>Campaigns</h1>
+        <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
+          New campaign
+        </Button>
+      </div>
+      <search className={classes["filters"]}>
+        <TextInput
+          aria-label="Search campaigns by name"
+          placeholder="Search"
+          leftSection={<IconSearch size={18} aria-hidden />}
+          value={search}
+          onChange={(event) => setSearch(event.currentTarget.value)}
+        />
+        <SegmentedControl
+          aria-label="State"
+          size="md"
+          value={state}
+          onChange={(value) => setState(value as StateFilter)}
+          data={STATE_FILTERS}
+        />
+        <Select
+          aria-label="Vehicle"
+          placeholder="Every vehicle"
+          clearable
+          data={kinds.map(({ name, title }) => ({ value: name, label: title }))}
+          value={vehicle}
+          onChange={setVehicle}
+        />
+        <Select
+          aria-label="Order"
+          allowDeselect={false}
+          data={SORTS}
+          value={sort}
+          onChange={(value) => setSort((value ?? "-updated") as Sort)}
+        />
+      </search>
+      <Trouble error={campaigns.error} />
+      {campaigns.isPending && (
+        <div className={classes["cards"]} aria-busy="true">
+          {[1, 2, 3].map((one) => (
+            <Skeleton key={one} height={250} radius="md" />
+          ))}
+        </div>
+      )}
+      {campaigns.data && found.length === 0 && (
+        <p className={classes["none"]}>No campaign fits this search. Take a filter away, or create one.</p>
+      )}
+      <ul className={classes["cards"]} aria-label="Campaigns">
+        {found.map((campaign) => (
+          <CampaignCard key={campaign.id} campaign={campaign} />
+        ))}
+      </ul>
+      {campaigns.hasNextPage && (
+        <div className={classes["more"]}>
+          <Button
+            variant="default"
+            loading={campaigns.isFetchingNextPage}
+            onClick={() => void campaigns.fetchNextPage()}
+          >
+            Show more ({found.length} of {total})
+          </Button>
+        </div>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,51 @@
+import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Link, useParams } from "react-router";
+import { useCampaign, useFlightFigure, useTrial, useTrials } from "../api/queries";
+import { FigurePanel } from "../components/FigurePanel";
+import { Trouble } from "../components/Trouble";
+import { useTitle } from "../components/useTitle";
+import { VerdictPanel } from "../components/VerdictPanel";
+import { GateChecks } from "../components/Why";
+import classes from "./FlightPage.module.css";
+import { NotFoundPage } from "./NotFoundPage";
+
+export function FlightPage() {
+  const { campaignId, trialId } = useParams();
+  const [campaign, trial] = [Number(campaignId), Number(trialId)];
+  if (!Number.isInteger(campaign) || !Number.isInteger(trial)) return <NotFoundPage />;
+  return <FlightById campaignId={campaign} trialId={trial} />;
+}
+
+/** One flight: its own curve and commands first, then what it was worth. */
+function FlightById({ campaignId, trialId }: { campaignId: number; trialId: number }) {
+  const theme = useComputedColorScheme("light");
+  const campaign = useCampaign(campaignId).data;
+  const trial = useTrial(trialId);
+  const trials = useTrials(campaignId).data ?? [];
+  const figure = useFlightFigure(trialId, theme);
+  useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
+  if (trial.error) return <Trouble error={trial.error} />;
+  if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
+  const { number, record, gate } = trial.data;
+  return (
+    <>
+      <Anchor component={Link} to={`/campaigns/${campaignId}`} className={classes["back"]}>
+        {campaign?.name ?? "The campaign"}
+      </Anchor>
+      <h1 className={classes["name"]}>Flight {number}</h1>
+      <FigurePanel title="Record" card={figure.data} error={figure.error} height={480} />
+      <div className={classes["row"]}>
+        <VerdictPanel trial={trial.data} trials={trials} isBest={trialId === campaign?.best?.trial_id} own />
+      </div>
+      <div className={classes["facts"]}>
+        {record !== null && (
+          <p className="numbers">
+            {record.samples} samples over {record.duration_s.toFixed(1)} s from {record.source}, on the clock of{" "}
+            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
+          </p>
+        )}
+        <GateChecks gate={gate} />
+      </div>
+    </>
+  );
+}

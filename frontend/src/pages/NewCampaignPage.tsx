@@ -1,0 +1,136 @@
+import { Accordion, Button, Select, Skeleton, TextInput } from "@mantine/core";
+import { IconPlus } from "@tabler/icons-react";
+import { useState } from "react";
+import { useNavigate } from "react-router";
+import { useCreateCampaign } from "../api/mutations";
+import { useCatalogue } from "../api/queries";
+import type { Catalogue } from "../api/types";
+import { AdvancedFields } from "../components/AdvancedFields";
+import { Entry } from "../components/Entry";
+import { Trouble } from "../components/Trouble";
+import { useTitle } from "../components/useTitle";
+import { VehiclePicker } from "../components/VehiclePicker";
+import {
+  type CampaignForm,
+  fieldsOf,
+  gainsOf,
+  requestFrom,
+  type StartKind,
+  startingForm,
+  withVehicle,
+} from "../lib/newCampaign";
+import { problemOf, reasonsByField } from "../lib/problems";
+import classes from "./NewCampaignPage.module.css";
+
+export function NewCampaignPage() {
+  useTitle("New campaign");
+  const catalogue = useCatalogue();
+  return (
+    <div className={classes["page"]}>
+      <h1 className={classes["title"]}>New campaign</h1>
+      {catalogue.data && <NewCampaignForm catalogue={catalogue.data} />}
+      {catalogue.error && <Trouble error={catalogue.error} />}
+      {catalogue.isPending && <Skeleton height={420} radius="md" />}
+    </div>
+  );
+}
+
+const STARTS: { value: StartKind; label: string }[] = [
+  { value: "default", label: "The vehicle's default gains" },
+  { value: "simplex", label: "Best gains on the model (simplex)" },
+  { value: "given", label: "Gains of my own" },
+];
+
+function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
+  const [form, setForm] = useState<CampaignForm>(() => startingForm(catalogue));
+  const navigate = useNavigate();
+  const create = useCreateCampaign();
+  const { plain, advanced } = fieldsOf(form, catalogue);
+  const reasons = reasonsByField(problemOf(create.error), [...plain, ...advanced]);
+  const [opened, setOpened] = useState<string | null>(null);
+  const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
+  const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
+  const strategy = catalogue.strategies.find(({ name }) => name === form.strategy);
+  return (
+    <form
+      noValidate
+      className={classes["form"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        create.mutate(requestFrom(form, catalogue), { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
+      }}
+    >
+      <VehiclePicker
+        kinds={catalogue.vehicle_kinds}
+        value={form.vehicle}
+        error={reasons["vehicle.kind"]}
+        onChange={(vehicle) => setForm(withVehicle(form, catalogue, vehicle))}
+      />
+      <TextInput
+        label="Name"
+        value={form.name}
+        maxLength={120}
+        error={reasons["name"]}
+        onChange={(event) => set({ name: event.currentTarget.value })}
+      />
+      <div className={classes["pair"]}>
+        <Select
+          label="Start from"
+          data={STARTS}
+          value={form.start}
+          allowDeselect={false}
+          error={reasons["start.kind"]}
+          onChange={(value) => set({ start: (value ?? "default") as StartKind })}
+        />
+        <Select
+          label="Strategy"
+          description={strategy?.line}
+          inputWrapperOrder={["label", "input", "description", "error"]}
+          data={catalogue.strategies.map(({ name, title }) => ({ value: name, label: title }))}
+          value={form.strategy}
+          allowDeselect={false}
+          error={reasons["strategy"]}
+          onChange={(value) => set({ strategy: value ?? "gradient", strategyOptions: {} })}
+        />
+      </div>
+      {form.start === "given" && (
+        <fieldset className={classes["gains"]}>
+          <legend>Start gains</legend>
+          {gainsOf(catalogue).map((gain) => (
+            <Entry
+              key={gain.name}
+              label={gain.name}
+              description={`${gain.lower} … ${gain.upper} ${gain.unit}`}
+              value={form.startGains[gain.name] ?? ""}
+              error={reasons[`start.gains.${gain.name}`]}
+              onChange={(value) => set({ startGains: { ...form.startGains, [gain.name]: value } })}
+            />
+          ))}
+        </fieldset>
+      )}
+      <Accordion
+        variant="contained"
+        chevronPosition="left"
+        value={refusedBelow ? "advanced" : opened}
+        onChange={setOpened}
+      >
+        <Accordion.Item value="advanced">
+          <Accordion.Control mih={56}>Advanced: stop rule, bounds, vehicle settings, seed</Accordion.Control>
+          <Accordion.Panel>
+            <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
+          </Accordion.Panel>
+        </Accordion.Item>
+      </Accordion>
+      <Trouble error={create.error} shown={[...plain, ...advanced]} />
+      <Button
+        type="submit"
+        size="lg"
+        loading={create.isPending}
+        leftSection={<IconPlus size={22} aria-hidden />}
+        className={classes["create"]}
+      >
+        Create campaign
+      </Button>
+    </form>
+  );
+}
