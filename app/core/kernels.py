@@ -28,17 +28,18 @@ def _cache_folder() -> Path:
     return Path(_NUMBA["CACHE_DIR"] or own) / f"kernels-{digest.hexdigest()[:16]}"
 
 
-def _use_cache(folder: Path) -> bool:
+def _use_cache() -> bool:
     """Point numba to the folder; False where nothing can be kept, and every process compiles for itself."""
     try:
+        folder = _cache_folder()
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # not writable; no home
         return False
     _NUMBA["CACHE_DIR"] = str(folder)
     return os.access(folder, os.W_OK)
 
 
-_CACHE: Final = _use_cache(_cache_folder())
+_CACHE: Final = _use_cache()
 
 
 def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:

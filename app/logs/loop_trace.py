@@ -3,6 +3,7 @@
 import csv
 import gzip
 import io
+import re
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from app.core.errors import InputError, Problem
 
 COLUMNS: Final = ("step", *INPUTS[:7], "zdd", *INPUTS[7:], *OUTPUTS)
 MAX_ROWS: Final = 1_000_000
+_INTEGER: Final = re.compile(r"[+-]?[0-9]{1,19}")
 
 _HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row for each 1/512 s, whole numbers of 32 bits."
 
@@ -67,10 +69,9 @@ def _value(name: str, line: int, column: str, text: str) -> int:
         if text not in MODES:
             raise _malformed(name, line, column, f"must be one of {', '.join(MODES)}, got {text!r}")
         return MODES[text]
-    try:
-        value = int(text)
-    except ValueError as error:
-        raise _malformed(name, line, column, f"must be a whole number, got {text!r}") from error
+    if not _INTEGER.fullmatch(text):
+        raise _malformed(name, line, column, f"must be a whole number, got {text[:40]!r}")
+    value = int(text)
     low, high = (0, 1) if column == "in_flight" else (INT32_MIN, INT32_MAX)
     if not low <= value <= high:
         raise _malformed(name, line, column, f"must lie in {low} … {high}, got {value}")

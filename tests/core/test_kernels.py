@@ -38,7 +38,16 @@ def test_a_cache_folder_of_the_operators_choice_is_used(tmp_path: Path) -> None:
 def test_where_nothing_can_be_kept_kernels_are_compiled_for_each_process(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
-    assert not kernels._use_cache(blocked / "kernels")
+    kept = output(NUMBA_DISABLE_JIT="0")
+    assert output(NUMBA_DISABLE_JIT="0", NUMBA_CACHE_DIR=str(blocked / "kernels")) == kept
+
+
+def test_a_user_without_a_home_gets_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(kernels, "_cache_folder", homeless)
+    assert not kernels._use_cache()
 
 
 def test_each_state_of_the_sources_has_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,6 +42,7 @@ def test_columns_are_found_by_name_in_any_order(tmp_path: Path) -> None:
         ((HEADER + ",extra", ROW + ",0"), "line 1, extra: column is unknown"),
         ((HEADER, ROW, ROW.replace("283", "28.3")), "line 3, kp: must be a whole number, got '28.3'"),
         ((HEADER, ROW.replace("768", "")), "line 2, target: must be a whole number, got ''"),
+        ((HEADER, ROW.replace("768", "7_68")), "line 2, target: must be a whole number, got '7_68'"),
         ((HEADER, ROW.replace("alt", "hover")), "line 2, mode: must be one of throttle, alt, climb, got 'hover'"),
         ((HEADER, ROW.replace("16384,0", "16384,2")), "line 2, in_flight: must lie in 0 … 1, got 2"),
         ((HEADER, ROW.replace("283", "2147483648")), "line 2, kp: must lie in -2147483648 … 2147483647"),
