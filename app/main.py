@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
-from app.api import catalogue, errors, events
+from app.api import catalogue, errors, events, figures
 from app.api.headers import HeadersMiddleware
 from app.api.openapi import describe
 from app.campaigns.router import router as campaigns
@@ -45,7 +45,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.database = database
-    for router in (catalogue.router, campaigns, trials, records, fleet, jobs, events.router):
+    for router in (catalogue.router, campaigns, trials, records, fleet, jobs, figures.router, events.router):
         app.include_router(router)
     errors.install(app)
     describe(app)

@@ -18,7 +18,7 @@ _CHUNK_BYTES: Final = 2**18
 _RAW: Final = frozenset({"text/csv", "application/csv", "text/plain", "application/octet-stream"})
 
 REQUEST_BODY: Final = {"requestBody": {"required": True, "content": {
-    "text/csv": {"schema": {"type": "string"}},
+    "text/csv": {"schema": {"type": "string", "format": "binary"}},
     "multipart/form-data": {"schema": {
         "type": "object", "required": ["file"], "properties": {"file": {"type": "string", "format": "binary"}}}},
 }}}

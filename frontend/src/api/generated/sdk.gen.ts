@@ -309,18 +309,6 @@ export const cancelJob = <ThrowOnError extends boolean = false>(options: Options
 export const retryJob = <ThrowOnError extends boolean = false>(options: Options<RetryJobData, ThrowOnError>): RequestResult<RetryJobResponses, RetryJobErrors, ThrowOnError> => (options.client ?? client).post<RetryJobResponses, RetryJobErrors, ThrowOnError>({ url: '/api/jobs/{job_id}/retry', ...options });
 
 /**
- * Events
- *
- * Follow everything that happens.
- *
- * `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
- * entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
- * server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
- * flight and `worker` tells when the worker comes or goes; these carry no id and may be dropped for a slow client.
- */
-export const events = <ThrowOnError extends boolean = false>(options?: Options<EventsData, ThrowOnError, unknown>): Promise<ServerSentEventsResult<EventsResponses>> => (options?.client ?? client).sse.get<EventsResponses, EventsErrors, ThrowOnError>({ url: '/api/events', ...options });
-
-/**
  * Get Campaign Figure
  *
  * All takeoffs over the set point, the error of each flight, or the gains of each flight.
@@ -333,3 +321,15 @@ export const getCampaignFigure = <ThrowOnError extends boolean = false>(options:
  * One flight by itself, with its prediction and its commands.
  */
 export const getFlightFigure = <ThrowOnError extends boolean = false>(options: Options<GetFlightFigureData, ThrowOnError>): RequestResult<GetFlightFigureResponses, GetFlightFigureErrors, ThrowOnError> => (options.client ?? client).get<GetFlightFigureResponses, GetFlightFigureErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/figure', ...options });
+
+/**
+ * Events
+ *
+ * Follow everything that happens.
+ *
+ * `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
+ * entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
+ * server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
+ * flight and `worker` tells when the worker comes or goes; these carry no id and may be dropped for a slow client.
+ */
+export const events = <ThrowOnError extends boolean = false>(options?: Options<EventsData, ThrowOnError, unknown>): Promise<ServerSentEventsResult<EventsResponses>> => (options?.client ?? client).sse.get<EventsResponses, EventsErrors, ThrowOnError>({ url: '/api/events', ...options });

@@ -1024,7 +1024,7 @@ export type Proposal = {
     /**
      * Kind
      */
-    kind: 'start' | 'step' | 'shorter step' | 'none';
+    kind: 'start' | 'step' | 'shorter step' | 'manual' | 'none';
     /**
      * Recommended
      */
@@ -1109,7 +1109,7 @@ export type Release = {
 /**
  * Sort
  *
- * Orders of the list of campaigns.
+ * Orders of the list of campaigns; `error` begins with the lowest best error.
  */
 export type Sort = '-created' | 'created' | '-updated' | 'name' | 'error';
 
@@ -2812,35 +2812,6 @@ export type RetryJobResponses = {
 
 export type RetryJobResponse = RetryJobResponses[keyof RetryJobResponses];
 
-export type EventsData = {
-    body?: never;
-    headers?: {
-        /**
-         * Last-Event-Id
-         */
-        'last-event-id'?: string | null;
-    };
-    path?: never;
-    query?: never;
-    url: '/api/events';
-};
-
-export type EventsErrors = {
-    /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
-     */
-    default: Problem;
-};
-
-export type EventsError = EventsErrors[keyof EventsErrors];
-
-export type EventsResponses = {
-    /**
-     * Successful Response
-     */
-    200: unknown;
-};
-
 export type GetCampaignFigureData = {
     body?: never;
     path: {
@@ -2918,3 +2889,32 @@ export type GetFlightFigureResponses = {
 };
 
 export type GetFlightFigureResponse = GetFlightFigureResponses[keyof GetFlightFigureResponses];
+
+export type EventsData = {
+    body?: never;
+    headers?: {
+        /**
+         * Last-Event-Id
+         */
+        'last-event-id'?: string | null;
+    };
+    path?: never;
+    query?: never;
+    url: '/api/events';
+};
+
+export type EventsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type EventsError = EventsErrors[keyof EventsErrors];
+
+export type EventsResponses = {
+    /**
+     * Successful Response
+     */
+    200: unknown;
+};

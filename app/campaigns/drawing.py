@@ -1,0 +1,168 @@
+"""What the figures need, gathered from storage as plain data."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Final, Literal, cast
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.definitions import definition_of
+from app.campaigns.proposing import is_stale
+from app.core.experiments import get_experiment
+from app.core.trajectory import CHANNEL_UNITS, Trajectory
+from app.db.models import CampaignRow, TrialRow
+from app.figures import CAMPAIGN_FIGURES
+from app.figures.base import Card, card_of
+from app.figures.flight import FlightFigure, FlightRecordData
+from app.figures.history import Curve, FlightData, History, NextFlight, Outcome
+from app.figures.theme import ThemeName
+from app.trials import history
+from app.trials import service as trials_service
+from app.trials.states import TrialState
+
+FULL_RECORDS: Final = 30
+"""With more flights than this, all but the best and the latest are drawn from their coarse copies."""
+
+_TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude"}
+_INPUTS: Final[Mapping[str, str]] = {"thrust": "Thrust", "feed_forward": "Feed-forward", "feedback": "Feedback"}
+_UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
+
+
+def campaign_figure(
+    session: Session, campaign_id: int, name: Literal["takeoffs", "errors", "gains"], theme: ThemeName
+) -> Card:
+    """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
+    return card_of(CAMPAIGN_FIGURES[name](history_of(session, campaign_id, curves=name == "takeoffs"), theme))
+
+
+def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
+    """The figure of one flight. Raises NotFoundError for an unknown trial."""
+    campaign_id = trials_service.get_trial(session, trial_id).campaign_id
+    trials = history.trials_of(session, campaign_id)
+    row = next(row for row in trials if row.id == trial_id)
+    return card_of(FlightFigure(_flight_record(session, row, trials), theme))
+
+
+def history_of(session: Session, campaign_id: int, *, curves: bool) -> History:
+    """The campaign as its figures see it; without `curves` no record is read."""
+    campaign = repository.get_one(session, campaign_id)
+    definition = definition_of(campaign)
+    experiment = get_experiment(definition.experiment)
+    rows = history.trials_of(session, campaign_id)
+    flown = [row for row in rows if row.state in history.FLOWN]
+    drawn = _curves(session, flown, experiment.output) if curves else {}
+    set_point, reference = _goal(experiment.name)
+    return History(
+        output_title=_TITLES.get(experiment.output, experiment.output),
+        output_unit=CHANNEL_UNITS[experiment.output],
+        error_unit=experiment.error_unit,
+        gains=experiment.space.gains,
+        set_point=set_point,
+        reference=reference,
+        flights=tuple(
+            FlightData(
+                number=row.number,
+                gains=row.gains,
+                outcome=cast("Outcome", row.state.value),
+                curve=drawn.get(row.id),
+                error=row.error,
+                predicted_error=row.predicted_error,
+            )
+            for row in flown
+        ),
+        proposal=_next_flight(session, campaign, rows, experiment.output),
+        stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
+    )
+
+
+def _curves(session: Session, flown: Sequence[TrialRow], output: str) -> dict[int, Curve]:
+    """The scored output of each flight that left a record, by trial."""
+    recorded = {row.id: row for row in flown if row.trajectory_id is not None}
+    best = history.best_of(flown)
+    whole = (
+        recorded
+        if len(recorded) <= FULL_RECORDS
+        else {row.id: row for row in (best, flown[-1]) if row is not None and row.id in recorded}
+    )
+    records = history.trajectories_of(
+        session, [row.trajectory_id for row in whole.values() if row.trajectory_id is not None]
+    )
+    return {
+        identity: _curve(records[row.trajectory_id], output)
+        if identity in whole and row.trajectory_id is not None
+        else _coarse(row)
+        for identity, row in recorded.items()
+    }
+
+
+def _curve(trajectory: Trajectory, channel: str) -> Curve:
+    return Curve(trajectory.time_s, trajectory[channel])
+
+
+def _coarse(row: TrialRow) -> Curve:
+    points = np.array(row.curve or [], dtype=np.float64).reshape(-1, 2)
+    return Curve(points[:, 0], points[:, 1])
+
+
+@lru_cache
+def _goal(experiment_name: str) -> tuple[Curve, Curve | None]:
+    """Set point and reference of an experiment; the reference is the same whatever the gains."""
+    experiment = get_experiment(experiment_name)
+    grid = experiment.grid_s
+    model = experiment.simulate(experiment.space.default, experiment.nominal_model)
+    reference = Curve(model.time_s, model["reference_m"]) if "reference_m" in model.channels else None
+    return Curve(grid, experiment.set_point(grid)), reference
+
+
+def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow], output: str) -> NextFlight | None:
+    """The trial that is planned or in the air, else the proposal for the one after the last."""
+    planned = next((row for row in rows if row.state in _UNFLOWN), None)
+    if planned is not None:
+        return NextFlight(
+            number=planned.number,
+            gains=planned.gains,
+            predicted_error=planned.predicted_error,
+            curve=_predicted(session, planned.proposal_id, output),
+        )
+    proposal = repository.latest_proposal(session, campaign.id)
+    if proposal is None or campaign.outcome is not None or is_stale(campaign, proposal, rows):
+        return None
+    return NextFlight(
+        number=max((row.number for row in rows), default=0) + 1,
+        gains=proposal.gains,
+        predicted_error=proposal.predicted_error,
+        curve=_predicted(session, proposal.id, output),
+    )
+
+
+def _predicted(session: Session, proposal_id: int | None, output: str) -> Curve | None:
+    proposal = None if proposal_id is None else repository.get_proposal_or_none(session, proposal_id)
+    if proposal is None or proposal.predicted_id is None:
+        return None
+    return _curve(history.trajectory_of(session, proposal.predicted_id), output)
+
+
+def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
+    campaign = repository.get_one(session, row.campaign_id)
+    experiment = get_experiment(campaign.experiment)
+    set_point, reference = _goal(experiment.name)
+    record = None if row.trajectory_id is None else history.trajectory_of(session, row.trajectory_id)
+    best = history.best_of(trials)
+    other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
+    channels = {} if record is None else record.channels
+    return FlightRecordData(
+        number=row.number,
+        output_title=_TITLES.get(experiment.output, experiment.output),
+        output_unit=CHANNEL_UNITS[experiment.output],
+        set_point=set_point,
+        reference=reference,
+        curve=None if record is None else _curve(record, experiment.output),
+        predicted=_predicted(session, row.proposal_id, experiment.output),
+        best=None if other is None else _curve(history.record_of(session, other), experiment.output),
+        best_number=None if other is None else other.number,
+        inputs={
+            title: _curve(record, name) for name, title in _INPUTS.items() if record is not None and name in channels
+        },
+    )
