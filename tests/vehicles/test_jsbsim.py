@@ -1,4 +1,6 @@
 import math
+import subprocess
+import sys
 from collections.abc import Mapping
 
 import numpy as np
@@ -152,6 +154,39 @@ def test_a_vehicle_too_heavy_for_its_motors_is_refused_by_name() -> None:
 def test_gains_that_throw_it_about_still_leave_a_finite_record() -> None:
     flight = flown("jsbsim", {}, {"kp": 4000, "ki": 2000, "kd": 0})
     assert np.isfinite(flight["altitude_m"]).all()
+
+
+THREADS = """
+import threading
+from app.vehicles.jsbsim.flight import new_aircraft
+
+def step() -> None:
+    aircraft = new_aircraft()
+    for _ in range(200):
+        aircraft.run()
+
+def keep_busy() -> None:
+    while not over.is_set():
+        [object() for _ in range(1000)]
+
+over = threading.Event()
+busy = threading.Thread(target=keep_busy)
+busy.start()
+for _ in range(30):
+    threads = [threading.Thread(target=step) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+over.set()
+busy.join()
+"""
+
+
+def test_jsbsim_in_threads_that_end_neither_kills_the_process_nor_writes_to_the_terminal() -> None:
+    """A process of its own: JSBSim 1.3.3 ends it when a thread with a Python logger goes, and prints when left alone."""
+    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_jsbsim_writes_nothing_to_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:

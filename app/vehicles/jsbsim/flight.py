@@ -4,7 +4,6 @@ The aircraft file holds attitude, heading and horizontal position by itself, so 
 three numbers out (altitude, sink rate, tilt) and one in (thrust).
 """
 
-import logging
 import math
 from pathlib import Path
 from typing import Final
@@ -38,49 +37,15 @@ _SETTLING_STEPS: Final = 200
 _GUST_CORRELATION_S: Final = 1.0
 _FULL_BATTERY_V: Final = 11.1
 
-_log = logging.getLogger(__name__)
-
-
-class _Logger(jsbsim.FGLogger):
-    """JSBSim's messages into Python's log instead of standard output; banners and echoes are dropped."""
-
-    _LEVELS: Final = {
-        jsbsim.LogLevel.WARN: logging.WARNING,
-        jsbsim.LogLevel.ERROR: logging.ERROR,
-        jsbsim.LogLevel.FATAL: logging.CRITICAL,
-    }
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._level: int | None = None
-        self._text = ""
-
-    def set_level(self, level: jsbsim.LogLevel) -> None:
-        self._level = self._LEVELS.get(level)
-        self._text = ""
-
-    def file_location(self, filename: str, line: int) -> None:
-        self._text += f"{filename}:{line}: "
-
-    def message(self, message: str) -> None:
-        self._text += message
-
-    def format(self, format: jsbsim.LogFormat) -> None:  # noqa: A002
-        """Colours say nothing here."""
-
-    def flush(self) -> None:
-        if self._level is not None:
-            _log.log(self._level, "JSBSim: %s", self._text.strip())
-
 
 def new_aircraft() -> jsbsim.FGFDMExec:
     """The AR.Drone 2 of the aircraft file, standing on its springs at 52° north, sea level, at 512 Hz; no wind.
 
-    Raises VehicleError when JSBSim cannot load it.
+    Raises VehicleError when JSBSim cannot load it. JSBSim is silenced by its own switch, not by a logger of ours: it
+    keeps a logger for each thread and lets go of it after Python has left the thread, which ends the process.
     """
-    jsbsim.set_logger(_Logger())
+    jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # JSBSim's own gap in its types
     fdm = jsbsim.FGFDMExec(str(_ROOT))
-    fdm.set_debug_level(0)
     fdm.set_aircraft_path("aircraft")
     if not fdm.load_model(_AIRCRAFT):
         raise VehicleError("JSBSim could not load the simulated vehicle.", hint="Install the program again.")
