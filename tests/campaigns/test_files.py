@@ -7,7 +7,6 @@ import pytest
 
 from app.campaigns.files import check_campaign, preset_names, read_campaign_file, read_preset
 from app.errors import InputError, NotFoundError
-from app.vehicles.open import VEHICLE_KINDS
 
 
 def written(tmp_path: Path, text: str) -> Path:
@@ -76,9 +75,3 @@ def test_the_documented_example_holds_the_defaults_and_names_every_field(tmp_pat
     default, _ = check_campaign(read_campaign_file(written(tmp_path, "name: x\n")))
     assert replace(documented, options={}, bounds={}) == default
     assert [field.name for field in fields(documented) if f"  {field.name}: " not in example.replace(":\n", ": ")] == []
-
-
-def test_every_vehicle_option_is_documented() -> None:
-    named = {(kind.name, option.name) for kind in VEHICLE_KINDS.values() for option in kind.options}
-    rows = [row.split("|") for row in DOCUMENT.splitlines() if row.startswith("| ") and "`" in row]
-    assert {(row[1].strip(), row[2].split("`")[1]) for row in rows} == named
