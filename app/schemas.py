@@ -2,7 +2,7 @@
 
 from typing import Annotated, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 T = TypeVar("T")
 
@@ -12,8 +12,12 @@ OptionValue = bool | int | float | str
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite JSON number: no text that looks like one, no NaN, no infinity."""
 
+Gains = dict[str, int | float]
+"""Gains by name; whole numbers where the controller takes counts."""
+
 Text = Annotated[str, Field(max_length=2000)]
-Name = Annotated[str, Field(min_length=1, max_length=120, pattern=r"\S", examples=["AR.Drone takeoff"])]
+Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120)]
+Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
 Version = Annotated[int, Field(ge=1, strict=True, description="the version that was edited, as last read")]
 
 

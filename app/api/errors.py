@@ -13,35 +13,46 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from app.errors import (
+    BusyError,
     ConflictError,
     GainlineError,
+    GainsError,
     InputError,
+    KeyReusedError,
     MediaTypeError,
     NotFoundError,
     StorageError,
     TooLargeError,
+    TrajectoryError,
 )
 from app.live.client import LinkDownError
 from app.schemas import Problem, ProblemField
 
 MEDIA_TYPE: Final = "application/problem+json"
 
-_STATUS: Final[Mapping[type[GainlineError], HTTPStatus]] = {
-    NotFoundError: HTTPStatus.NOT_FOUND,
-    ConflictError: HTTPStatus.CONFLICT,
-    TooLargeError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-    MediaTypeError: HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
-    InputError: HTTPStatus.UNPROCESSABLE_ENTITY,
-    StorageError: HTTPStatus.SERVICE_UNAVAILABLE,
-    LinkDownError: HTTPStatus.SERVICE_UNAVAILABLE,
-    GainlineError: HTTPStatus.INTERNAL_SERVER_ERROR,
+_KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
+    NotFoundError: (HTTPStatus.NOT_FOUND, "Not found"),
+    BusyError: (HTTPStatus.CONFLICT, "Vehicle busy"),
+    ConflictError: (HTTPStatus.CONFLICT, "Conflict"),
+    TooLargeError: (HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "Too large"),
+    MediaTypeError: (HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "Unsupported type"),
+    KeyReusedError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Key reused"),
+    GainsError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Gains refused"),
+    TrajectoryError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable record"),
+    InputError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable input"),
+    StorageError: (HTTPStatus.SERVICE_UNAVAILABLE, "Storage trouble"),
+    LinkDownError: (HTTPStatus.SERVICE_UNAVAILABLE, "Worker out of reach"),
+    GainlineError: (HTTPStatus.INTERNAL_SERVER_ERROR, "Error"),
 }
+"""Status and title; a class without its own has those of the nearest above it."""
 
-_HINTS: Final[Mapping[int, str]] = {
-    404: "Check the address; the paths of the API are listed in /api/openapi.json.",
-    405: "This address knows other methods; they are listed in /api/openapi.json.",
-    413: "Send less at once: a JSON body has at most 1 MiB, a flight record at most 200 000 rows.",
+_HTTP: Final[Mapping[int, tuple[str, str]]] = {
+    404: ("There is nothing at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
+    405: ("{path} does not know the method {method}.", "The methods of each path are listed in /api/openapi.json."),
+    413: ("The request is too large; nothing was stored.",
+          "A JSON body has at most 1 MiB, a flight record at most 200 000 rows and 48 MiB."),
 }
+"""What the framework refuses by itself."""
 
 RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
     "default": {
@@ -63,14 +74,14 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _unforeseen)
 
 
-def status_of(error: GainlineError) -> HTTPStatus:
-    """The status of the nearest class that has one."""
-    return next(_STATUS[kind] for kind in type(error).__mro__ if kind in _STATUS)
+def kind_of(error: GainlineError) -> tuple[HTTPStatus, str]:
+    """Status and title of the nearest class that has them."""
+    return next(_KINDS[kind] for kind in type(error).__mro__ if kind in _KINDS)
 
 
 def _problem(status: int, detail: str, hint: str, problems: Iterable[ProblemField] = (), *,
-             kind: str = "about:blank", title: str | None = None,
-             headers: Mapping[str, str] | None = None) -> JSONResponse:
+             title: str = "", headers: Mapping[str, str] | None = None) -> JSONResponse:
+    kind = f"urn:gainline:{title.lower().replace(' ', '-')}" if title else "about:blank"
     body = Problem(type=kind, title=title or HTTPStatus(status).phrase, status=status, detail=detail, hint=hint,
                    problems=list(problems))
     return JSONResponse(body.model_dump(), status, headers, media_type=MEDIA_TYPE)
@@ -78,37 +89,35 @@ def _problem(status: int, detail: str, hint: str, problems: Iterable[ProblemFiel
 
 async def _own_error(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, GainlineError)
-    name = type(error).__name__.removesuffix("Error")
-    words = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in name).strip()
-    return _problem(status_of(error), error.message, error.hint,
+    status, title = kind_of(error)
+    return _problem(status, error.message, error.hint,
                     [ProblemField(field=problem.field, reason=problem.reason) for problem in error.problems],
-                    kind=f"urn:gainline:{words.replace(' ', '-')}", title=words.capitalize())
+                    title=title)
 
 
 async def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    problems = [ProblemField(field=_field(found["loc"]), reason=_reason(found)) for found in error.errors()]
+    problems = [_refused(found) for found in error.errors()]
     return _problem(HTTPStatus.UNPROCESSABLE_ENTITY, "The request has fields that cannot be used; nothing was changed.",
-                    "Correct the named fields and send the request again.", problems,
-                    kind="urn:gainline:input", title="Input")
+                    "Correct the named fields and send the request again.", problems, title="Unusable input")
 
 
-def _field(location: tuple[str | int, ...]) -> str:
-    """Dotted as the caller wrote it: without the part of the request, unless there is nothing else."""
-    return ".".join(map(str, location[1:] if len(location) > 1 else location))
-
-
-def _reason(found: Mapping[str, Any]) -> str:
+def _refused(found: Mapping[str, Any]) -> ProblemField:
+    """The field dotted as the caller wrote it: without the part of the request, unless there is nothing else."""
+    part, *inner = found["loc"]
     if found["type"] == "json_invalid":
-        return f"the body is not JSON ({found.get('ctx', {}).get('error', 'cannot be read')} at this character)"
+        return ProblemField(field="body", reason=f"is not JSON: {found['ctx']['error']}, at character {inner[0]}")
     text: str = found["msg"]
-    return text[:1].lower() + text[1:]
+    return ProblemField(field=".".join(map(str, inner or [part])), reason=text[:1].lower() + text[1:])
 
 
-async def _http_error(_request: Request, error: Exception) -> JSONResponse:
+async def _http_error(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
-    hint = _HINTS.get(error.status_code, "Correct the request and send it again.")
-    return _problem(error.status_code, str(error.detail), hint, headers=error.headers)
+    detail, hint = str(error.detail), "Correct the request and send it again."
+    if error.status_code in _HTTP:
+        sentence, hint = _HTTP[error.status_code]
+        detail = sentence.format(method=request.method, path=request.url.path)
+    return _problem(error.status_code, detail, hint, headers=error.headers)
 
 
 async def _system_error(request: Request, error: Exception) -> JSONResponse:

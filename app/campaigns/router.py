@@ -6,8 +6,7 @@ from fastapi import APIRouter, Depends, Query, status
 
 from app.api.deps import JSON_BYTES, Act, CursorText, Id, Limit, Reader, Writer, json_only
 from app.campaigns import service
-from app.campaigns.schemas import Campaign, CampaignEdit, CampaignSummary, Clone, Finish, NewCampaign, NextFlight
-from app.campaigns.service import Sort
+from app.campaigns.schemas import Campaign, CampaignEdit, CampaignSummary, Clone, Finish, NewCampaign, NextFlight, Sort
 from app.campaigns.states import CampaignState
 from app.schemas import Page
 

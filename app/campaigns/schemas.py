@@ -1,17 +1,28 @@
 """What campaigns and proposals look like from outside."""
 
 from datetime import datetime
+from enum import StrEnum
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
 from app.campaigns.states import CampaignState, Outcome
-from app.core.strategies.base import Explanation
+from app.core.strategies.base import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
-from app.schemas import Gate, Name, Number, OptionValue, Request, Text, Trouble, Version
+from app.schemas import Gains, Gate, Name, Number, OptionValue, Request, Text, Trouble, Version
 
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
 Key = Annotated[str, Field(max_length=40)]
+
+
+class Sort(StrEnum):
+    """Orders of the list of campaigns; `error` begins with the lowest best error."""
+
+    NEWEST = "-created"
+    OLDEST = "created"
+    LATELY_CHANGED = "-updated"
+    NAME = "name"
+    BEST_ERROR = "error"
 
 
 class Start(Request):
@@ -84,7 +95,7 @@ class BestTrial(BaseModel):
     trial_id: int
     trial_number: int
     error: float
-    gains: dict[str, float]
+    gains: Gains
 
 
 class FlyingTrial(BaseModel):
@@ -157,9 +168,9 @@ class CampaignSummary(BaseModel):
 class GainChange(BaseModel):
     """One gain now (of the best flight, else of the vehicle's safe gains) and next."""
 
-    now: float
-    next: float
-    delta: float
+    now: int | float
+    next: int | float
+    delta: int | float
 
 
 class StopVerdict(BaseModel):
@@ -176,9 +187,9 @@ class Proposal(BaseModel):
 
     id: int
     campaign_id: int
-    kind: Literal["start", "step", "shorter step", "none"]
+    kind: Kind
     recommended: Literal["step", "repeat", "baseline", "stop"]
-    gains: dict[str, float]
+    gains: Gains
     changes: dict[str, GainChange]
     predicted_error: float | None
     explanation: Explanation

@@ -5,14 +5,26 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any, Final, Literal
 
-from sqlalchemy import JSON, CheckConstraint, Enum, ForeignKey, Index, LargeBinary, MetaData, UniqueConstraint, text
+from sqlalchemy import (
+    JSON,
+    CheckConstraint,
+    Enum,
+    ForeignKey,
+    Index,
+    LargeBinary,
+    MetaData,
+    String,
+    UniqueConstraint,
+    text,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 from app.campaigns.states import CampaignState, Outcome
+from app.core.strategies.base import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
 from app.fleet.states import VehicleState
 from app.jobs.states import JobState
-from app.trials.states import UNDER_WAY, FlightState, TrialState
+from app.trials.states import UNDER_WAY, FlightState, TrialKind, TrialState
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
 JsonObject = dict[str, Any]
@@ -28,11 +40,16 @@ NAMING: Final = {
 }
 
 
+_JSON: Final = JSON(none_as_null=True)
+_NEVER_REUSE_IDS: Final = {"sqlite_autoincrement": True}
+"""Else SQLite gives a deleted row's id to the next one, and an open page would show somebody else's."""
+
+
 class Base(DeclarativeBase):
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
-        datetime: UtcDateTime, JsonObject: JSON, GainsJson: JSON, OptionsJson: JSON,
-        list[str]: JSON, list[list[float]]: JSON,
+        datetime: UtcDateTime, JsonObject: _JSON, GainsJson: _JSON, OptionsJson: _JSON,
+        list[str]: _JSON, list[list[float]]: _JSON,
     }
 
 
@@ -61,7 +78,7 @@ class VehicleRow(Base, Reported):
     """Something that can fly a trial. A simulation's settings stand in each campaign, the row is shared by all."""
 
     __tablename__ = "vehicle"
-    __table_args__ = (_state_check(VehicleState),)
+    __table_args__ = (_state_check(VehicleState), _NEVER_REUSE_IDS)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     kind: Mapped[str] = mapped_column(unique=True)
@@ -84,6 +101,7 @@ class CampaignRow(Base, Reported):
         _state_check(CampaignState),
         _state_check(Outcome, column="outcome"),
         Index("ix_campaign_updated_at_id", "updated_at", "id"),
+        _NEVER_REUSE_IDS,
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -112,6 +130,7 @@ class TrajectoryRow(Base):
     """One recorded or predicted flight, packed by `app.trials.codec`. Written once; the database refuses changes."""
 
     __tablename__ = "trajectory"
+    __table_args__ = (_NEVER_REUSE_IDS,)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     codec: Mapped[int]
@@ -134,6 +153,7 @@ class TrialRow(Base, Reported):
         CheckConstraint("state != 'valid' OR error IS NOT NULL", name="valid_is_scored"),
         UniqueConstraint("campaign_id", "number"),
         Index("ix_trial_campaign_id_state_error", "campaign_id", "state", "error"),
+        _NEVER_REUSE_IDS,
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -141,7 +161,7 @@ class TrialRow(Base, Reported):
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"))
     number: Mapped[int]
     state: Mapped[TrialState] = mapped_column(_state_type(TrialState))
-    kind: Mapped[str]
+    kind: Mapped[TrialKind] = mapped_column(String)
     gains: Mapped[GainsJson]
     read_back: Mapped[GainsJson | None]
     proposal_id: Mapped[int | None] = mapped_column(ForeignKey("proposal.id", ondelete="SET NULL"), index=True)
@@ -175,6 +195,7 @@ class FlightRow(Base, Reported):
         _state_check(FlightState),
         Index("uq_flight_vehicle_under_way", "vehicle_id", unique=True, sqlite_where=text(_UNDER_WAY_SQL),
               postgresql_where=text(_UNDER_WAY_SQL)),
+        _NEVER_REUSE_IDS,
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -189,7 +210,6 @@ class FlightRow(Base, Reported):
     problem: Mapped[str] = mapped_column(default="")
     requested_at: Mapped[datetime] = mapped_column(default=utc_now)
     claimed_at: Mapped[datetime | None]
-    heartbeat_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
     trial: Mapped[TrialRow] = relationship()
@@ -203,11 +223,12 @@ class ProposalRow(Base, Reported):
     """What a strategy proposed from one history; stale as soon as the campaign's history has another digest."""
 
     __tablename__ = "proposal"
+    __table_args__ = (_NEVER_REUSE_IDS,)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     history_digest: Mapped[str]
-    kind: Mapped[str]
+    kind: Mapped[ProposalKind] = mapped_column(String)
     gains: Mapped[GainsJson]
     predicted_error: Mapped[float | None]
     predicted_id: Mapped[int | None] = mapped_column(ForeignKey("trajectory.id"), unique=True)
@@ -226,7 +247,7 @@ class JobRow(Base, Reported):
     """Numeric work in waiting, running or done. `lease_until` passes when its worker falls silent."""
 
     __tablename__ = "job"
-    __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"))
+    __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"), _NEVER_REUSE_IDS)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     kind: Mapped[str]
@@ -248,10 +269,10 @@ class JobRow(Base, Reported):
 
 
 class EventRow(Base):
-    """The outbox: what changed, in the order in which it changed. An id is never used twice."""
+    """The outbox: what changed, in the order in which it changed."""
 
     __tablename__ = "event"
-    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012 - SQLAlchemy reads it from the class
+    __table_args__ = (_NEVER_REUSE_IDS,)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     topic: Mapped[str]

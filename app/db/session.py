@@ -23,8 +23,11 @@ _BUSY_TIMEOUT_MS: Final = 5000
 _BEGIN: Final = "gainline_begin"
 
 
-def open_engine(database_file: Path) -> Engine:
-    """An engine on a SQLite file; nothing is opened before the first statement."""
+def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
+    """An engine on a SQLite file; nothing is opened before the first statement.
+
+    Without `foreign_keys` a migration can rebuild a table without deleting what refers to it.
+    """
     engine = create_engine(
         URL.create("sqlite+pysqlite", database=str(database_file)),
         connect_args={"check_same_thread": False},
@@ -32,6 +35,8 @@ def open_engine(database_file: Path) -> Engine:
         max_overflow=40,
     )
     event.listen(engine, "connect", _on_connect)
+    if not foreign_keys:
+        event.listen(engine, "connect", _without_foreign_keys)
     event.listen(engine, "begin", _on_begin)
     return engine
 
@@ -41,6 +46,10 @@ def _on_connect(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> 
     for pragma in ("journal_mode = WAL", "synchronous = NORMAL", "foreign_keys = ON",
                    f"busy_timeout = {_BUSY_TIMEOUT_MS}"):
         connection.execute(f"PRAGMA {pragma}")
+
+
+def _without_foreign_keys(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> None:
+    connection.execute("PRAGMA foreign_keys = OFF")
 
 
 def _on_begin(connection: Connection) -> None:

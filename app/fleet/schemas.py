@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from app.fleet.states import VehicleState
-from app.schemas import Name, OptionValue, Request
+from app.schemas import Gains, OptionValue, Reason, Request
 
 
 class VehicleChoice(Request):
@@ -38,7 +38,7 @@ class Vehicle(BaseModel):
     can_fly: bool
     state: VehicleState
     concern: str
-    safe_gains: dict[str, float]
+    safe_gains: Gains
     actions: Annotated[list[str], Field(description="what may be done with it now: fly, release")]
 
 
@@ -48,8 +48,8 @@ class GivenGains(BaseModel):
     flight_id: int
     campaign_id: int
     trial_id: int
-    asked: dict[str, float]
-    read_back: dict[str, float] | None
+    asked: Gains
+    read_back: Gains | None
     outcome: str
     asked_at: datetime | None
 
@@ -57,4 +57,4 @@ class GivenGains(BaseModel):
 class Release(Request):
     """Who has looked at the vehicle, and found what."""
 
-    statement: Name
+    statement: Reason

@@ -5,10 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.schemas import Gate, Number, Request, Text, Version
-from app.trials.states import FlightState, TrialState
+from app.schemas import Gains, Gate, Number, Reason, Request, Text, Version
+from app.trials.states import FlightState, TrialKind, TrialState
 
-Kind = Literal["start", "step", "shorter step", "repeat", "manual"]
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1000)]
 
 
@@ -39,7 +38,7 @@ class Classification(Request):
 
     version: Version
     outcome: Literal["valid", "aborted", "invalid"]
-    reason: Annotated[str, Field(min_length=1, max_length=500, pattern=r"\S")]
+    reason: Reason
 
 
 class Abort(Request):
@@ -83,9 +82,9 @@ class Trial(BaseModel):
     campaign_id: int
     number: int
     state: TrialState
-    kind: Kind
-    gains: dict[str, float]
-    read_back: dict[str, float] | None
+    kind: TrialKind
+    gains: Gains
+    read_back: Gains | None
     proposal_id: int | None
     error: float | None
     predicted_error: float | None

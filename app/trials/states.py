@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Final
+from typing import Final, Literal
+
+TrialKind = Literal["start", "step", "shorter step", "repeat", "manual"]
+"""Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, a person."""
 
 
 class TrialState(StrEnum):

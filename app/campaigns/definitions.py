@@ -1,0 +1,56 @@
+"""A campaign's definition on its way from a request to the core, into its row, and back."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Final
+
+from pydantic import TypeAdapter
+
+from app.campaigns.schemas import Definition as DefinitionIn
+from app.core.checking import check_definition
+from app.core.definition import Definition
+from app.core.errors import InputError, Problem
+from app.db.models import CampaignRow, JsonObject
+from app.fleet.schemas import VehicleChoice
+from app.vehicles.base import OptionValue
+from app.vehicles.open import check_options
+
+_ADAPTER: Final = TypeAdapter(Definition)
+
+
+def core_definition(asked: DefinitionIn) -> Definition:
+    """The same definition as the core has it, unchecked."""
+    return _ADAPTER.validate_python(asked.model_dump())
+
+
+def definition_of(row: CampaignRow) -> Definition:
+    """The definition of a stored campaign."""
+    return _ADAPTER.validate_python(row.definition)
+
+
+def stored(definition: Definition) -> JsonObject:
+    """For the row."""
+    return asdict(definition)
+
+
+def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definition, dict[str, OptionValue]]:
+    """Definition and complete vehicle options. Raises InputError naming everything that cannot be used in either."""
+    definition = core_definition(asked)
+    options: dict[str, OptionValue] = {}
+
+    def take_options() -> None:
+        options.update(check_options(vehicle.kind, vehicle.options, field="vehicle"))
+
+    problems = [*_refusals(lambda: check_definition(definition), "definition."), *_refusals(take_options, "")]
+    if problems:
+        raise InputError("This campaign cannot be used.", problems=tuple(problems),
+                         hint="Correct the named fields and send it again; nothing was changed.")
+    return definition, options
+
+
+def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:
+    try:
+        check()
+    except InputError as error:
+        return [Problem(prefix + problem.field, problem.reason) for problem in error.problems]
+    return []

@@ -1,0 +1,148 @@
+"""The next gain set: computed as a job from the stored history, stored with that history's digest, judged.
+
+For a worker: `read_history`, then `compute` (pure, in any process), then `store_proposal`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.definitions import definition_of
+from app.campaigns.states import MOVES, CampaignState, Outcome
+from app.core.definition import Definition, Flight
+from app.core.experiments import get_experiment
+from app.core.gate import Gate, check_policy
+from app.core.policy import PolicySpace
+from app.core.proposing import next_proposal
+from app.core.stopping import Reason, StopVerdict, verdict
+from app.core.strategies.base import Proposal
+from app.db.models import CampaignRow, ProposalRow, TrialRow
+from app.errors import ConflictError, NotFoundError
+from app.jobs import service as jobs
+from app.moves import check_move
+from app.trials import history
+from app.trials.lifecycle import cancel_planned
+
+PROPOSAL_JOB: Final = "proposal"
+_COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
+_OUTCOMES: Final[dict[Reason, Outcome]] = {
+    "flight budget": Outcome.BUDGET,
+    "not improving": Outcome.CONVERGED,
+    "nothing better on the line": Outcome.CONVERGED,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """All that a proposal is computed from. `digest` changes as soon as any of it does."""
+
+    campaign_id: int
+    definition: Definition
+    flights: tuple[Flight, ...]
+    digest: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computed:
+    """A proposal with the gate's word on it and the stop rule's."""
+
+    history_digest: str
+    proposal: Proposal
+    gate: Gate
+    stop_verdict: StopVerdict
+
+
+def read_history(session: Session, campaign_id: int) -> History:
+    """The campaign's definition and its flights with their trajectories as stored. Raises NotFoundError."""
+    row = repository.get_one(session, campaign_id)
+    definition = definition_of(row)
+    return History(campaign_id=campaign_id, definition=definition, flights=history.flights_of(session, campaign_id),
+                   digest=history.history_digest(definition.digest(), history.trials_of(session, campaign_id)))
+
+
+def compute(past: History) -> Computed:
+    """Pure: the same history gives the same answer. Takes up to a second; call it outside of any transaction."""
+    definition, flights = past.definition, past.flights
+    proposal = next_proposal(definition, flights)
+    return Computed(
+        history_digest=past.digest, proposal=proposal,
+        gate=check_policy(definition, get_experiment(definition.experiment), space_of(definition), proposal.gains,
+                          flights),
+        stop_verdict=verdict(definition.stop, [flight.error for flight in flights], proposal.kind))
+
+
+def store_proposal(session: Session, campaign_id: int, computed: Computed) -> ProposalRow:
+    """Store a proposal, and let it count: a draft becomes ready, a campaign whose rule says so is finished.
+
+    One from an outdated history is stored too, stale from the start, and counts for nothing. Raises NotFoundError when
+    the campaign has been deleted.
+    """
+    campaign = repository.get_one(session, campaign_id)
+    proposal = computed.proposal
+    predicted = None if proposal.predicted is None else history.store_trajectory(session, proposal.predicted)
+    row = ProposalRow(
+        campaign_id=campaign_id, history_digest=computed.history_digest, kind=proposal.kind, gains=proposal.gains,
+        predicted_error=proposal.predicted_error, predicted_id=None if predicted is None else predicted.id,
+        explanation=asdict(proposal.explanation), gate=gate_json(computed.gate),
+        stop_verdict=asdict(computed.stop_verdict))
+    session.add(row)
+    session.flush()
+    trials = history.trials_of(session, campaign_id)
+    if not is_stale(campaign, row, trials) and history.unclassed(trials) is None:
+        _let_count(campaign, trials, computed.stop_verdict)
+    return row
+
+
+def _let_count(campaign: CampaignRow, trials: Sequence[TrialRow], said: StopVerdict) -> None:
+    if campaign.state == CampaignState.DRAFT:
+        move_campaign(campaign, CampaignState.READY)
+    elif campaign.state == CampaignState.DECIDING and said.reason is not None:
+        end_campaign(campaign, trials, _OUTCOMES[said.reason], said.why)
+
+
+def request_proposal(session: Session, campaign: CampaignRow) -> None:
+    """The history has changed, or somebody wants the proposal anew: a job computes it."""
+    if campaign.state in _COMPUTED_IN:
+        jobs.enqueue_job(session, PROPOSAL_JOB, campaign_id=campaign.id)
+
+
+def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) -> ProposalRow:
+    """A proposal of this campaign that still holds. Raises NotFoundError, or ConflictError when it is stale."""
+    row = repository.get_proposal_or_none(session, proposal_id)
+    if row is None or row.campaign_id != campaign.id:
+        raise NotFoundError("proposal", proposal_id, hint="Ask for the campaign's proposal and use its id.")
+    if is_stale(campaign, row, history.trials_of(session, campaign.id)):
+        raise ConflictError(f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
+                            hint="Ask for the campaign's proposal again and decide on the new one.")
+    return row
+
+
+def is_stale(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
+    """Whether the campaign's history is no longer the one that the proposal was computed from."""
+    return row.history_digest != history.history_digest(definition_of(campaign).digest(), trials)
+
+
+def end_campaign(campaign: CampaignRow, trials: Sequence[TrialRow], outcome: Outcome,
+                 reason: str) -> None:
+    """Finish a campaign; what was only planned is cancelled."""
+    move_campaign(campaign, CampaignState.FINISHED)
+    campaign.outcome, campaign.stop_reason = outcome, reason
+    cancel_planned(trials, "the campaign was finished")
+
+
+def move_campaign(row: CampaignRow, to: CampaignState) -> None:
+    """Raises ConflictError when the states' table does not lead there."""
+    row.state = check_move(MOVES, row.state, to, f"Campaign {row.id}")
+
+
+def space_of(definition: Definition) -> PolicySpace:
+    """The gains that a campaign may choose from."""
+    return get_experiment(definition.experiment).space.narrowed(definition.bounds)
+
+
+def gate_json(gate: Gate) -> dict[str, object]:
+    """The gate's answer as it is stored."""
+    return {"passed": gate.passed, "checks": [asdict(check) for check in gate.checks]}

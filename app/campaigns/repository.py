@@ -1,0 +1,97 @@
+"""Queries on campaigns and proposals."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from sqlalchemy import ColumnElement, func, literal, select, tuple_
+from sqlalchemy.orm import Session
+
+from app.campaigns.schemas import Sort
+from app.campaigns.states import CampaignState
+from app.db.models import CampaignRow, ProposalRow, TrialRow, VehicleRow
+from app.db.paging import Position, instant
+from app.db.types import UtcDateTime
+from app.errors import NotFoundError
+from app.trials.states import TrialState
+
+_NO_ERROR: Final = 1e300
+"""Where campaigns without an error stand among the errors: last."""
+
+_BEST_ERROR: Final = func.coalesce(
+    select(func.min(TrialRow.error)).where(TrialRow.campaign_id == CampaignRow.id, TrialRow.state == TrialState.VALID)
+    .correlate(CampaignRow).scalar_subquery(), _NO_ERROR)
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What a list is sorted by; `kind` is the type of the value in a cursor."""
+
+    value: ColumnElement[datetime] | ColumnElement[str] | ColumnElement[float] | ColumnElement[int]
+    descending: bool
+    kind: type[str] | type[float]
+    is_time: bool = False
+
+
+_ORDERS: Final[Mapping[Sort, _Order]] = {
+    Sort.NEWEST: _Order(CampaignRow.id.expression, True, float),
+    Sort.OLDEST: _Order(CampaignRow.id.expression, False, float),
+    Sort.LATELY_CHANGED: _Order(CampaignRow.updated_at.expression, True, str, is_time=True),
+    Sort.NAME: _Order(func.lower(CampaignRow.name), False, str),
+    Sort.BEST_ERROR: _Order(_BEST_ERROR, False, float),
+}
+
+
+def cursor_kind(sort: Sort) -> type[str] | type[float]:
+    return _ORDERS[sort].kind
+
+
+def get_one(session: Session, campaign_id: int) -> CampaignRow:
+    """Raises NotFoundError."""
+    if (row := session.get(CampaignRow, campaign_id)) is None:
+        raise NotFoundError("campaign", campaign_id)
+    return row
+
+
+def page(session: Session, *, search: str, states: Collection[CampaignState], vehicles: Collection[str], sort: Sort,
+         after: Position | None, limit: int) -> tuple[list[tuple[CampaignRow, Position]], int]:
+    """The campaigns after that position, one more than `limit`, each with its own; and the number of all."""
+    wanted = _filters(search, states, vehicles)
+    total = session.scalar(select(func.count(CampaignRow.id)).join(CampaignRow.vehicle).where(*wanted)) or 0
+    order = _ORDERS[sort]
+    if after is not None:
+        value = literal(instant(after[0]), UtcDateTime()) if order.is_time else literal(after[0])
+        here, there = tuple_(order.value, CampaignRow.id), tuple_(value, literal(after[1]))
+        wanted.append(here < there if order.descending else here > there)
+    directed = (order.value.desc(), CampaignRow.id.desc()) if order.descending else (order.value, CampaignRow.id)
+    found = session.execute(select(CampaignRow, order.value).join(CampaignRow.vehicle).where(*wanted)
+                            .order_by(*directed).limit(limit + 1)).all()
+    return [(row, (_in_cursor(value), row.id)) for row, value in found], total
+
+
+def _in_cursor(value: object) -> str | float:
+    if isinstance(value, datetime):
+        return value.isoformat()
+    return value if isinstance(value, int | float) else str(value)
+
+
+def _filters(search: str, states: Collection[CampaignState], vehicles: Collection[str]) -> list[ColumnElement[bool]]:
+    return [
+        *([CampaignRow.name.icontains(search, autoescape=True)] if search else []),
+        *([CampaignRow.state.in_(states)] if states else []),
+        *([VehicleRow.kind.in_(vehicles)] if vehicles else []),
+    ]
+
+
+def get_proposal_or_none(session: Session, proposal_id: int) -> ProposalRow | None:
+    return session.get(ProposalRow, proposal_id)
+
+
+def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
+    return session.scalars(select(ProposalRow).where(ProposalRow.campaign_id == campaign_id)).all()
+
+
+def latest_proposal(session: Session, campaign_id: int) -> ProposalRow | None:
+    return session.scalar(select(ProposalRow).where(ProposalRow.campaign_id == campaign_id)
+                          .order_by(ProposalRow.id.desc()).limit(1))

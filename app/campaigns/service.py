@@ -1,0 +1,179 @@
+"""What people and scripts do with campaigns. Proposals are in `proposing`, how things look from outside in `views`."""
+
+from collections.abc import Collection
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.definitions import check_campaign, definition_of, stored
+from app.campaigns.proposing import end_campaign, move_campaign, request_proposal
+from app.campaigns.schemas import (
+    Campaign,
+    CampaignEdit,
+    CampaignSummary,
+    Clone,
+    Definition,
+    NewCampaign,
+    NextFlight,
+    Sort,
+)
+from app.campaigns.states import ACTIONS, CampaignState, Outcome
+from app.campaigns.views import campaign_view, next_flight_view, summaries
+from app.core.experiments import get_experiment
+from app.db.models import CampaignRow
+from app.db.paging import decode_cursor, encode_cursor
+from app.db.types import utc_now
+from app.errors import BusyError
+from app.fleet import service as fleet
+from app.fleet.schemas import VehicleChoice
+from app.moves import check_action, check_version
+from app.schemas import Page
+from app.trials import history
+from app.trials.lifecycle import cancel_planned
+
+
+def list_campaigns(session: Session, *, search: str, states: Collection[CampaignState], vehicles: Collection[str],
+                   sort: Sort, limit: int, cursor: str | None) -> Page[CampaignSummary]:
+    """One page of cards. Raises InputError for a cursor that is none of this list's."""
+    after = None if cursor is None else decode_cursor(sort, cursor, repository.cursor_kind(sort))
+    found, total = repository.page(session, search=search, states=states, vehicles=vehicles, sort=sort, after=after,
+                                   limit=limit)
+    following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
+    return Page(items=summaries(session, [row for row, _ in found[:limit]]), total=total, next_cursor=following)
+
+
+def get_row(session: Session, campaign_id: int) -> CampaignRow:
+    """For the other slices. Raises NotFoundError."""
+    return repository.get_one(session, campaign_id)
+
+
+def get_campaign(session: Session, campaign_id: int) -> Campaign:
+    """Raises NotFoundError."""
+    return campaign_view(session, repository.get_one(session, campaign_id))
+
+
+def create_campaign(session: Session, new: NewCampaign) -> Campaign:
+    """A draft whose first gains are being computed. Raises InputError naming every field that cannot be used."""
+    row = _add(session, new.name, new.definition, new.vehicle, parent_id=None)
+    return campaign_view(session, row)
+
+
+def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
+    """A new draft with the same definition, linked to its origin."""
+    origin = repository.get_one(session, campaign_id)
+    vehicle = clone.vehicle or VehicleChoice(kind=origin.vehicle.kind, options=origin.vehicle_options)
+    name = clone.name or f"{origin.name[:110]} (again)"
+    row = _add(session, name, Definition.model_validate(origin.definition), vehicle, parent_id=origin.id)
+    return campaign_view(session, row)
+
+
+def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Campaign:
+    """Raises ConflictError when somebody else was faster, or when the definition is frozen."""
+    row = repository.get_one(session, campaign_id)
+    definition = None if edit.definition is None else edit.definition.model_dump(mode="json")
+    check_version(edit.version, row.version, f"Campaign {row.id}", {
+        field: (now, sent) for field, now, sent in (
+            ("name", row.name, edit.name), ("definition", row.definition, definition),
+            ("vehicle.kind", row.vehicle.kind, edit.vehicle.kind if edit.vehicle else None)) if sent is not None})
+    if edit.definition is not None or edit.vehicle is not None:
+        _define(session, row, edit)
+    if edit.name is not None:
+        row.name = edit.name
+    row.version += 1
+    return campaign_view(session, row)
+
+
+def delete_campaign(session: Session, campaign_id: int) -> None:
+    """Raises ConflictError when something has flown in it."""
+    row = repository.get_one(session, campaign_id)
+    check_action(ACTIONS, "delete", row.state, f"Campaign {row.id}")
+    _require_no_flight(session, row)
+    predicted = [proposal.predicted for proposal in repository.proposals(session, row.id) if proposal.predicted]
+    session.delete(row)
+    session.flush()
+    for trajectory in predicted:
+        session.delete(trajectory)
+
+
+def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign:
+    """End it on the operator's word. Raises ConflictError unless it is between flights."""
+    row = repository.get_one(session, campaign_id)
+    check_action(ACTIONS, "finish", row.state, f"Campaign {row.id}")
+    _require_no_flight(session, row)
+    end_campaign(row, history.trials_of(session, row.id), Outcome.STOPPED, reason)
+    return campaign_view(session, row)
+
+
+def archive_campaign(session: Session, campaign_id: int) -> Campaign:
+    """Raises ConflictError unless it is finished."""
+    row = repository.get_one(session, campaign_id)
+    check_action(ACTIONS, "archive", row.state, f"Campaign {row.id}")
+    move_campaign(row, CampaignState.ARCHIVED)
+    return campaign_view(session, row)
+
+
+def next_flight(session: Session, campaign_id: int) -> NextFlight:
+    """Where the next proposal stands. Raises NotFoundError."""
+    return next_flight_view(session, repository.get_one(session, campaign_id))
+
+
+def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
+    """Have the proposal computed anew. Raises ConflictError in states in which none is made."""
+    row = repository.get_one(session, campaign_id)
+    check_action(ACTIONS, "propose", row.state, f"Campaign {row.id}")
+    request_proposal(session, row)
+    return next_flight_view(session, row)
+
+
+def begin_flying(row: CampaignRow) -> None:
+    """A trial lifts off, or a record of one arrives: from the first one on the definition is frozen."""
+    if row.definition_digest is None:
+        row.definition_digest = definition_of(row).digest()
+    move_campaign(row, CampaignState.FLYING)
+
+
+def end_flying(session: Session, row: CampaignRow) -> None:
+    """The trial is down, however it ended; the next gains are computed from what is known now."""
+    if row.state == CampaignState.FLYING:
+        move_campaign(row, CampaignState.DECIDING)
+    history_changed(session, row)
+
+
+def history_changed(session: Session, row: CampaignRow) -> None:
+    """A flight counts now that did not, or the other way round: everything computed from the flights is outdated."""
+    row.updated_at = utc_now()
+    request_proposal(session, row)
+
+
+def _add(session: Session, name: str, asked: Definition, choice: VehicleChoice, *,
+         parent_id: int | None) -> CampaignRow:
+    definition, options = check_campaign(asked, choice)
+    space = get_experiment(definition.experiment).space
+    vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
+    row = CampaignRow(
+        name=name, state=CampaignState.DRAFT, experiment=definition.experiment, strategy=definition.strategy,
+        definition=stored(definition), vehicle=vehicle, vehicle_options=options, parent_id=parent_id)
+    session.add(row)
+    session.flush()
+    request_proposal(session, row)
+    return row
+
+
+def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
+    check_action(ACTIONS, "define", row.state, f"Campaign {row.id}")
+    _require_no_flight(session, row)
+    asked = edit.definition or Definition.model_validate(row.definition)
+    choice = edit.vehicle or VehicleChoice(kind=row.vehicle.kind, options=row.vehicle_options)
+    definition, options = check_campaign(asked, choice)
+    space = get_experiment(definition.experiment).space
+    row.vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
+    row.experiment, row.strategy = definition.experiment, definition.strategy
+    row.definition, row.vehicle_options = stored(definition), options
+    cancel_planned(history.trials_of(session, row.id), "the campaign's definition was changed")
+    request_proposal(session, row)
+
+
+def _require_no_flight(session: Session, row: CampaignRow) -> None:
+    if (flight := history.flight_under_way(session, row.id)) is not None:
+        raise BusyError(f"Campaign {row.id} has a flight under way (trial {flight.trial_id}).",
+                        hint="Wait until it is over, or abort it.")

@@ -1,0 +1,175 @@
+"""How campaigns and proposals look from outside."""
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Final, Literal
+
+from pydantic import TypeAdapter
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.proposing import PROPOSAL_JOB, is_stale
+from app.campaigns.schemas import (
+    BestTrial,
+    Campaign,
+    CampaignSummary,
+    Definition,
+    FlyingTrial,
+    GainChange,
+    NextFlight,
+    Proposal,
+    SparkCurve,
+    StopVerdict,
+    TrialCounts,
+)
+from app.campaigns.states import ACTIONS, CampaignState
+from app.core.strategies.base import Explanation
+from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
+from app.fleet import service as fleet
+from app.jobs import service as jobs
+from app.jobs.states import JobState
+from app.moves import allowed
+from app.schemas import Gate, Trouble
+from app.trials import history
+from app.trials.states import TrialState
+
+SPARKS: Final = 7
+_EXPLANATION: Final = TypeAdapter(Explanation)
+
+_NEXT_ACTIONS: Final[Mapping[CampaignState, str]] = {
+    CampaignState.DRAFT: "Wait for the first gains",
+    CampaignState.FLYING: "Watch the flight",
+    CampaignState.FINISHED: "Look at the result",
+    CampaignState.ARCHIVED: "",
+}
+
+
+def campaign_view(session: Session, row: CampaignRow) -> Campaign:
+    session.flush()
+    trials = history.trials_of(session, row.id)
+    flight = history.flight_under_way(session, row.id)
+    return Campaign(
+        id=row.id, version=row.version, name=row.name, state=row.state, outcome=row.outcome,
+        stop_reason=row.stop_reason, definition=Definition.model_validate(row.definition),
+        definition_digest=row.definition_digest, vehicle=fleet.campaign_vehicle(row), parent_id=row.parent_id,
+        best=_best(trials), trials=_counts(trials), flying=_flying(flight, trials),
+        next_action=_next_action(row, trials), actions=_actions(row, flight), created_at=row.created_at,
+        updated_at=row.updated_at)
+
+
+def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSummary]:
+    """The cards of several campaigns, from one query for all their trials."""
+    by_campaign: Mapping[int, list[TrialRow]] = defaultdict(list)
+    for trial in history.trials_of(session, *(row.id for row in rows)):
+        by_campaign[trial.campaign_id].append(trial)
+    return [_summary(row, by_campaign[row.id]) for row in rows]
+
+
+def _summary(row: CampaignRow, trials: Sequence[TrialRow]) -> CampaignSummary:
+    valid = [trial for trial in trials if trial.state == TrialState.VALID]
+    return CampaignSummary(
+        id=row.id, name=row.name, state=row.state, outcome=row.outcome, vehicle=fleet.campaign_vehicle(row),
+        experiment=row.experiment, strategy=row.strategy, flights=_counts(trials).flown, best=_best(trials),
+        first_error=valid[0].error if valid else None, next_action=_next_action(row, trials), spark=_sparks(trials),
+        updated_at=row.updated_at)
+
+
+def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
+    """Where the next proposal stands; computed in the background, it may be fresh, stale, on its way, or impossible."""
+    session.flush()
+    trials = history.trials_of(session, row.id)
+    latest = repository.latest_proposal(session, row.id)
+    shown = None if latest is None else proposal_view(row, latest, trials)
+    if (waiting := history.unclassed(trials)) is not None:
+        return NextFlight(state="none", proposal=shown, problem=Trouble(
+            title=f"Flight {waiting.number} waits for its class.",
+            detail="The next gains depend on whether it counts.",
+            hint="Say whether it is valid, aborted or invalid."))
+    job = jobs.latest_job(session, row.id, PROPOSAL_JOB)
+    if job is not None and job.state in {JobState.QUEUED, JobState.RUNNING}:
+        return NextFlight(state="computing", proposal=shown, problem=None)
+    if shown is not None and not shown.stale:
+        return NextFlight(state="ready", proposal=shown, problem=None)
+    if job is not None and job.state == JobState.FAILED:
+        return NextFlight(state="failed", proposal=shown, problem=jobs.trouble(job))
+    return NextFlight(state="none", proposal=shown, problem=Trouble(
+        title="There is no proposal for the present flights.", detail="Its computation was cancelled.",
+        hint="Compute it again."))
+
+
+def proposal_view(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> Proposal:
+    best = history.best_of(trials)
+    now = best.gains if best is not None else campaign.vehicle.safe_gains
+    said = row.stop_verdict
+    verdict = StopVerdict(stop=said["stop"], reason=said["reason"] or "", sentence=said["why"],
+                          threshold=said["threshold"])
+    return Proposal(
+        id=row.id, campaign_id=row.campaign_id, kind=row.kind, recommended=_recommended(row.kind, verdict),
+        gains=row.gains, changes=_changes(now, row.gains), predicted_error=row.predicted_error,
+        explanation=_explanation(row), gate=Gate.model_validate(row.gate), stop_verdict=verdict,
+        history_digest=row.history_digest, stale=is_stale(campaign, row, trials), computed_at=row.computed_at)
+
+
+def _explanation(row: ProposalRow) -> Explanation:
+    return _EXPLANATION.validate_python(row.explanation)
+
+
+def _recommended(kind: str, verdict: StopVerdict) -> Literal["step", "repeat", "baseline", "stop"]:
+    if verdict.stop:
+        return "stop"
+    if kind == "start":
+        return "baseline"
+    return "repeat" if kind == "none" else "step"
+
+
+def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[str, GainChange]:
+    return {name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
+            for name, value in following.items()}
+
+
+def _best(trials: Sequence[TrialRow]) -> BestTrial | None:
+    best = history.best_of(trials)
+    if best is None or best.error is None:
+        return None
+    return BestTrial(trial_id=best.id, trial_number=best.number, error=best.error, gains=best.gains)
+
+
+def _counts(trials: Sequence[TrialRow]) -> TrialCounts:
+    states = Counter(trial.state for trial in trials)
+    return TrialCounts(
+        total=len(trials), flown=sum(states[state] for state in history.FLOWN), valid=states[TrialState.VALID],
+        aborted=states[TrialState.ABORTED], invalid=states[TrialState.INVALID], lost=states[TrialState.LOST])
+
+
+def _flying(flight: FlightRow | None, trials: Sequence[TrialRow]) -> FlyingTrial | None:
+    if flight is None:
+        return None
+    number = next(trial.number for trial in trials if trial.id == flight.trial_id)
+    return FlyingTrial(trial_id=flight.trial_id, trial_number=number)
+
+
+def _next_action(row: CampaignRow, trials: Sequence[TrialRow]) -> str:
+    """One recommended action, in a few words."""
+    if row.state in _NEXT_ACTIONS:
+        return _NEXT_ACTIONS[row.state]
+    if (waiting := history.unclassed(trials)) is not None:
+        return f"Say whether flight {waiting.number} counts"
+    which = "first" if row.state == CampaignState.READY else "next"
+    return f"Fly the {which} trial" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"
+
+
+def _actions(row: CampaignRow, flight: FlightRow | None) -> list[str]:
+    """The states' table, without what a flight under way forbids."""
+    impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
+    return [action for action in allowed(ACTIONS, row.state) if action not in impossible]
+
+
+def _sparks(trials: Sequence[TrialRow]) -> list[SparkCurve]:
+    """The first flight, the best, and the latest, in their order."""
+    flown = [trial for trial in trials if trial.curve and trial.state in {TrialState.VALID, TrialState.CAPTURED}]
+    best = history.best_of(flown)
+    chosen = {trial.number for trial in (*flown[:1], *([best] if best is not None else []))}
+    chosen |= {trial.number for trial in flown[-(SPARKS - len(chosen)):]}
+    return [SparkCurve(trial_number=trial.number, best=trial is best, time_s=[point[0] for point in trial.curve or []],
+                       values=[point[1] for point in trial.curve or []])
+            for trial in flown if trial.number in chosen]

@@ -1,0 +1,62 @@
+"""Queries on jobs."""
+
+from collections.abc import Collection, Sequence
+from datetime import datetime
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.db.models import JobRow
+from app.errors import NotFoundError
+from app.jobs.states import JobState
+
+
+def get_one(session: Session, job_id: int) -> JobRow:
+    """Raises NotFoundError."""
+    if (row := session.get(JobRow, job_id)) is None:
+        raise NotFoundError("job", job_id)
+    return row
+
+
+def held_by_or_none(session: Session, job_id: int, worker: str) -> JobRow | None:
+    """The job, while it runs and is this worker's."""
+    return session.scalar(select(JobRow).where(JobRow.id == job_id, JobRow.worker == worker,
+                                               JobRow.state == JobState.RUNNING))
+
+
+def page(session: Session, *, states: Collection[JobState], campaign_id: int | None, before_id: int | None,
+         limit: int) -> tuple[Sequence[JobRow], int]:
+    """The newest jobs before that id, one more than `limit`, and the number of all."""
+    wanted = select(JobRow)
+    if states:
+        wanted = wanted.where(JobRow.state.in_(states))
+    if campaign_id is not None:
+        wanted = wanted.where(JobRow.campaign_id == campaign_id)
+    total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
+    if before_id is not None:
+        wanted = wanted.where(JobRow.id < before_id)
+    return session.scalars(wanted.order_by(JobRow.id.desc()).limit(limit + 1)).all(), total
+
+
+def first_waiting(session: Session, kinds: Collection[str]) -> JobRow | None:
+    """The job that has waited longest."""
+    return session.scalar(select(JobRow).where(JobRow.state == JobState.QUEUED, JobRow.kind.in_(kinds))
+                          .order_by(JobRow.id).limit(1))
+
+
+def running(session: Session, *, lease_before: datetime | None = None) -> Sequence[JobRow]:
+    """Running jobs; with `lease_before`, those whose lease ended before that time."""
+    wanted = select(JobRow).where(JobRow.state == JobState.RUNNING)
+    if lease_before is not None:
+        wanted = wanted.where(JobRow.lease_until < lease_before)
+    return session.scalars(wanted.order_by(JobRow.id)).all()
+
+
+def latest_of_campaign(session: Session, campaign_id: int, kind: str) -> JobRow | None:
+    return session.scalar(select(JobRow).where(JobRow.campaign_id == campaign_id, JobRow.kind == kind)
+                          .order_by(JobRow.id.desc()).limit(1))
+
+
+def waiting_of_campaign(session: Session, campaign_id: int, kind: str) -> JobRow | None:
+    return session.scalar(select(JobRow).where(JobRow.campaign_id == campaign_id, JobRow.kind == kind,
+                                               JobRow.state == JobState.QUEUED).limit(1))

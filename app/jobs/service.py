@@ -1,0 +1,167 @@
+"""Numeric work as rows: written in the transaction that needs it, carried out by a worker, and again after a crash.
+
+For a worker: `claim_job`, then `heartbeat_job` while it computes, then `finish_job` or `fail_job`.
+"""
+
+from collections.abc import Collection, Mapping
+from datetime import timedelta
+from typing import Final
+
+from sqlalchemy import update
+from sqlalchemy.orm import Session
+
+from app.core.errors import GainlineError
+from app.db.models import JobRow, JsonObject
+from app.db.paging import decode_cursor, encode_cursor
+from app.db.types import utc_now
+from app.jobs import repository
+from app.jobs.schemas import Job
+from app.jobs.states import ACTIONS, MOVES, JobState
+from app.moves import allowed, check_action, check_move
+from app.schemas import Page, Trouble
+
+MAX_ATTEMPTS: Final = 3
+"""A job that lost its worker so many times probably killed it, and is failed."""
+
+
+def enqueue_job(session: Session, kind: str, *, campaign_id: int | None = None,
+                payload: Mapping[str, object] | None = None) -> JobRow:
+    """A job that waits. One of the same kind for the same campaign that still waits serves for both."""
+    if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
+        return waiting
+    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, payload=dict(payload or {}))
+    session.add(row)
+    session.flush()
+    return row
+
+
+def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s: float) -> JobRow | None:
+    """The job that has waited longest, now this worker's until the lease ends; None when nothing waits."""
+    if (row := repository.first_waiting(session, kinds)) is None:
+        return None
+    _move(row, JobState.RUNNING)
+    row.worker, row.attempts = worker, row.attempts + 1
+    row.started_at, row.finished_at, row.problem, row.progress = utc_now(), None, None, 0.0
+    row.lease_until = utc_now() + timedelta(seconds=lease_s)
+    return row
+
+
+def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float, progress: float | None = None,
+                  note: str | None = None) -> bool:
+    """Extend the lease and tell the progress (0 … 1). False when the job is no longer this worker's: stop it."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    # Not through the row: a heartbeat alone is no change that a browser has to hear of.
+    session.execute(update(JobRow).where(JobRow.id == job_id)
+                    .values(lease_until=utc_now() + timedelta(seconds=lease_s))
+                    .execution_options(synchronize_session=False))
+    if progress is not None:
+        row.progress = progress
+    if note is not None:
+        row.progress_note = note
+    return True
+
+
+def finish_job(session: Session, job_id: int, *, worker: str) -> bool:
+    """The job is done. False, and nothing changes, when it was cancelled, deleted or given away meanwhile."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    _move(row, JobState.DONE)
+    row.progress, row.finished_at, row.lease_until = 1.0, utc_now(), None
+    return True
+
+
+def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str) -> bool:
+    """The job cannot be done; the error is kept for a person. False when it was no longer this worker's."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    _fail(row, error.message, error.hint,
+          [f"{problem.field}: {problem.reason}" for problem in error.problems])
+    return True
+
+
+def requeue_running_jobs(session: Session) -> list[int]:
+    """At a worker's start, when no other worker can be there: whatever ran waits again."""
+    return [_requeue(row) for row in repository.running(session)]
+
+
+def requeue_expired_jobs(session: Session) -> list[int]:
+    """Jobs whose worker fell silent wait again."""
+    return [_requeue(row) for row in repository.running(session, lease_before=utc_now())]
+
+
+def latest_job(session: Session, campaign_id: int, kind: str) -> JobRow | None:
+    """The newest job of that kind for a campaign, whatever became of it."""
+    return repository.latest_of_campaign(session, campaign_id, kind)
+
+
+def list_jobs(session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int,
+              cursor: str | None) -> Page[Job]:
+    """The newest first."""
+    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
+    rows, total = repository.page(session, states=states, campaign_id=campaign_id, before_id=before, limit=limit)
+    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
+    return Page(items=[job_view(row) for row in rows[:limit]], total=total, next_cursor=following)
+
+
+def get_job(session: Session, job_id: int) -> Job:
+    return job_view(repository.get_one(session, job_id))
+
+
+def cancel_job(session: Session, job_id: int) -> Job:
+    """Raises ConflictError when it is over already."""
+    row = repository.get_one(session, job_id)
+    check_action(ACTIONS, "cancel", row.state, _name(row))
+    _move(row, JobState.CANCELLED)
+    row.finished_at, row.lease_until = utc_now(), None
+    session.flush()
+    return job_view(row)
+
+
+def retry_job(session: Session, job_id: int) -> Job:
+    """Raises ConflictError unless it failed or was cancelled."""
+    row = repository.get_one(session, job_id)
+    check_action(ACTIONS, "retry", row.state, _name(row))
+    _move(row, JobState.QUEUED)
+    row.attempts, row.problem, row.progress, row.finished_at = 0, None, 0.0, None
+    session.flush()
+    return job_view(row)
+
+
+def job_view(row: JobRow) -> Job:
+    return Job(
+        id=row.id, kind=row.kind, state=row.state, campaign_id=row.campaign_id, progress=row.progress,
+        progress_note=row.progress_note, problem=trouble(row), attempts=row.attempts, created_at=row.created_at,
+        started_at=row.started_at, finished_at=row.finished_at, actions=allowed(ACTIONS, row.state))
+
+
+def trouble(row: JobRow) -> Trouble | None:
+    """Why a job failed."""
+    return None if row.problem is None else Trouble.model_validate(row.problem)
+
+
+def _requeue(row: JobRow) -> int:
+    if row.attempts >= MAX_ATTEMPTS:
+        _fail(row, f"The worker went away {row.attempts} times while it did this.",
+              "Look into the worker's log, then retry the job.", [])
+    else:
+        _move(row, JobState.QUEUED)
+        row.worker, row.lease_until, row.progress = None, None, 0.0
+    return row.id
+
+
+def _fail(row: JobRow, happened: str, hint: str, problems: list[str]) -> None:
+    _move(row, JobState.FAILED)
+    said: JsonObject = {"title": happened, "detail": "; ".join(problems), "hint": hint}
+    row.problem, row.finished_at, row.lease_until = said, utc_now(), None
+
+
+def _move(row: JobRow, to: JobState) -> None:
+    row.state = check_move(MOVES, row.state, to, _name(row))
+
+
+def _name(row: JobRow) -> str:
+    return f"Job {row.id}"

@@ -1,0 +1,56 @@
+"""State machines as data: one way to ask what is allowed, and one sentence when it is not."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import TypeVar
+
+from app.errors import ConflictError, Problem
+
+S = TypeVar("S", bound=StrEnum)
+
+
+def check_move(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:
+    """The new state. Raises ConflictError when the table does not lead there from `state`."""
+    if to not in moves[state]:
+        raise ConflictError(f"{what} is {state} and cannot become {to}.", hint=_look_again(sorted(moves[state])))
+    return to
+
+
+def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, what: str) -> None:
+    """Raises ConflictError when `action` is not possible in `state`."""
+    if state not in actions[action]:
+        raise ConflictError(f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
+                            hint="Load it again: it has changed since, or something else has to be done first.")
+
+
+def allowed(actions: Mapping[str, frozenset[S]], state: S) -> list[str]:
+    """What may be done in `state`, in the table's order."""
+    return [action for action, states in actions.items() if state in states]
+
+
+def check_version(sent: int, held: int, what: str, differences: Mapping[str, tuple[object, object]]) -> None:
+    """Raises ConflictError when the edit was made on an outdated version.
+
+    `differences`: for each edited field what is there now and what was sent; those that differ are named.
+    """
+    if sent == held:
+        return
+    problems = tuple(Problem(field, f"is now {_short(now)}; you sent {_short(wanted)}")
+                     for field, (now, wanted) in differences.items() if now != wanted)
+    raise ConflictError(f"{what} was changed by somebody else (version {held}, you edited version {sent}).",
+                        hint="Load it again, look at what changed, and make your edit on that.",
+                        problems=(Problem("version", f"is {held}, got {sent}"), *problems))
+
+
+def _short(value: object) -> str:
+    text = f"“{value}”"
+    return text if len(text) <= 80 else f"{text[:78]}…”"
+
+
+def _or(states: frozenset[S]) -> str:
+    *others, last = sorted(states)
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _look_again(possible: list[S]) -> str:
+    return f"Load it again; from here it can become {', '.join(possible)}." if possible else "This is its last state."

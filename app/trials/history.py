@@ -1,0 +1,109 @@
+"""A campaign's trials as others read them: the flights a proposal is computed from, the best, the stored records."""
+
+import hashlib
+import json
+from collections.abc import Collection, Sequence
+from typing import Final, Literal
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from app.core.definition import Flight
+from app.core.trajectory import Trajectory
+from app.db.models import FlightRow, TrajectoryRow, TrialRow
+from app.errors import NotFoundError
+from app.trials import repository
+from app.trials.codec import Packed, pack, unpack
+from app.trials.states import HISTORY, TrialState
+
+_NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
+
+FLOWN: Final = frozenset({TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID,
+                          TrialState.LOST})
+"""States of trials that have left the ground."""
+
+
+def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
+    """The trials of one or more campaigns, by campaign and number, without their samples."""
+    return repository.of_campaigns(session, campaign_ids)
+
+
+def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
+    """The valid and aborted flights with their trajectories as stored."""
+    rows = counted(trials_of(session, campaign_id))
+    records = repository.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
+    return tuple(_flight(row, _unpacked(records[row.trajectory_id]) if row.trajectory_id is not None else _NOTHING)
+                 for row in rows)
+
+
+def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
+    """The same flights with nothing in their trajectories, for checks that look at gains only."""
+    return tuple(_flight(row, _NOTHING) for row in counted(trials))
+
+
+def counted(trials: Sequence[TrialRow]) -> list[TrialRow]:
+    """The trials that are history: valid and aborted."""
+    return [row for row in trials if row.state in HISTORY]
+
+
+def history_digest(definition_digest: str, trials: Sequence[TrialRow]) -> str:
+    """SHA-256 over everything that a proposal is computed from; differs as soon as any of it does."""
+    flights = [[row.number, row.gains, row.state, row.error,
+                row.trajectory.checksum if row.trajectory is not None else None] for row in counted(trials)]
+    content = json.dumps([definition_digest, flights], sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:
+    """The campaign's flight that is asked for or running."""
+    return repository.flight_of_campaign_under_way(session, campaign_id)
+
+
+def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
+    """The valid trial with the lowest error, the earliest of equals."""
+    valid = [(row.error, row.number, row) for row in trials if row.state == TrialState.VALID and row.error is not None]
+    return min(valid, key=lambda found: found[:2])[2] if valid else None
+
+
+def unclassed(trials: Sequence[TrialRow]) -> TrialRow | None:
+    """The captured flight that waits for its class, which blocks the next proposal."""
+    return next((row for row in trials if row.state == TrialState.CAPTURED), None)
+
+
+def record_of(session: Session, row: TrialRow) -> Trajectory:
+    """A trial's whole record. Raises NotFoundError when it has none."""
+    if row.trajectory_id is None:
+        raise NotFoundError("record of trial", row.id, hint=f"The trial is {row.state}; only flights leave a record.")
+    return trajectory_of(session, row.trajectory_id)
+
+
+def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
+    """A stored trajectory, checked against its checksum."""
+    return _unpacked(repository.samples_of(session, [trajectory_id])[trajectory_id])
+
+
+def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
+    """Several stored trajectories, by id."""
+    return {identity: _unpacked(row) for identity, row in repository.samples_of(session, trajectory_ids).items()}
+
+
+def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
+    """Written once; the database refuses any change. Raises TrajectoryError when single precision cannot hold it."""
+    packed = pack(trajectory)
+    row = TrajectoryRow(
+        codec=packed.codec, columns=packed.columns, samples=packed.samples, duration_s=packed.duration_s,
+        source=packed.source, clock=packed.clock, checksum=packed.checksum, data=packed.data)
+    session.add(row)
+    session.flush()
+    return row
+
+
+def _unpacked(row: TrajectoryRow) -> Trajectory:
+    return unpack(Packed(
+        codec=row.codec, columns=row.columns, samples=row.samples, duration_s=row.duration_s, source=row.source,
+        clock=row.clock, checksum=row.checksum, data=row.data))
+
+
+def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
+    outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
+    return Flight(number=row.number, gains=row.gains, trajectory=trajectory, error=row.error, outcome=outcome)

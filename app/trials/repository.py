@@ -1,0 +1,69 @@
+"""Queries on trials, flights and trajectories."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session, joinedload, undefer
+
+from app.db.models import FlightRow, TrajectoryRow, TrialRow
+from app.errors import NotFoundError
+from app.trials.states import UNDER_WAY, FlightState
+
+
+def get_one(session: Session, trial_id: int) -> TrialRow:
+    """Raises NotFoundError."""
+    if (row := session.get(TrialRow, trial_id)) is None:
+        raise NotFoundError("trial", trial_id)
+    return row
+
+
+def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[TrialRow]:
+    """Their trials in the order of their numbers, with what describes their records, without the samples."""
+    return session.scalars(
+        select(TrialRow).where(TrialRow.campaign_id.in_(campaign_ids)).options(joinedload(TrialRow.trajectory))
+        .order_by(TrialRow.campaign_id, TrialRow.number)).all()
+
+
+def next_number(session: Session, campaign_id: int) -> int:
+    last = session.scalar(select(func.max(TrialRow.number)).where(TrialRow.campaign_id == campaign_id))
+    return (last or 0) + 1
+
+
+def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
+    """The records with their samples, by id."""
+    rows = session.scalars(select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids))
+                           .options(undefer(TrajectoryRow.data)))
+    return {row.id: row for row in rows}
+
+
+def get_flight(session: Session, flight_id: int) -> FlightRow:
+    """Raises NotFoundError."""
+    if (row := session.get(FlightRow, flight_id)) is None:
+        raise NotFoundError("flight", flight_id)
+    return row
+
+
+def flight_of_vehicle_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
+    return session.scalar(select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(UNDER_WAY)))
+
+
+def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRow | None:
+    return session.scalar(select(FlightRow).where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(UNDER_WAY))
+                          .order_by(FlightRow.id).limit(1))
+
+
+def first_requested(session: Session) -> FlightRow | None:
+    """The flight that has waited longest."""
+    return session.scalar(select(FlightRow).where(FlightRow.state == FlightState.REQUESTED)
+                          .order_by(FlightRow.id).limit(1))
+
+
+def running(session: Session) -> Sequence[FlightRow]:
+    return session.scalars(select(FlightRow).where(FlightRow.state == FlightState.RUNNING)
+                           .order_by(FlightRow.id)).all()
+
+
+def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:
+    """The last flight of each trial that has one, by trial."""
+    last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
+    return {row.trial_id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(last)))}

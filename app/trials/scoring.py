@@ -1,0 +1,65 @@
+"""What a flight's record says about the flight: its error, its overshoot, a coarse curve."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from tsdownsample import MinMaxLTTBDownsampler
+
+from app.core.errors import TrajectoryError
+from app.core.experiments.base import Experiment
+from app.core.trajectory import Samples, Trajectory
+
+CURVE_POINTS: Final = 48
+_DOWNSAMPLER: Final = MinMaxLTTBDownsampler()  # type: ignore[no-untyped-call]  # the library has no types
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """`error` in the experiment's unit, or None and `refusal`, the reason why there is none."""
+
+    error: float | None
+    refusal: str
+    overshoot: float | None
+    curve: list[list[float]]
+
+
+def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool = False) -> Score:
+    """Judge a record as it is stored. With `accept_gaps` a person has said that its gaps do no harm."""
+    error, refusal = None, ""
+    try:
+        error = experiment.error(trajectory, accept_gaps=accept_gaps)
+    except TrajectoryError as found:
+        refusal = "; ".join(f"{problem.field} {problem.reason}" for problem in found.problems) or found.message
+    return Score(error=error, refusal=refusal, overshoot=_overshoot(experiment, trajectory),
+                 curve=_curve(experiment, trajectory))
+
+
+def thinned(time_s: Samples, values: Samples, points: int) -> NDArray[np.uint64]:
+    """Indices of at most `points` samples that keep the peaks of `values`, shape (k,)."""
+    if len(time_s) <= points:
+        return np.arange(len(time_s), dtype=np.uint64)
+    indices: NDArray[np.uint64] = _DOWNSAMPLER.downsample(
+        np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
+    return indices
+
+
+def _overshoot(experiment: Experiment, trajectory: Trajectory) -> float | None:
+    """How far the output went beyond its last set point; zero when it stayed below, None without samples."""
+    if experiment.output not in trajectory.channels:
+        return None
+    flown = trajectory[experiment.output][trajectory.time_s >= 0.0]
+    if not flown.size:
+        return None
+    target = float(experiment.set_point(trajectory.time_s[-1:])[0])
+    return max(float(flown.max()) - target, 0.0)
+
+
+def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:
+    if experiment.output not in trajectory.channels:
+        return []
+    flown = trajectory.time_s >= 0.0
+    time_s, values = trajectory.time_s[flown], trajectory[experiment.output][flown]
+    return [[round(float(time_s[index]), 3), round(float(values[index]), 4)]
+            for index in thinned(time_s, values, CURVE_POINTS)]

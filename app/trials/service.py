@@ -1,0 +1,248 @@
+"""What people and scripts do with trials. The worker's side of a flight is in `flights`."""
+
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from app.campaigns import proposing
+from app.campaigns import service as campaigns
+from app.campaigns.definitions import definition_of
+from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
+from app.core.definition import flight_seed
+from app.core.errors import GainsError, InputError, Problem
+from app.core.experiments import get_experiment
+from app.core.gate import Gate, check_policy
+from app.core.policy import Gains
+from app.core.trajectory import Trajectory
+from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
+from app.db.types import utc_now
+from app.errors import BusyError, ConflictError
+from app.fleet import service as fleet
+from app.logs.takeoff_csv import read_takeoff_csv
+from app.moves import check_action, check_version
+from app.trials import history, repository
+from app.trials.capture import capture
+from app.trials.lifecycle import move_flight, move_trial
+from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trial, TrialEdit
+from app.trials.schemas import Trajectory as TrajectoryOut
+from app.trials.scoring import score
+from app.trials.states import ACTIONS, FlightState, TrialKind, TrialState
+from app.trials.views import trajectory_view, trial_view, trial_views
+
+
+def list_trials(session: Session, campaign_id: int) -> list[Trial]:
+    """In the order of their numbers. Raises NotFoundError."""
+    return trial_views(session, campaigns.get_row(session, campaign_id))
+
+
+def get_trial(session: Session, trial_id: int) -> Trial:
+    """Raises NotFoundError."""
+    return _seen(session, repository.get_one(session, trial_id))
+
+
+def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
+    """Plan a trial and, with `fly`, ask for its flight.
+
+    Raises ConflictError for a stale proposal, an unclassed flight, a campaign that is over or not ready; GainsError
+    naming what the gate refuses; BusyError when the vehicle has a flight already.
+    """
+    campaign = campaigns.get_row(session, campaign_id)
+    _require_open(session, campaign)
+    proposal = None
+    if new.proposal_id is not None and new.gains is None:
+        proposal = proposing.fresh_proposal(session, campaign, new.proposal_id)
+        asked: Gains = proposal.gains
+    elif new.gains is not None and new.proposal_id is None:
+        asked = new.gains
+    else:
+        raise InputError("A trial flies a proposal or gains of one's own.", hint="Send exactly one of the two.",
+                         problems=(Problem("proposal_id", "or gains, exactly one of the two, must be given"),))
+    gains, gate = _through_the_gate(session, campaign, asked)
+    number = repository.next_number(session, campaign_id)
+    row = TrialRow(
+        campaign_id=campaign_id, number=number, state=TrialState.PLANNED, gains=gains,
+        kind=_kind(session, campaign, gains, proposal), proposal_id=None if proposal is None else proposal.id,
+        predicted_error=None if proposal is None else proposal.predicted_error, gate=proposing.gate_json(gate),
+        note=new.note, seed=flight_seed(definition_of(campaign).seed, number))
+    session.add(row)
+    session.flush()
+    if new.fly is not None:
+        _request_flight(session, campaign, row, new.fly)
+    return trial_view(session, campaign, row)
+
+
+def fly_trial(session: Session, trial_id: int, order: FlightOrder) -> Trial:
+    """Ask for the flight of a planned trial; the worker carries it out. Raises as `create_trial` does."""
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, "fly", row.state, f"Trial {row.number}")
+    campaign = campaigns.get_row(session, row.campaign_id)
+    _require_open(session, campaign)
+    _, gate = _through_the_gate(session, campaign, row.gains)
+    row.gate = proposing.gate_json(gate)
+    _request_flight(session, campaign, row, order)
+    return trial_view(session, campaign, row)
+
+
+def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer:
+    """Abort a flight that no worker has begun. Raises ConflictError when there is none to abort."""
+    row = repository.get_one(session, trial_id)
+    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    if flight is not None and flight.state == FlightState.REQUESTED:
+        move_flight(flight, FlightState.CANCELLED, problem=reason)
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
+    if flight is not None and flight.state == FlightState.RUNNING:
+        raise ConflictError(f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
+                            hint="Abort again. If a vehicle is in the air, use its own remote control now.")
+    raise ConflictError(f"Trial {row.number} is {row.state}: there is no flight to abort.",
+                        hint="Load it again; the flight is over, or was never asked for.")
+
+
+def cancel_trial(session: Session, trial_id: int) -> Trial:
+    """Give up a trial before its lift-off. Raises ConflictError when it is too late for that."""
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, "cancel", row.state, f"Trial {row.number}")
+    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    if flight is not None and flight.state == FlightState.REQUESTED:
+        move_flight(flight, FlightState.CANCELLED, problem="the trial was cancelled")
+    move_trial(row, TrialState.CANCELLED, reason="cancelled by the operator")
+    return _seen(session, row)
+
+
+def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
+    """Raises ConflictError when somebody else was faster."""
+    row = repository.get_one(session, trial_id)
+    check_version(edit.version, row.version, f"Trial {row.number}", {"note": (row.note, edit.note)})
+    row.note = edit.note
+    row.version += 1
+    return _seen(session, row)
+
+
+def classify_trial(session: Session, trial_id: int, said: Classification) -> Trial:
+    """A person's word on a flight; the next gains are computed again from what counts now.
+
+    Raises ConflictError when the states' table does not lead there or somebody else was faster, InputError when a
+    flight without a usable record is to count.
+    """
+    row = repository.get_one(session, trial_id)
+    outcome = TrialState(said.outcome)
+    check_version(said.version, row.version, f"Trial {row.number}",
+                  {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)})
+    check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
+    campaign = campaigns.get_row(session, row.campaign_id)
+    error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
+    row.error = error if outcome == TrialState.VALID else None
+    move_trial(row, outcome, reason=said.reason)
+    row.version += 1
+    campaigns.history_changed(session, campaign)
+    return trial_view(session, campaign, row)
+
+
+def read_record(stream: BinaryIO) -> Trajectory:
+    """A flight's record from CSV. Raises TrajectoryError naming the line and the column."""
+    return read_takeoff_csv(stream)
+
+
+def import_trajectory(session: Session, trial_id: int, trajectory: Trajectory) -> Trial:
+    """The record of a flight made elsewhere, or the recovered one of a lost flight; scored and classed at once.
+
+    Raises ConflictError when the trial takes no record, TrajectoryError when the record cannot be stored.
+    """
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, "upload", row.state, f"Trial {row.number}")
+    campaign = campaigns.get_row(session, row.campaign_id)
+    if row.state == TrialState.LOST:
+        capture(session, campaign, row, trajectory)
+        campaigns.history_changed(session, campaign)
+        return trial_view(session, campaign, row)
+    if fleet.can_fly(campaign.vehicle):
+        raise ConflictError(f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
+                            hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.")
+    _require_open(session, campaign)
+    campaigns.begin_flying(campaign)
+    row.flown_at = utc_now()
+    capture(session, campaign, row, trajectory)
+    campaigns.end_flying(session, campaign)
+    return trial_view(session, campaign, row)
+
+
+def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
+    """Thinned. Raises NotFoundError when there is no record, StorageError when it is damaged."""
+    row = repository.get_one(session, trial_id)
+    return trajectory_view(campaigns.get_row(session, row.campaign_id), row, history.record_of(session, row), points)
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """A whole record as CSV."""
+
+    file_name: str
+    csv: str
+    checksum: str
+
+
+def export_trajectory(session: Session, trial_id: int) -> Export:
+    """Every sample, nine digits, which give the stored single-precision number back exactly."""
+    row = repository.get_one(session, trial_id)
+    record = history.record_of(session, row)
+    assert row.trajectory is not None
+    table = np.column_stack([record.time_s, *record.channels.values()])
+    lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
+    return Export(f"campaign-{row.campaign_id}-trial-{row.number}.csv", "\n".join(lines) + "\n",
+                  row.trajectory.checksum)
+
+
+def _seen(session: Session, row: TrialRow) -> Trial:
+    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+
+
+def _require_open(session: Session, campaign: CampaignRow) -> None:
+    """Raises ConflictError unless the campaign can take another trial now."""
+    check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
+    if (waiting := history.unclassed(history.trials_of(session, campaign.id))) is not None:
+        raise ConflictError(f"Flight {waiting.number} waits for its class.",
+                            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.")
+
+
+def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], Gate]:
+    """The gains, complete and in order, with the gate's answer. Raises GainsError naming what was refused."""
+    definition = definition_of(campaign)
+    space = proposing.space_of(definition)
+    gains = space.check(asked)
+    flown = history.flown_gains(history.trials_of(session, campaign.id))
+    gate = check_policy(definition, get_experiment(campaign.experiment), space, gains, flown)
+    if not gate.passed:
+        raise GainsError("The gate refuses these gains.", hint="Choose gains nearer to what has flown.", problems=tuple(
+            Problem("gains", check.sentence) for check in gate.checks if not check.passed))
+    return gains, gate
+
+
+def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None) -> TrialKind:
+    if proposal is not None and proposal.kind != "none":
+        return proposal.kind
+    flown = history.counted(history.trials_of(session, campaign.id))
+    return "repeat" if any(row.gains == gains for row in flown) else "manual"
+
+
+def _request_flight(session: Session, campaign: CampaignRow, row: TrialRow, order: FlightOrder) -> None:
+    vehicle = campaign.vehicle
+    if (busy := repository.flight_of_vehicle_under_way(session, vehicle.id)) is not None:
+        raise BusyError(f"{vehicle.title} has a flight already: trial {busy.trial.number} of campaign "
+                        f"{busy.campaign_id}.", hint="Wait until it has landed, or abort it; flights do not queue.")
+    fleet.require_ready(vehicle)
+    session.add(FlightRow(
+        campaign_id=campaign.id, trial_id=row.id, vehicle_id=vehicle.id, state=FlightState.REQUESTED, gains=row.gains,
+        speed=order.speed))
+    session.flush()
+
+
+def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:
+    """The error of a flight that a person counts in spite of its gaps."""
+    judged = None if row.trajectory_id is None else score(
+        get_experiment(campaign.experiment), history.record_of(session, row), accept_gaps=True)
+    if judged is None or judged.error is None:
+        reason = judged.refusal if judged is not None else "it left no record"
+        raise InputError(f"Trial {row.number} cannot count: it cannot be scored.",
+                         hint="Leave it invalid and fly the gains again.", problems=(Problem("outcome", reason),))
+    return judged.error
