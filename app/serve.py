@@ -62,7 +62,7 @@ def listen(host: str, port: int) -> socket.socket:
     """A listening socket; who connects early waits until the application is ready. Raises AddressError."""
     try:
         family, _, _, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        return socket.create_server(where[:2], family=family, backlog=2048)  # type: ignore[arg-type]
+        return socket.create_server(where[:2], family=family, backlog=2048)
     except OSError as error:
         raise _no_address(host, port, error) from error
 

@@ -4,25 +4,25 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Header, Request
+from fastapi import APIRouter, Header
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app import __version__
+from app.api.deps import CurrentDatabase, Live
 from app.db.outbox import holds_everything_after, latest_event_id
 from app.db.session import Database
 from app.live.hub import Change, LinkState
-from app.live.link import Live
 from app.live.messages import FlightPhase, Telemetry
 from app.live.tail import changes_after
 
 RETRY_MS: Final = 1000
 
-router = APIRouter(tags=["events"])
+router = APIRouter(prefix="/api", tags=["events"])
 
 
-@router.get("/api/events", response_class=EventSourceResponse)
-async def events(request: Request, last_event_id: Annotated[str | None, Header()] = None,
-                 ) -> AsyncIterator[ServerSentEvent]:
+@router.get("/events", response_class=EventSourceResponse)
+async def events(live: Live, database: CurrentDatabase,
+                 last_event_id: Annotated[str | None, Header()] = None) -> AsyncIterator[ServerSentEvent]:
     """Follow everything that happens.
 
     `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
@@ -30,8 +30,6 @@ async def events(request: Request, last_event_id: Annotated[str | None, Header()
     server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
     flight and `worker` tells when the worker comes or goes; these carry no id and may be dropped for a slow client.
     """
-    live: Live = request.app.state.live
-    database: Database = request.app.state.database
     with live.hub.subscribe() as stream:
         sent, known = await asyncio.to_thread(_start, database, last_event_id)
         yield ServerSentEvent(event="hello", id=None if last_event_id else str(sent), retry=RETRY_MS,

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 import structlog
+from sqlalchemy.exc import DBAPIError
 
 from app.db.outbox import events_after, latest_event_id
 from app.db.session import Database
@@ -54,7 +55,7 @@ class OutboxTail:
         while not self._stop.is_set():
             try:
                 self._follow()
-            except StorageError as error:
+            except (StorageError, DBAPIError) as error:
                 _log.error("the outbox cannot be read", why=str(error))
                 self._stop.wait(PAUSE_AFTER_TROUBLE_S)
 

@@ -30,8 +30,12 @@ class DatabaseWatch:
         self._connection.close()
 
     def changed(self) -> bool:
-        """Whether anything was committed since the last look; true at the first."""
-        (version,) = self._connection.execute("PRAGMA data_version").fetchone()
+        """Whether anything was committed since the last look; true at the first, and when it cannot be told: whoever
+        then reads the database meets the trouble itself."""
+        try:
+            (version,) = self._connection.execute("PRAGMA data_version").fetchone()
+        except sqlite3.OperationalError:
+            return True
         seen, self._seen = self._seen, int(version)
         return seen != self._seen
 

@@ -1,6 +1,5 @@
 """What a flight shows of itself while it lasts, and how it is told to end: all in memory, nothing waits."""
 
-import threading
 import time
 from collections.abc import Callable
 from typing import Final
@@ -15,51 +14,57 @@ Publish = Callable[[Telemetry | FlightPhase], None]
 
 
 class AbortFlag:
-    """Raised once, from any thread; the flight asks for it at every sample."""
+    """Put up once, from any thread; whoever flies is told at once."""
 
     def __init__(self) -> None:
-        self._reason: str | None = None
+        self.reason: str | None = None
+        self._tell: Callable[[str], None] = lambda _reason: None
 
     def put_up(self, reason: str) -> None:
         """The first reason counts."""
-        self._reason = self._reason or reason or "aborted"
+        if self.reason is None:
+            self.reason = reason or "aborted"
+            self._tell(self.reason)
 
-    def reason(self) -> str | None:
-        return self._reason
+    def tell(self, tell: Callable[[str], None]) -> None:
+        """Who is to be told: of what comes, or of what is there already."""
+        self._tell = tell
+        if self.reason is not None:
+            tell(self.reason)
 
 
 class Airspace:
-    """The flights of this process, by trial. Thread-safe."""
+    """The flights of this process, by trial. Safe from any thread and from signal handlers: it takes no lock."""
 
     def __init__(self) -> None:
         self._flags: dict[int, AbortFlag] = {}
-        self._lock = threading.Lock()
+        self._closed: str | None = None
 
     def enter(self, trial_id: int) -> AbortFlag:
-        with self._lock:
-            return self._flags.setdefault(trial_id, AbortFlag())
+        """The trial's flag; it is up already in a closed airspace."""
+        flag = self._flags.setdefault(trial_id, AbortFlag())
+        if self._closed is not None:
+            flag.put_up(self._closed)
+        return flag
 
     def leave(self, trial_id: int) -> None:
-        with self._lock:
-            self._flags.pop(trial_id, None)
+        self._flags.pop(trial_id, None)
 
     def abort(self, trial_id: int, reason: str) -> bool:
         """Whether that trial is being flown here, and so ends now."""
-        with self._lock:
-            flag = self._flags.get(trial_id)
-        if flag is not None:
-            flag.put_up(reason)
-        return flag is not None
+        if (flag := self._flags.get(trial_id)) is None:
+            return False
+        flag.put_up(reason)
+        return True
 
-    def abort_all(self, reason: str) -> None:
-        with self._lock:
-            flags = tuple(self._flags.values())
-        for flag in flags:
+    def close(self, reason: str) -> None:
+        """End every flight, and those to come."""
+        self._closed = reason
+        for flag in tuple(self._flags.values()):
             flag.put_up(reason)
 
     def trials(self) -> list[int]:
-        with self._lock:
-            return sorted(self._flags)
+        return sorted(self._flags)
 
 
 class Monitor:
@@ -89,7 +94,7 @@ class Monitor:
                            sample.reference_m, sample.thrust, sample.battery_v))
         now_s = time.monotonic()
         if now_s >= self._due_s:
-            self._due_s = now_s + 1.0 / MESSAGES_PER_S
+            self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
             self.flush()
 
     def flush(self) -> None:

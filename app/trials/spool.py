@@ -84,10 +84,10 @@ class Spool:
         for suffix in (_UNFINISHED, _FINISHED):
             self._path(flight_id, suffix).unlink(missing_ok=True)
 
-    def set_aside(self, flight_id: int) -> Path:
-        """Put a record that cannot be used out of the way, without losing it."""
+    def set_aside(self, flight_id: int) -> str:
+        """Put a record that cannot be used out of the way, without losing it; its new place."""
         path = self._path(flight_id, _FINISHED)
-        return path.replace(path.with_suffix(".unusable"))
+        return str(path.replace(path.with_suffix(".unusable")))
 
     def sweep(self) -> None:
         """Give back the rooms of flights that left no record. Only before anything flies."""

@@ -1,0 +1,168 @@
+"""The worker process: it flies, and it computes. One for each database; the web process needs it for both.
+
+Flights and computations run in processes of their own, each watched by a thread of this one, which keeps the books. The
+live socket has a thread of its own too, so that an abort is heard whatever the others do.
+"""
+
+import os
+import platform
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from multiprocessing import parent_process
+from types import FrameType
+from typing import Final
+
+import structlog
+
+from app import __version__
+from app.campaigns.tasks import ProposalDesk, prepare
+from app.db.migrate import require_current
+from app.db.session import Database
+from app.errors import AlreadyRunningError, StorageError
+from app.live.address import live_address
+from app.live.messages import WorkerHello
+from app.live.server import LiveServer
+from app.live.watch import DatabaseWatch
+from app.locks import LockedError, exclusive
+from app.observability import configure_logs
+from app.pool import Pool
+from app.settings import Settings
+from app.trials.flying import Airspace
+from app.trials.tasks import FlightDeck
+
+FLIGHTS_AT_ONCE: Final = 8
+SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
+LOOK_ANYWAY_S: Final = 1.0
+RETRY_S: Final = 1.0
+
+_log = structlog.get_logger(__name__)
+
+
+class Ending:
+    """Whether the worker is to end; once it is, no new work is claimed, and what flies is finished."""
+
+    def __init__(self) -> None:
+        self.event = threading.Event()
+        self.reason = ""
+
+    def ask(self, reason: str) -> None:
+        self.reason = self.reason or reason
+        self.event.set()
+
+
+def run_worker(settings: Settings) -> None:
+    """Work until SIGINT or SIGTERM, which also end the flights under way; the main thread only.
+
+    Raises AlreadyRunningError when another worker has this database, SchemaError when it is not up to date, and
+    StorageError when it cannot be opened.
+    """
+    airspace, ending = Airspace(), Ending()
+    _end_on(signal.SIGINT, signal.SIGTERM, ending=ending, airspace=airspace)
+    try:
+        _run(settings, ending, airspace, keep_waiting=lambda: False)
+    except LockedError as error:
+        raise AlreadyRunningError(
+            f"Another Gainline worker ({error.holder or 'its process is unknown'}) already works for "
+            f"{settings.database_file}.",
+            hint="One is enough: `gainline serve` brings its own. Stop that one first, or start this one with another "
+                 "data folder (GAINLINE_DATA_DIR).") from error
+
+
+def run_supervised_worker(settings: Settings) -> None:
+    """The worker beside a web process: it stands by while an older worker ends, and does not outlive its parent by
+    more than the flights under way. Ctrl-C is left to the parent."""
+    airspace, ending = Airspace(), Ending()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _end_on(signal.SIGTERM, ending=ending, airspace=airspace)
+    threading.Thread(target=_end_with_parent, args=(ending,), daemon=True).start()
+    with suppress(LockedError):  # asked to end while it stood by
+        _run(settings, ending, airspace, keep_waiting=lambda: not ending.event.is_set())
+
+
+def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting: Callable[[], bool]) -> None:
+    settings.data_dir.mkdir(parents=True, exist_ok=True)
+    configure_logs(settings.data_dir, "worker", settings.log_level)
+    with exclusive(settings.data_dir / "worker.lock", keep_waiting=keep_waiting):
+        require_current(settings.database_file)
+        Worker(settings, ending, airspace).work()
+
+
+def _end_on(*signals: signal.Signals, ending: Ending, airspace: Airspace) -> None:
+    def end(number: int, _frame: FrameType | None) -> None:
+        reason = f"the worker was stopped ({signal.Signals(number).name})"
+        ending.ask(reason)
+        airspace.close(reason)
+
+    for number in signals:
+        signal.signal(number, end)
+
+
+def _end_with_parent(ending: Ending) -> None:
+    if (parent := parent_process()) is not None:
+        parent.join()
+        ending.ask("the web process is gone")
+
+
+class Worker:
+    """Everything that runs while the worker holds its lock."""
+
+    def __init__(self, settings: Settings, ending: Ending, airspace: Airspace) -> None:
+        self._settings = settings
+        self._ending = ending
+        self._airspace = airspace
+        self._name = f"{platform.node()}:{os.getpid()}"
+
+    def work(self) -> None:
+        """Recover what the last worker left, then work until asked to end; then let flights end, and drop the rest."""
+        with ExitStack() as stack:
+            database = Database(self._settings.database_file)
+            stack.callback(database.close)
+            live = stack.enter_context(LiveServer(
+                live_address(self._settings.data_dir), abort=self._airspace.abort, hello=self._hello))
+            deck = FlightDeck(database, self._settings.data_dir, self._airspace, live.publish, worker=self._name,
+                              closing=self._ending.event)
+            stack.callback(deck.close)
+            computing = stack.enter_context(ThreadPoolExecutor(SPARE_PROCESSORS, thread_name_prefix="job"))
+            pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
+            desk = ProposalDesk(database, pool, worker=self._name, lease_s=self._settings.lease_s)
+            flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
+            self._until_stored(deck.recover)
+            self._until_stored(desk.recover)
+            computing.submit(pool.run, os.getpid)
+            _log.info("worker ready", worker=self._name)
+            self._loop(database, deck, flying, desk, computing)
+            _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trials())
+
+    def _loop(self, database: Database, deck: FlightDeck, flying: Executor, desk: ProposalDesk,
+              computing: Executor) -> None:
+        with DatabaseWatch(database.file) as watch:
+            while not self._ending.event.is_set():
+                try:
+                    self._claim(deck, flying, desk, computing)
+                except StorageError as error:
+                    _log.error("no work can be claimed", why=str(error))
+                    self._ending.event.wait(RETRY_S)
+                watch.wait(self._ending.event, LOOK_ANYWAY_S)
+
+    def _claim(self, deck: FlightDeck, flying: Executor, desk: ProposalDesk, computing: Executor) -> None:
+        while len(self._airspace.trials()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:
+            flying.submit(deck.carry_out, task)
+        while desk.at_work < SPARE_PROCESSORS and (job := desk.claim()) is not None:
+            computing.submit(desk.carry_out, job)
+        desk.heartbeat()
+
+    def _until_stored(self, work: Callable[[], None]) -> None:
+        while not self._ending.event.is_set():
+            try:
+                work()
+            except StorageError as error:
+                _log.error("the worker cannot begin", why=str(error))
+                self._ending.event.wait(RETRY_S)
+            else:
+                return
+
+    def _hello(self) -> WorkerHello:
+        return WorkerHello(pid=os.getpid(), version=__version__, flying=self._airspace.trials())

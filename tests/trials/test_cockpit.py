@@ -1,0 +1,151 @@
+"""The process that flies, with real simulated vehicles."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.core.experiments import get_experiment
+from app.live.messages import FlightPhase, Telemetry
+from app.locks import exclusive
+from app.trials.cockpit import CONTROL_WITHIN_S, Cockpit, Landed, Orders, Said, Staged, Trouble
+from app.vehicles.base import FlightOrder
+from app.vehicles.errors import VehicleError
+from app.vehicles.open import open_vehicle
+
+GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, trial_id: int = 1) -> Orders:
+    return Orders(campaign_id=1, trial_id=trial_id, experiment="takeoff", vehicle_kind=kind, vehicle_options={},
+                  safe_gains=GAINS, gains=GAINS, flight=FlightOrder(seed=3, speed=speed), lock=folder / "vehicle.lock")
+
+
+@pytest.fixture(scope="module")
+def cockpit() -> Iterator[Cockpit]:
+    one = Cockpit()
+    yield one
+    one.close()
+
+
+def fly(cockpit: Cockpit, asked: Orders, on_said: Callable[[Said], None] = lambda _said: None) -> list[Said]:
+    heard = []
+    for said in cockpit.fly(asked):
+        heard.append(said)
+        if isinstance(said, Staged):
+            cockpit.take_off()
+        on_said(said)
+    return heard
+
+
+def only(heard: list[Said], kind: type[Said]) -> list[Said]:
+    return [said for said in heard if isinstance(said, kind)]
+
+
+def test_a_flight_in_the_process_is_the_flight_in_this_one(cockpit: Cockpit, tmp_path: Path) -> None:
+    heard = fly(cockpit, orders(tmp_path))
+    with open_vehicle("twin", {}, safe_gains=GAINS) as vehicle:
+        vehicle.stage(GAINS)
+        here = vehicle.fly(FlightOrder(seed=3), on_sample=lambda _: None, should_abort=lambda: None)
+    (landed,) = only(heard, Landed)
+    assert isinstance(landed, Landed)
+    assert heard[0] == Staged(GAINS)
+    assert landed.record.ending == "completed"
+    np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], here.trajectory["altitude_m"])
+    assert [said.phase for said in heard if isinstance(said, FlightPhase)] == ["flying", "landed"]
+
+
+def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(cockpit: Cockpit, tmp_path: Path) -> None:
+    heard = fly(cockpit, orders(tmp_path))
+    rows = [row for said in heard if isinstance(said, Telemetry) for row in said.samples]
+    assert [round(row[0] * 50) for row in rows] == list(range(len(rows)))
+    assert rows[-1][0] == pytest.approx(33.0, abs=0.03)
+    last = [said for said in heard if isinstance(said, Telemetry)][-1]
+    (landed,) = only(heard, Landed)
+    assert isinstance(landed, Landed)
+    # 50 Hz telemetry against the 512 Hz record
+    assert last.error_so_far == pytest.approx(get_experiment("takeoff").error(landed.record.trajectory), abs=2e-4)
+
+
+def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
+        cockpit: Cockpit, tmp_path: Path) -> None:
+    def abort(said: Said) -> None:
+        if isinstance(said, Telemetry):
+            cockpit.stand_down(1, "too high")
+
+    (landed,) = only(fly(cockpit, orders(tmp_path, speed=1.0), abort), Landed)
+    assert isinstance(landed, Landed)
+    assert (landed.record.ending, landed.record.reason) == ("aborted", "too high")
+    assert landed.record.trajectory["altitude_m"][-1] < 0.1
+    (landed,) = only(fly(cockpit, orders(tmp_path, trial_id=2)), Landed)
+    assert isinstance(landed, Landed)
+    assert landed.record.ending == "completed"
+
+
+def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(cockpit: Cockpit, tmp_path: Path) -> None:
+    (trouble,) = fly(cockpit, orders(tmp_path, kind="import"))
+    assert isinstance(trouble, Trouble)
+    assert not trouble.unsafe
+    assert len(only(fly(cockpit, orders(tmp_path)), Landed)) == 1
+
+
+def test_standing_down_before_lift_off_leaves_no_record(cockpit: Cockpit, tmp_path: Path) -> None:
+    heard = []
+    for said in cockpit.fly(orders(tmp_path)):
+        heard.append(said)
+        cockpit.stand_down(1, "not today")
+    assert heard == [Staged(GAINS)]
+
+
+def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
+    alone, together = Cockpit(), [Cockpit(), Cockpit()]
+    records: dict[int, Landed] = {}
+
+    def one(number: int) -> None:
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (landed,) = only(fly(together[number], orders(folder, kind="jsbsim")), Landed)
+        assert isinstance(landed, Landed)
+        records[number] = landed
+
+    threads = [threading.Thread(target=one, args=(number,)) for number in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    (expected,) = only(fly(alone, orders(tmp_path, kind="jsbsim")), Landed)
+    assert isinstance(expected, Landed)
+    for landed in records.values():
+        np.testing.assert_array_equal(landed.record.trajectory["altitude_m"],
+                                      expected.record.trajectory["altitude_m"])
+    for each in (alone, *together):
+        each.close()
+
+
+def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) -> None:
+    cockpit = Cockpit()
+
+    def kill(said: Said) -> None:
+        if isinstance(said, Telemetry):
+            os.kill(cockpit._process.pid or 0, signal.SIGKILL)
+
+    with pytest.raises(VehicleError, match=r"exit code -9"):
+        fly(cockpit, orders(tmp_path, speed=1.0), kill)
+    cockpit.close()
+
+
+def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_path: Path) -> None:
+    cockpit = Cockpit()
+    heard: list[Said] = []
+    with exclusive(tmp_path / "vehicle.lock"):
+        thread = threading.Thread(target=lambda: heard.extend(fly(cockpit, orders(tmp_path))))
+        thread.start()
+        thread.join(1.0)
+        assert heard == []
+    thread.join(CONTROL_WITHIN_S)
+    assert len(only(heard, Landed)) == 1
+    cockpit.close()
