@@ -1,0 +1,254 @@
+"""A small typed client of the REST API: for scripts, notebooks, and programs that fly with something of their own.
+
+    with Client("http://127.0.0.1:8000") as gainline:
+        campaign = gainline.create_campaign("My drone", vehicle="import")
+        proposal = gainline.ask(campaign.id)
+        trial = gainline.tell(campaign.id, proposal, {"time_s": [...], "altitude_m": [...]})
+
+Every act carries an idempotency key and is sent again when the connection breaks, which is harmless. What the server
+refuses is raised with the server's own words:
+
+    GainlineError
+    └── RefusedError              status, title, problems; str() of it says what happened and what to do
+        ├── NotFoundError         404
+        ├── ConflictError         409: not possible now, or somebody else was faster
+        ├── InvalidError          413, 415, 422: `problems` names the fields
+        └── UnavailableError      503 and no connection at all: try again later
+"""
+
+import csv
+import io
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self, TypeVar
+
+import httpx2
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal
+from app.core.errors import GainlineError, Problem
+from app.fleet.schemas import VehicleChoice
+from app.schemas import OptionValue, Page
+from app.schemas import Problem as ProblemDetails
+from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial
+from app.trials.states import FlightState, TrialState
+
+Record = Path | bytes | Mapping[str, Sequence[float]]
+"""A flight's record: a CSV file, its content, or columns by name, `time_s` and `altitude_m` among them."""
+
+_ATTEMPTS: Final = 3
+_PAUSE_S: Final = 0.2
+_LANDED: Final = frozenset({TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID,
+                            TrialState.LOST, TrialState.CANCELLED})
+_NOT_FLOWN: Final = frozenset({FlightState.FAILED, FlightState.CANCELLED})
+
+M = TypeVar("M", bound=BaseModel)
+T = TypeVar("T")
+
+
+class RefusedError(GainlineError):
+    """The server has refused; `status` and `title` are those of its answer."""
+
+    def __init__(self, message: str, *, hint: str, problems: tuple[Problem, ...] = (), status: int = 0,
+                 title: str = "") -> None:
+        super().__init__(message, hint=hint, problems=problems)
+        self.status = status
+        self.title = title
+
+
+class NotFoundError(RefusedError):
+    """There is no such thing."""
+
+
+class ConflictError(RefusedError):
+    """Not possible in the present state, or decided on an outdated version."""
+
+
+class InvalidError(RefusedError):
+    """Something that was sent cannot be used; `problems` names the fields."""
+
+
+class UnavailableError(RefusedError):
+    """The server cannot be reached, or cannot store anything at present."""
+
+
+_REFUSALS: Final[Mapping[int, type[RefusedError]]] = {
+    404: NotFoundError, 409: ConflictError, 413: InvalidError, 415: InvalidError, 422: InvalidError,
+    503: UnavailableError,
+}
+
+
+class Client:
+    """A connection to one server; give your own `http` client for special needs (proxies, tests)."""
+
+    def __init__(self, address: str = "http://127.0.0.1:8000", *, timeout_s: float = 30.0,
+                 http: httpx2.Client | None = None) -> None:
+        self._http = http or httpx2.Client(base_url=address, timeout=timeout_s)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._http.close()
+
+    def campaigns(self, *, search: str = "") -> Iterator[CampaignSummary]:
+        """All campaigns whose names contain `search`, the newest first, page by page as they are needed."""
+        query = {"search": search, "limit": "200"}
+        while True:
+            page = self._get("/api/campaigns", Page[CampaignSummary], query)
+            yield from page.items
+            if page.next_cursor is None:
+                return
+            query["cursor"] = page.next_cursor
+
+    def campaign(self, campaign_id: int) -> Campaign:
+        return self._get(f"/api/campaigns/{campaign_id}", Campaign)
+
+    def create_campaign(self, name: str, *, vehicle: str = "jsbsim", options: Mapping[str, OptionValue] | None = None,
+                        definition: Definition | None = None) -> Campaign:
+        """A campaign with working defaults for whatever is left out."""
+        new = NewCampaign(name=name, vehicle=VehicleChoice(kind=vehicle, options=dict(options or {})),
+                          definition=definition or Definition())
+        return self._post("/api/campaigns", Campaign, new)
+
+    def finish(self, campaign_id: int) -> Campaign:
+        """End a campaign between flights."""
+        return self._post(f"/api/campaigns/{campaign_id}/finish", Campaign)
+
+    def ask(self, campaign_id: int, *, timeout_s: float = 60.0) -> Proposal:
+        """The next gain set for the flights so far; waits while it is computed.
+
+        `recommended` is `stop` once the campaign's own rule has ended it. Raises ConflictError when there can be none
+        (an unclassed flight blocks it), RefusedError when computing it failed, UnavailableError after `timeout_s`.
+        """
+        def ready() -> Proposal | None:
+            found = self._get(f"/api/campaigns/{campaign_id}/proposal", NextFlight)
+            if found.problem is not None:
+                kind = RefusedError if found.state == "failed" else ConflictError
+                raise kind(f"{found.problem.title} {found.problem.detail}".strip(), hint=found.problem.hint)
+            return found.proposal if found.state == "ready" else None
+
+        return _wait(ready, timeout_s, f"There is no proposal for campaign {campaign_id} after {timeout_s:g} s.",
+                     "Look whether a worker runs (GET /api/health), then ask again.")
+
+    def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *,
+             note: str = "") -> Trial:
+        """Hand in a flight made elsewhere, with the gains it was flown with; it comes back scored and classed."""
+        trial = self._plan(campaign_id, flown, note=note, fly=None)
+        return self.upload(trial.id, record)
+
+    def upload(self, trial_id: int, record: Record) -> Trial:
+        """Hand in the record of a planned trial, or the recovered one of a lost flight."""
+        return self._request("POST", f"/api/trials/{trial_id}/trajectory", Trial.model_validate_json,
+                             content=_csv(record), kind="text/csv")
+
+    def fly(self, campaign_id: int, gains: Proposal | Mapping[str, float], *, speed: float | None = None,
+            note: str = "") -> Trial:
+        """Ask for a flight of a simulated vehicle (`speed` times as fast as life, None: as fast as possible)."""
+        return self._plan(campaign_id, gains, note=note, fly=FlightOrder(speed=speed))
+
+    def wait(self, trial_id: int, *, timeout_s: float = 120.0) -> Trial:
+        """The trial once its flight is over. Raises RefusedError when it was not flown, UnavailableError after
+        `timeout_s`."""
+        def landed() -> Trial | None:
+            trial = self.trial(trial_id)
+            flight = trial.flight
+            if trial.state not in _LANDED and flight is not None and flight.state in _NOT_FLOWN:
+                raise RefusedError(f"Trial {trial.number} was not flown: {flight.problem}",
+                                   hint="It is planned as before; fly it again or cancel it.")
+            return trial if trial.state in _LANDED else None
+
+        return _wait(landed, timeout_s, f"Trial {trial_id} has not landed after {timeout_s:g} s.",
+                     "Look whether a worker runs (GET /api/health), then wait again.")
+
+    def abort(self, trial_id: int) -> AbortAnswer:
+        """End a flight now."""
+        return self._post(f"/api/trials/{trial_id}/abort", AbortAnswer)
+
+    def trials(self, campaign_id: int) -> list[Trial]:
+        return self._request("GET", f"/api/campaigns/{campaign_id}/trials", TypeAdapter(list[Trial]).validate_json)
+
+    def trial(self, trial_id: int) -> Trial:
+        return self._get(f"/api/trials/{trial_id}", Trial)
+
+    def classify(self, trial: Trial, said: Classification) -> Trial:
+        """Say what a flight is worth; whatever was computed from it is computed again."""
+        return self._post(f"/api/trials/{trial.id}/classify", Trial, said)
+
+    def trajectory(self, trial_id: int, *, points: int = 1000) -> Trajectory:
+        """The record thinned to at most so many points."""
+        return self._get(f"/api/trials/{trial_id}/trajectory", Trajectory, {"points": str(points)})
+
+    def trajectory_csv(self, trial_id: int) -> bytes:
+        """The whole record."""
+        return self._request("GET", f"/api/trials/{trial_id}/trajectory.csv", bytes)
+
+    def _plan(self, campaign_id: int, gains: Proposal | Mapping[str, float], *, note: str,
+              fly: FlightOrder | None) -> Trial:
+        asked = NewTrial(proposal_id=gains.id, note=note, fly=fly) if isinstance(gains, Proposal) else NewTrial(
+            gains=dict(gains), note=note, fly=fly)
+        return self._post(f"/api/campaigns/{campaign_id}/trials", Trial, asked)
+
+    def _get(self, path: str, kind: type[M], query: Mapping[str, str] | None = None) -> M:
+        return self._request("GET", path, kind.model_validate_json, query=query)
+
+    def _post(self, path: str, kind: type[M], body: BaseModel | None = None) -> M:
+        content = b"" if body is None else body.model_dump_json().encode()
+        return self._request("POST", path, kind.model_validate_json, content=content)
+
+    def _request(self, method: str, path: str, read: Callable[[bytes], T], *, content: bytes = b"",
+                 kind: str = "application/json", query: Mapping[str, str] | None = None) -> T:
+        headers = {"Content-Type": kind, "Idempotency-Key": uuid.uuid4().hex} if method == "POST" else {}
+        for left in reversed(range(_ATTEMPTS)):
+            try:
+                answer = self._http.request(method, path, content=content or None, headers=headers, params=query)
+            except httpx2.TransportError as error:
+                if not left:
+                    raise UnavailableError(f"{self._http.base_url} cannot be reached: {error}.", title="No connection",
+                                           hint="Start the dashboard (`gainline serve`), or check the address.",
+                                           ) from error
+                time.sleep(_PAUSE_S)
+            else:
+                if answer.is_success:
+                    return read(answer.content)
+                raise _refusal(answer)
+        raise AssertionError("the last attempt answers or raises")
+
+
+def _refusal(answer: httpx2.Response) -> RefusedError:
+    kind = _REFUSALS.get(answer.status_code, RefusedError)
+    try:
+        said = ProblemDetails.model_validate_json(answer.content)
+    except ValidationError:
+        return kind(f"The server answered {answer.status_code} {answer.reason_phrase}.", status=answer.status_code,
+                    hint="Check that the address is that of a Gainline server of this version.")
+    problems = tuple(Problem(problem.field, problem.reason) for problem in said.problems)
+    return kind(said.detail, hint=said.hint, problems=problems, status=said.status, title=said.title)
+
+
+def _csv(record: Record) -> bytes:
+    if isinstance(record, Path):
+        return record.read_bytes()
+    if isinstance(record, bytes):
+        return record
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(record)
+    writer.writerows(zip(*record.values(), strict=True))
+    return text.getvalue().encode()
+
+
+def _wait(ready: Callable[[], T | None], timeout_s: float, happened: str, hint: str) -> T:
+    deadline_s = time.monotonic() + timeout_s
+    while (found := ready()) is None:
+        if time.monotonic() > deadline_s:
+            raise UnavailableError(happened, hint=hint, title="Timed out")
+        time.sleep(_PAUSE_S)
+    return found
