@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
+from app.live.memory import FlightMemory
 from app.live.messages import FlightPhase, Telemetry
 
 WAITING_CHANGES: Final = 2000
@@ -74,12 +75,16 @@ class Hub:
 
     def __init__(self) -> None:
         self._subscriptions: set[Subscription] = set()
+        self._memory = FlightMemory()
         self._open = True
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:
-        """A subscription to whatever comes from now on; over at once when the hub is closed."""
+        """A subscription to whatever comes from now on, and before it to what is in the air since its command; over at
+        once when the hub is closed."""
         subscription = Subscription()
+        for flight in self._memory.so_far():
+            subscription.push(flight)
         self._subscriptions.add(subscription)
         if not self._open:
             subscription.end()
@@ -93,6 +98,11 @@ class Hub:
         return len(self._subscriptions)
 
     def publish(self, item: Change | Live) -> None:
+        match item:
+            case Telemetry() | FlightPhase():
+                self._memory.take(item)
+            case LinkState(worker=False):
+                self._memory.forget_all()
         for subscription in self._subscriptions:
             subscription.push(item)
 

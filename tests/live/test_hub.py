@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live
-from app.live.messages import Telemetry
+from app.live.messages import FlightPhase, Telemetry
 from app.live.watch import DatabaseWatch
 
 
@@ -53,6 +53,32 @@ def test_two_streams_see_the_same() -> None:
 
     first, second = asyncio.run(scenario())
     assert first == second == [change(1), telemetry(0.1), LinkState(worker=False), change(2)]
+
+
+def test_a_stream_that_joins_late_gets_the_flight_from_its_command_on() -> None:
+    def sample(time_s: float) -> Telemetry:
+        row = (time_s, 0.1, 0.0, 3.0, 0.0, 0.6, 12.0)
+        return Telemetry(campaign_id=1, trial_id=7, time_s=time_s, samples=[row], error_so_far=2.9)
+
+    async def first_heard(hub: Hub, now_s: float) -> list[float]:
+        """Times of the first telemetry that a new stream gets, while the flight goes on."""
+        with hub.subscribe() as stream:
+            hub.publish(sample(now_s))
+            item = await anext(aiter(stream))
+            assert isinstance(item, Telemetry)
+            return [row[0] for row in item.samples]
+
+    async def scenario() -> tuple[list[float], list[float], list[float]]:
+        hub = Hub()
+        hub.publish(sample(0.1))
+        hub.publish(sample(0.2))
+        joined = await first_heard(hub, 0.3)
+        hub.publish(FlightPhase(campaign_id=1, trial_id=7, phase="landed"))
+        after_landing = await first_heard(hub, 0.1)
+        hub.publish(LinkState(worker=False))
+        return joined, after_landing, await first_heard(hub, 0.4)
+
+    assert asyncio.run(scenario()) == ([0.1, 0.2], [0.1], [0.4])
 
 
 def test_a_stream_too_far_behind_is_ended_so_that_it_resumes_from_the_database() -> None:
