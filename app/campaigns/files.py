@@ -4,23 +4,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
-from app.core.checking import problems_of
-from app.core.definition import Definition
 from app.errors import InputError, NotFoundError, Problem
 from app.schemas import Text
-from app.vehicles.base import OptionValue
-from app.vehicles.open import check_options
 
 PRESETS_DIR: Final = Path(__file__).parent / "presets"
 MAX_FILE_BYTES: Final = 2**20
-
-_CORE: Final = TypeAdapter(Definition)
 
 
 class CampaignFile(NewCampaign):
@@ -50,28 +45,11 @@ def read_campaign_file(path: Path) -> CampaignFile:
         problems = tuple(_located(document, entry["loc"], entry["msg"]) for entry in error.errors())
         raise _no_campaign(path, problems) from error
     try:
-        check_campaign(file)
+        check_campaign(file.definition, file.vehicle)
     except InputError as error:
         problems = tuple(_located(document, problem.field.split("."), problem.reason) for problem in error.problems)
         raise _no_campaign(path, problems) from error
     return file
-
-
-def check_campaign(file: CampaignFile) -> tuple[Definition, dict[str, OptionValue]]:
-    """The campaign as the mathematics needs it, and its vehicle's complete options.
-
-    Raises InputError naming every field that cannot be used.
-    """
-    definition = _CORE.validate_python(file.definition.model_dump())
-    problems = [Problem(f"definition.{problem.field}", problem.reason) for problem in problems_of(definition)]
-    options: dict[str, OptionValue] = {}
-    try:
-        options = check_options(file.vehicle.kind, file.vehicle.options)
-    except InputError as error:
-        problems.extend(error.problems)
-    if problems:
-        raise InputError("This campaign cannot be used.", problems=tuple(problems), hint="Correct the named settings.")
-    return definition, options
 
 
 def _no_campaign(path: Path, problems: tuple[Problem, ...]) -> InputError:

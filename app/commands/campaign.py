@@ -8,7 +8,8 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
-from app.campaigns.files import CampaignFile, check_campaign, preset_names, read_campaign_file, read_preset
+from app.campaigns.definitions import check_campaign
+from app.campaigns.files import CampaignFile, preset_names, read_campaign_file, read_preset
 from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly_campaign
 from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
@@ -42,7 +43,7 @@ def run_campaign(
         max_flights=max_flights,
         settings=settings,
     )
-    definition, options = check_campaign(file)
+    definition, options = check_campaign(file.definition, file.vehicle)
     _require_wings(file)
     experiment = get_experiment(definition.experiment)
     out = console(json_out)

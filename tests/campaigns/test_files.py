@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from app.campaigns.files import check_campaign, preset_names, read_campaign_file, read_preset
+from app.campaigns.definitions import check_campaign
+from app.campaigns.files import CampaignFile, preset_names, read_campaign_file, read_preset
+from app.core.definition import Definition
 from app.errors import InputError, NotFoundError
 
 
@@ -15,9 +17,13 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
+def checked(file: CampaignFile) -> Definition:
+    return check_campaign(file.definition, file.vehicle)[0]
+
+
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_is_a_campaign_that_can_be_created(name: str) -> None:
-    definition, _ = check_campaign(read_preset(name))
+    definition = checked(read_preset(name))
     assert definition.experiment == "takeoff"
 
 
@@ -71,7 +77,7 @@ DOCUMENT = (Path(__file__).parents[2] / "docs" / "campaign-files.md").read_text(
 
 def test_the_documented_example_holds_the_defaults_and_names_every_field(tmp_path: Path) -> None:
     example = DOCUMENT.split("```yaml\n")[1].split("```")[0]
-    documented, _ = check_campaign(read_campaign_file(written(tmp_path, example)))
-    default, _ = check_campaign(read_campaign_file(written(tmp_path, "name: x\n")))
+    documented = checked(read_campaign_file(written(tmp_path, example)))
+    default = checked(read_campaign_file(written(tmp_path, "name: x\n")))
     assert replace(documented, options={}, bounds={}) == default
     assert [field.name for field in fields(documented) if f"  {field.name}: " not in example.replace(":\n", ": ")] == []
