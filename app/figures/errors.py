@@ -1,13 +1,16 @@
 """The error of each flight: measured, predicted, best so far, and what the next one must beat."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
 from app.figures.history import FlightData, History
 from app.figures.scale import robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
+
+FEW: Final = 8
+"""Up to so many flights each carries its error in print."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +55,10 @@ class ErrorsFigure:
         layout = theme.layout(
             palette,
             xaxis=theme.titled(
-                palette, "Flight", range=[0.5, last + 0.6], dtick=max(1, -(-last // 12)), showgrid=False
+                palette, "Flight", range=[0.5, last + 0.95], dtick=max(1, -(-last // 12)), showgrid=False
             ),
-            yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, span.high]),
+            yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, 1.08 * span.high], nticks=6),
+            annotations=self._labels(palette, span.high),
             uirevision="errors",
         )
         return Card(
@@ -74,13 +78,10 @@ class ErrorsFigure:
         return [
             {
                 "type": "scatter",
-                "mode": "markers+text",
+                "mode": "markers",
                 "name": "Measured",
                 "x": [flight.number for flight in flights],
                 "y": [_rounded(flight.error) for flight in flights],
-                "text": [f"{flight.error:.3f}" if flight is best or len(flights) <= 10 else "" for flight in flights],
-                "textposition": "top center",
-                "textfont": {"size": 12, "color": palette.ink},
                 "cliponaxis": False,
                 "marker": {
                     "size": [13 if flight is best else 9 for flight in flights],
@@ -92,8 +93,27 @@ class ErrorsFigure:
             }
         ]
 
+    def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
+        """The error beside each mark, clear of the steps; with many flights above the best only."""
+        flights, best = self.history.valid, self.history.best
+        return [
+            {
+                "x": flight.number,
+                "y": flight.error,
+                "text": f"{flight.error:.3f}",
+                "showarrow": False,
+                "xanchor": "left",
+                "xshift": 5,
+                "yshift": 10,
+                "font": {"size": 12, "color": palette.best if flight is best else palette.ink},
+            }
+            for flight in flights
+            if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
+        ]
+
     def _not_counted(self, palette: Palette) -> list[dict[str, object]]:
-        flights = [flight for flight in self.history.flights if flight.outcome != "valid" and flight.error is not None]
+        """A cross on the axis: these flights have no error that would mean anything."""
+        flights = [flight for flight in self.history.flights if flight.outcome != "valid"]
         if not flights:
             return []
         return [
@@ -102,11 +122,12 @@ class ErrorsFigure:
                 "mode": "markers",
                 "name": "Not counted",
                 "x": [flight.number for flight in flights],
-                "y": [_rounded(flight.error) for flight in flights],
+                "y": [0.0 for _ in flights],
                 "text": [flight.outcome for flight in flights],
                 "marker": {"size": 10, "symbol": "x-thin", "line": {"width": 2, "color": palette.bad}},
                 "meta": {"role": "not counted"},
-                "hovertemplate": f"<b>Flight %{{x}}, %{{text}}</b><br>{self._reading}<extra></extra>",
+                "cliponaxis": False,
+                "hovertemplate": "<b>Flight %{x}, %{text}</b><extra></extra>",
             }
         ]
 
@@ -135,7 +156,7 @@ class ErrorsFigure:
             {
                 "type": "scatter",
                 "mode": "lines",
-                "name": f"Progress counts below {value:.3f}",
+                "name": f"To beat: {value:.3f}",
                 "x": [0.5, last + 1.5],
                 "y": [value, value],
                 "line": theme.line(palette.dim, 1.25, "dot"),

@@ -11,6 +11,8 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 
 CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
+HEADROOM: Final = 1.15
+"""Room above the set point, as a multiple of it, for the flight that is still to come."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
 
@@ -39,20 +41,25 @@ class TakeoffsFigure:
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
         traces += [*self._prediction(palette), self._live(palette)]
         peaks = [float(flight.curve.values.max()) for flight in drawn if flight.curve is not None]
-        span = robust_range(peaks, low=0.0, high=float(history.set_point.values.max()))
-        traces += [_off_scale(palette, drawn[index], span.high) for index in span.outside]
+        predicted = [] if history.proposal is None or history.proposal.curve is None else [history.proposal.curve]
+        span = robust_range(
+            [*peaks, *(float(curve.values.max()) for curve in predicted)],
+            low=0.0,
+            high=HEADROOM * float(history.set_point.values.max()),
+        )
+        traces += [_off_scale(palette, drawn[index], span.high) for index in span.outside if index < len(drawn)]
         unit = history.output_unit
         layout = theme.layout(
             palette,
             xaxis=theme.titled(palette, "Time since the command (s)", range=self._time_range()),
-            yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[span.low, span.high]),
+            yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[span.low, span.high], nticks=7),
             uirevision="takeoffs",
         )
         return Card(
             name=self.name,
             title=self.title,
             state="ready",
-            summary=self._summary(len(span.outside)),
+            summary=self._summary(sum(index < len(drawn) for index in span.outside)),
             figure=plotly_json(traces, layout),
             table=self._table(drawn),
         )

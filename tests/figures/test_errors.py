@@ -21,6 +21,7 @@ def test_measured_errors_and_the_best_so_far_are_drawn_as_flown() -> None:
     card = ErrorsFigure(history(*TABLE_1)).compute()
     assert trace(card, "measured")["y"] == [0.3267, 0.1873, 0.1788, 0.1467, 0.1515]
     assert trace(card, "best so far")["y"] == [0.3267, 0.1873, 0.1788, 0.1467, 0.1467]
+    assert [label["text"] for label in layout(card)["annotations"]] == ["0.327", "0.187", "0.179", "0.147", "0.151"]
     assert trace(card, "measured")["marker"]["symbol"] == ["circle", "circle", "circle", "star", "circle"]
 
 
@@ -38,9 +39,9 @@ def test_predictions_of_flown_and_of_the_next_flight_are_open_diamonds() -> None
 
 
 def test_an_invalid_flight_is_a_cross_and_never_the_best() -> None:
-    card = ErrorsFigure(history(flight(1, 0.3), flight(2, 0.05, outcome="invalid"), flight(3, 0.2))).compute()
+    card = ErrorsFigure(history(flight(1, 0.3), flight(2, None, outcome="invalid"), flight(3, 0.2))).compute()
     assert trace(card, "measured")["x"] == [1, 3]
-    assert trace(card, "not counted")["x"] == [2]
+    assert (trace(card, "not counted")["x"], trace(card, "not counted")["y"]) == ([2], [0.0])
     assert trace(card, "best so far")["y"] == [0.3, 0.2]
     assert card.summary == "Best error 0.200 m in flight 3, 33 % below flight 1."
 
@@ -52,10 +53,10 @@ def test_a_flight_with_a_huge_error_is_marked_at_the_edge_with_its_value() -> No
 
 
 def test_the_table_lists_every_flight_with_its_running_best() -> None:
-    card = ErrorsFigure(history(flight(1, 0.3), flight(2, 0.05, outcome="invalid"), flight(3, 0.2))).compute()
+    card = ErrorsFigure(history(flight(1, 0.3), flight(2, None, outcome="invalid"), flight(3, 0.2))).compute()
     assert card.table is not None
     assert card.table.rows == (
         (1, "valid", 0.3, None, 0.3),
-        (2, "invalid", 0.05, None, None),
+        (2, "invalid", None, None, None),
         (3, "valid", 0.2, None, 0.2),
     )

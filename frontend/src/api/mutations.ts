@@ -107,6 +107,8 @@ export function useUploadRecord(campaignId: number) {
   });
 }
 
+export type RecordUpload = ReturnType<typeof useUploadRecord>;
+
 export function useRecompute(campaignId: number) {
   const settled = useSettled();
   return useMutation({

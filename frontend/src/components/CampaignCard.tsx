@@ -14,12 +14,13 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
   return (
     <li className={classes["card"]}>
       <div className={classes["top"]}>
-        <VehicleBadge isReal={vehicle.is_real} title={vehicle.title} />
+        <VehicleBadge isReal={vehicle.is_real} />
         <StateBadge words={campaignWords(state, outcome)} />
       </div>
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
       </h2>
+      <p className={classes["vehicle"]}>{vehicle.title}</p>
       <Sparkline curves={spark} />
       <dl className={`${classes["figures"]} numbers`}>
         <div>

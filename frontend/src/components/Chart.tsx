@@ -1,5 +1,5 @@
 import { useEffect, useRef, useState } from "react";
-import { clickedTrial, type PlotlyFigure, traceWithRole, withLive } from "../lib/traces";
+import { clickedTrial, narrowed, type PlotlyFigure, traceWithRole, withLive } from "../lib/traces";
 import { liveNow } from "../live/store";
 import classes from "./Chart.module.css";
 import { CONFIG, drawLive, loadPlotly } from "./plotly";
@@ -18,11 +18,16 @@ interface Props {
   onChoose?: (trial: number) => void;
 }
 
+const NARROW_PX = 420;
 const coarse = window.matchMedia("(pointer: coarse)");
 
 /** Brushing zooms with a mouse; a finger has to be able to scroll the page. */
-function layoutFor(layout: Record<string, unknown>): Record<string, unknown> {
-  return { ...layout, autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
+function layoutFor(layout: Record<string, unknown>, width: number): Record<string, unknown> {
+  return {
+    ...(width < NARROW_PX ? narrowed(layout) : layout),
+    autosize: true,
+    ...(coarse.matches ? { dragmode: false } : {}),
+  };
 }
 
 export function Chart({ figure, label, height, liveTrial = null, onChoose }: Props) {
@@ -39,7 +44,12 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
       try {
         const plotly = await loadPlotly();
         if (!wanted) return;
-        await plotly.react(target, withLive(figure.data, liveNow(liveTrial)), layoutFor(figure.layout), CONFIG);
+        await plotly.react(
+          target,
+          withLive(figure.data, liveNow(liveTrial)),
+          layoutFor(figure.layout, target.clientWidth),
+          CONFIG,
+        );
         target.removeAllListeners?.("plotly_click");
         target.on?.("plotly_click", ({ points }) => {
           const trial = clickedTrial(figure.data, points[0]?.curveNumber ?? -1);
@@ -78,7 +88,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
 
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset is for forms; this groups a drawing's parts under one name
-    <div role="group" aria-label={label} className={classes["frame"]} style={{ height }}>
+    <div role="group" aria-label={label} className={classes["frame"]} style={{ height: `min(${height}px, 96vw)` }}>
       {broken !== null && (
         <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table still works.</p>
       )}

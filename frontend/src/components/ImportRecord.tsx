@@ -1,19 +1,17 @@
 import { Button, FileButton } from "@mantine/core";
 import { IconFileUpload } from "@tabler/icons-react";
-import { useUploadRecord } from "../api/mutations";
-import type { Campaign } from "../api/types";
+import type { RecordUpload } from "../api/mutations";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
 
 interface Props {
-  campaign: Campaign;
+  upload: RecordUpload;
   trialId?: number;
   proposalId?: number;
 }
 
 /** Hand in the record of a flight made elsewhere with these gains. */
-export function ImportRecord({ campaign, trialId, proposalId }: Props) {
-  const upload = useUploadRecord(campaign.id);
+export function ImportRecord({ upload, trialId, proposalId }: Props) {
   return (
     <div className={classes["stack"]}>
       <p className={classes["quiet"]}>

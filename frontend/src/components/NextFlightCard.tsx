@@ -1,5 +1,5 @@
 import { Button, Loader } from "@mantine/core";
-import { useRecompute } from "../api/mutations";
+import { useRecompute, useUploadRecord } from "../api/mutations";
 import type { Campaign, NextFlight, Trial } from "../api/types";
 import { nextStep } from "../lib/nextStep";
 import { FinishedCard } from "./FinishedCard";
@@ -20,16 +20,18 @@ interface Props {
 /** Always one recommended thing to do, whatever state the campaign is in. */
 export function NextFlightCard({ campaign, next, trials, onChoose }: Props) {
   const step = nextStep(campaign, next, trials);
+  // Held here, so that a refused record is still explained when its trial has become a planned one.
+  const upload = useUploadRecord(campaign.id);
   switch (step.kind) {
     case "flying":
       return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
     case "finished":
       return <FinishedCard campaign={campaign} trials={trials} onChoose={onChoose} />;
     case "planned":
-      return <PlannedCard campaign={campaign} trial={step.trial} />;
+      return <PlannedCard campaign={campaign} trial={step.trial} upload={upload} />;
     case "propose":
     case "nothing better":
-      return <ProposalCard campaign={campaign} proposal={step.proposal} trials={trials} />;
+      return <ProposalCard campaign={campaign} proposal={step.proposal} trials={trials} upload={upload} />;
     case "judge":
       return (
         <Panel title={`Flight ${step.trial.number} wants your word`}>

@@ -1,6 +1,6 @@
 import { Button } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
-import { useCancelTrial, useFlyTrial } from "../api/mutations";
+import { type RecordUpload, useCancelTrial, useFlyTrial } from "../api/mutations";
 import type { Campaign, Trial } from "../api/types";
 import { gainText, withUnit } from "../lib/format";
 import { speedOf } from "../lib/nextStep";
@@ -10,8 +10,14 @@ import { Panel } from "./Panel";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { Trouble } from "./Trouble";
 
+interface Props {
+  campaign: Campaign;
+  trial: Trial;
+  upload: RecordUpload;
+}
+
 /** A trial that is planned and has not flown: fly it, hand in its record, or give it up. */
-export function PlannedCard({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
+export function PlannedCard({ campaign, trial, upload }: Props) {
   const [speed, setSpeed] = useSpeed();
   const fly = useFlyTrial(campaign.id);
   const cancel = useCancelTrial();
@@ -45,7 +51,7 @@ export function PlannedCard({ campaign, trial }: { campaign: Campaign; trial: Tr
             <SpeedSwitch value={speed} onChange={setSpeed} />
           </>
         ) : (
-          <ImportRecord campaign={campaign} trialId={trial.id} />
+          <ImportRecord upload={upload} trialId={trial.id} />
         )}
         <Button
           variant="default"

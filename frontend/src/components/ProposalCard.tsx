@@ -1,7 +1,7 @@
 import { Button } from "@mantine/core";
 import { IconPencil, IconPlaneDeparture, IconRepeat } from "@tabler/icons-react";
 import { useState } from "react";
-import { useCreateTrial } from "../api/mutations";
+import { type RecordUpload, useCreateTrial } from "../api/mutations";
 import type { Campaign, Proposal, Trial } from "../api/types";
 import { percentChange, signed, withUnit } from "../lib/format";
 import { bestOf, speedOf } from "../lib/nextStep";
@@ -19,17 +19,19 @@ interface Props {
   campaign: Campaign;
   proposal: Proposal;
   trials: readonly Trial[];
+  upload: RecordUpload;
 }
 
 const KINDS: Record<Proposal["kind"], string> = {
   start: "Start",
   step: "Step",
+  manual: "By hand",
   "shorter step": "Shorter step",
   none: "Nothing better found",
 };
 
 /** The proposed flight: gains now and next, what it should bring and why, and one button that flies it. */
-export function ProposalCard({ campaign, proposal, trials }: Props) {
+export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const [editing, setEditing] = useState(false);
   const [speed, setSpeed] = useSpeed();
   const create = useCreateTrial(campaign.id);
@@ -64,7 +66,7 @@ export function ProposalCard({ campaign, proposal, trials }: Props) {
             <SpeedSwitch value={speed} onChange={setSpeed} />
           </>
         ) : (
-          <ImportRecord campaign={campaign} proposalId={proposal.id} />
+          <ImportRecord upload={upload} proposalId={proposal.id} />
         )}
         <Trouble error={create.error} />
         <div>

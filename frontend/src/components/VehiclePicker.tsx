@@ -13,7 +13,7 @@ interface Props {
 
 export function VehiclePicker({ kinds, value, error, onChange }: Props) {
   return (
-    <Radio.Group label="Vehicle" value={value} onChange={onChange} error={error}>
+    <Radio.Group size="md" label="Vehicle" value={value} onChange={onChange} error={error}>
       <div className={classes["cards"]}>
         {vehicleOrder(kinds).map((kind) => (
           <Radio.Card key={kind.name} value={kind.name} className={classes["card"]}>

@@ -3,7 +3,7 @@ import { IconDownload } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { recordCsv } from "../api/queries";
 import type { Trial } from "../api/types";
-import { gainText, signed, withUnit } from "../lib/format";
+import { gainText, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { compared } from "../lib/verdict";
 import { Classify } from "./Classify";
@@ -22,10 +22,12 @@ interface Props {
 
 function Change({ percent }: { percent: number | null }) {
   if (percent === null) return null;
-  const words = percent < 0 ? "lower" : "higher";
+  const size = Math.abs(percent).toFixed(0);
+  if (size === "0") return <small>the same</small>;
+  const lower = percent < 0;
   return (
-    <small data-better={percent < 0 || undefined}>
-      {signed(percent)} % {Math.abs(percent) < 0.5 ? "" : words}
+    <small data-better={lower || undefined}>
+      {size} % {lower ? "lower" : "higher"}
     </small>
   );
 }
@@ -39,7 +41,9 @@ export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
       tools={<StateBadge words={trialWords(trial.state)} />}
     >
       <p className={classes["sentence"]}>{trial.verdict || trial.reason}</p>
-      {trial.verdict && trial.reason && <p className={classes["reason"]}>{trial.reason}</p>}
+      {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
+        <p className={classes["reason"]}>{trial.reason}</p>
+      )}
       <dl className={`${classes["figures"]} numbers`}>
         <div>
           <dt>Error</dt>

@@ -3,6 +3,7 @@
 import type Plotly from "plotly.js-cartesian-dist-min";
 import type { LiveFlight } from "../lib/live";
 import { paced } from "../lib/pace";
+import { roomFor } from "../lib/traces";
 import { onLive } from "../live/store";
 
 let loading: Promise<typeof Plotly> | undefined;
@@ -23,13 +24,19 @@ export const CONFIG = {
 
 const SHORTEST_REDRAW_MS = 90;
 
+interface PlotlyElement extends HTMLElement {
+  layout?: { yaxis?: { range?: [number, number] } };
+}
+
 /** Grow the chart's live trace as telemetry of a trial comes; returns the function that ends it. */
 export function drawLive(chart: HTMLElement, trace: number, trialId: number): () => void {
   let latest: LiveFlight | null = null;
   const drawing = paced(async () => {
     if (latest === null || latest.timeS.length === 0) return;
     const plotly = await loadPlotly();
-    await plotly.restyle(chart, { x: [latest.timeS], y: [latest.altitudeM], showlegend: true }, [trace]);
+    const change = { x: [latest.timeS], y: [latest.altitudeM], showlegend: true };
+    const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.altitudeM);
+    await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, [trace]);
   }, SHORTEST_REDRAW_MS);
   const unfollow = onLive(trialId, (flight) => {
     latest = flight;

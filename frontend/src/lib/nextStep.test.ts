@@ -37,6 +37,11 @@ test("a proposal that could not be computed says why", () => {
   expect(nextStep(campaign, { state: "failed", proposal: null, problem }, [])).toEqual({ kind: "failed", problem });
 });
 
+test("a computation that was cancelled can be asked for again", () => {
+  const problem = { title: "There is no proposal for the present flights.", detail: "", hint: "" };
+  expect(nextStep(campaign, { state: "none", proposal: null, problem }, [])).toEqual({ kind: "failed", problem });
+});
+
 test("a strategy with nothing better to offer is not flown by default", () => {
   const none = { ...proposal, kind: "none" } as Proposal;
   expect(nextStep(campaign, { ...ready, proposal: none }, [])).toEqual({ kind: "nothing better", proposal: none });

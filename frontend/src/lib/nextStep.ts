@@ -21,7 +21,7 @@ export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly 
   if (campaign.state === "finished" || campaign.state === "archived") return { kind: "finished" };
   const planned = trials.find((trial) => trial.state === "planned" || trial.state === "staged");
   if (planned !== undefined) return { kind: "planned", trial: planned };
-  if (next.state === "failed") return { kind: "failed", problem: next.problem };
+  if (next.state === "failed" || next.state === "none") return { kind: "failed", problem: next.problem };
   if (next.state === "ready" && next.proposal !== null && !next.proposal.stale) return offered(next.proposal);
   return { kind: "computing" };
 }

@@ -1,6 +1,15 @@
 import { expect, test } from "vitest";
 import { begun } from "./live";
-import { clickedTrial, type Trace, traceWithRole, withChosen, withLive, withTimeRange } from "./traces";
+import {
+  clickedTrial,
+  narrowed,
+  roomFor,
+  type Trace,
+  traceWithRole,
+  withChosen,
+  withLive,
+  withTimeRange,
+} from "./traces";
 
 const traces: Trace[] = [
   { meta: { role: "set point" }, x: [0, 32], y: [3, 3] },
@@ -34,6 +43,19 @@ test("a click on a flight's curve names the flight, a click on the set point not
   expect(clickedTrial(traces, 0)).toBeNull();
   expect(clickedTrial(traces, 99)).toBeNull();
   expect(traceWithRole(traces, "live")).toBe(3);
+});
+
+test("an axis grows with a live curve that leaves it, and only then", () => {
+  expect(roomFor([-0.2, 3.6], [0, 3.5])).toEqual([-0.2, 3.6]);
+  expect(roomFor([0, 3.6], [0, 5, 4])).toEqual([0, 5.5]);
+  expect(roomFor([0, 3.6], [])).toEqual([0, 3.6]);
+});
+
+test("a narrow screen gets a smaller legend of the same colours", () => {
+  expect(narrowed({ legend: { font: { color: "red", size: 12 } }, xaxis: {} })).toEqual({
+    legend: { font: { color: "red", size: 11 }, entrywidth: 96, entrywidthmode: "pixels" },
+    xaxis: {},
+  });
 });
 
 test("the time axis can be cut without losing the rest of the layout", () => {

@@ -56,6 +56,20 @@ export function clickedTrial(traces: readonly Trace[], curveNumber: number): num
   return meta?.role === "flight" || meta?.role === "off scale" ? (meta.trial ?? null) : null;
 }
 
+/** The same layout for a narrow screen: a smaller legend in two columns. */
+export function narrowed(layout: Record<string, unknown>): Record<string, unknown> {
+  const legend = typeof layout["legend"] === "object" && layout["legend"] !== null ? layout["legend"] : {};
+  const font = "font" in legend && typeof legend.font === "object" ? legend.font : {};
+  return { ...layout, legend: { ...legend, font: { ...font, size: 11 }, entrywidth: 96, entrywidthmode: "pixels" } };
+}
+
+/** The top of an axis that a growing curve still fits under: `range` itself, or raised to the curve's peak. */
+export function roomFor(range: readonly [number, number], values: readonly number[]): [number, number] {
+  const peak = values.reduce((highest, value) => Math.max(highest, value), Number.NEGATIVE_INFINITY);
+  const [low, high] = range;
+  return peak <= high ? [low, high] : [low, low + 1.1 * (peak - low)];
+}
+
 /** The same layout with its first x axis cut to `range`, or as it was for null. */
 export function withTimeRange(layout: Record<string, unknown>, range: readonly [number, number] | null) {
   if (range === null) return layout;

@@ -31,7 +31,8 @@ test("the latest flight is shown until another is chosen; a plan is no flight", 
 test("what a flight may be classed as follows from what it is", () => {
   expect(otherClasses(first)).toEqual(["invalid"]);
   expect(otherClasses(glitch)).toEqual(["valid"]);
-  expect(otherClasses(trial(5, "invalid", null))).toEqual(["aborted"]);
+  const stopped = { ...trial(5, "invalid", null), flight: { id: 1, state: "aborted", problem: "" } } as Trial;
+  expect(otherClasses(stopped)).toEqual(["aborted"]);
   expect(otherClasses(trial(6, "captured", 0.2))).toEqual(["valid", "aborted", "invalid"]);
   expect(otherClasses({ ...first, actions: [] })).toEqual([]);
 });

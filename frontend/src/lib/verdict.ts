@@ -40,9 +40,9 @@ export function otherClasses(trial: Trial): ("valid" | "aborted" | "invalid")[] 
     case "aborted":
       return ["invalid"];
     case "invalid":
-      return [trial.error === null ? "aborted" : "valid"];
+      return [trial.flight?.state === "aborted" ? "aborted" : "valid"];
     case "captured":
-      return trial.error === null ? ["aborted", "invalid"] : ["valid", "aborted", "invalid"];
+      return ["valid", "aborted", "invalid"];
     case "lost":
       return ["invalid"];
     default:

@@ -61,29 +61,33 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
   return (
     <>
       <CampaignHeader campaign={campaign} />
-      <div className={classes["columns"]}>
-        <FigurePanel
-          title="Takeoff curves"
-          className={classes["curves"]}
-          card={takeoffs.data}
-          error={takeoffs.error}
-          height={440}
-          dressed={useDressed(chosen, span)}
-          liveTrial={campaign.flying?.trial_id ?? null}
-          onChoose={choose}
-          tools={
-            <SegmentedControl
-              aria-label="Time shown"
-              size="sm"
-              value={span}
-              onChange={setSpan}
-              data={[
-                { value: "first", label: "First 8 s" },
-                { value: "whole", label: "Whole flight" },
-              ]}
-            />
-          }
-        />
+      <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
+        <div className={classes["flown"]}>
+          <FigurePanel
+            title="Takeoff curves"
+            card={takeoffs.data}
+            error={takeoffs.error}
+            height={440}
+            dressed={useDressed(chosen, span)}
+            liveTrial={campaign.flying?.trial_id ?? null}
+            onChoose={choose}
+            tools={
+              <SegmentedControl
+                aria-label="Time shown"
+                size="sm"
+                value={span}
+                onChange={setSpan}
+                data={[
+                  { value: "first", label: "First 8 s" },
+                  { value: "whole", label: "Whole flight" },
+                ]}
+              />
+            }
+          />
+          {shown !== null && (
+            <VerdictPanel trial={shown} trials={trials} isBest={shown.id === campaign.best?.trial_id} />
+          )}
+        </div>
         <div className={classes["next"]}>
           {next.data ? (
             <NextFlightCard campaign={campaign} next={next.data} trials={trials} onChoose={setChosen} />
@@ -92,11 +96,6 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
           )}
         </div>
       </div>
-      {shown !== null && (
-        <div className={classes["row"]}>
-          <VerdictPanel trial={shown} trials={trials} isBest={shown.id === campaign.best?.trial_id} />
-        </div>
-      )}
       <div className={classes["halves"]}>
         <FigurePanel title="Error per flight" card={errors.data} error={errors.error} height={300} onChoose={choose} />
         <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={300} />

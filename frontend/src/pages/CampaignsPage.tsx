@@ -52,6 +52,7 @@ export function CampaignsPage() {
         <SegmentedControl
           aria-label="State"
           size="md"
+          className={classes["states"]}
           value={state}
           onChange={(value) => setState(value as StateFilter)}
           data={STATE_FILTERS}

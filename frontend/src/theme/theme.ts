@@ -14,10 +14,26 @@ const petrol: MantineColorsTuple = [
   "#034f46",
 ];
 
+/** Mantine's greys for the dark theme, on the blue side like the page behind them. */
+const dark: MantineColorsTuple = [
+  "#eef2f6",
+  "#c9d1da",
+  "#a9b4c1",
+  "#75818f",
+  "#3b444f",
+  "#2d343e",
+  "#1f252e",
+  "#181d24",
+  "#10141a",
+  "#0b0e12",
+];
+
 export const TOUCH_TARGET_PX = 48;
 
+const tall = { styles: { input: { minHeight: TOUCH_TARGET_PX } }, defaultProps: { size: "md" } } as const;
+
 export const theme = createTheme({
-  colors: { petrol },
+  colors: { petrol, dark },
   primaryColor: "petrol",
   primaryShade: 7,
   defaultRadius: "md",
@@ -29,10 +45,10 @@ export const theme = createTheme({
   components: {
     Button: { defaultProps: { size: "md" }, styles: { root: { minHeight: TOUCH_TARGET_PX } } },
     ActionIcon: { defaultProps: { size: TOUCH_TARGET_PX, variant: "subtle" } },
-    TextInput: { defaultProps: { size: "md" } },
-    NumberInput: { defaultProps: { size: "md" } },
-    Select: { defaultProps: { size: "md" } },
+    TextInput: tall,
+    NumberInput: tall,
+    Select: tall,
     Textarea: { defaultProps: { size: "md" } },
-    FileInput: { defaultProps: { size: "md" } },
+    FileInput: tall,
   },
 });

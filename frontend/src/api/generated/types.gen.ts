@@ -58,7 +58,7 @@ export type BestTrial = {
      * Gains
      */
     gains: {
-        [key: string]: number;
+        [key: string]: number | number;
     };
 };
 
@@ -645,15 +645,15 @@ export type GainChange = {
     /**
      * Now
      */
-    now: number;
+    now: number | number;
     /**
      * Next
      */
-    next: number;
+    next: number | number;
     /**
      * Delta
      */
-    delta: number;
+    delta: number | number;
 };
 
 /**
@@ -732,13 +732,13 @@ export type GivenGains = {
      * Asked
      */
     asked: {
-        [key: string]: number;
+        [key: string]: number | number;
     };
     /**
      * Read Back
      */
     read_back: {
-        [key: string]: number;
+        [key: string]: number | number;
     } | null;
     /**
      * Outcome
@@ -1033,7 +1033,7 @@ export type Proposal = {
      * Gains
      */
     gains: {
-        [key: string]: number;
+        [key: string]: number | number;
     };
     /**
      * Changes
@@ -1364,13 +1364,13 @@ export type Trial = {
      * Gains
      */
     gains: {
-        [key: string]: number;
+        [key: string]: number | number;
     };
     /**
      * Read Back
      */
     read_back: {
-        [key: string]: number;
+        [key: string]: number | number;
     } | null;
     /**
      * Proposal Id
@@ -1553,7 +1553,7 @@ export type Vehicle = {
      * Safe Gains
      */
     safe_gains: {
-        [key: string]: number;
+        [key: string]: number | number;
     };
     /**
      * Actions

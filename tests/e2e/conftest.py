@@ -1,0 +1,150 @@
+"""A real server, a real Chromium, and the dashboard between them."""
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import Browser, Page, Playwright, sync_playwright
+
+from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport
+
+HERE = Path(__file__).parent
+BUILT = HERE.parents[1] / "frontend" / "dist" / "index.html"
+FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+         "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if HERE in item.path.parents:
+            item.add_marker(pytest.mark.browser)
+            item.add_marker(pytest.mark.timeout(180))
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip("no Chromium found; install one (Debian: apt-get install chromium) to run the browser tests")
+    return found
+
+
+@pytest.fixture(scope="session")
+def playwright() -> Iterator[Playwright]:
+    with sync_playwright() as running:
+        yield running
+
+
+@pytest.fixture(scope="session")
+def browser(playwright: Playwright, chromium: str) -> Iterator[Browser]:
+    running = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+    yield running
+    running.close()
+
+
+class Server:
+    """`gainline serve` in a process of its own."""
+
+    def __init__(self, data_dir: Path, port: int = 0) -> None:
+        self.data_dir = data_dir
+        self._port = port
+        self._process: subprocess.Popen[str] | None = None
+        self.url = ""
+
+    def start(self) -> None:
+        assert BUILT.is_file(), "the UI is not built; run ./dev ui"
+        gainline = Path(sys.executable).with_name("gainline")
+        self._process = subprocess.Popen(
+            [gainline, "serve", "--port", str(self._port), "--data-dir", self.data_dir],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
+        assert self._process.stdout is not None
+        said = []
+        for line in self._process.stdout:
+            said.append(line)
+            if (found := re.search(r"http://\S+:\d+", line)) is not None:
+                self.url = found.group()
+                self._port = urlsplit(self.url).port or 0
+                return
+        pytest.fail("the server did not start:\n" + "".join(said))
+
+    def stop(self) -> None:
+        if self._process is not None:
+            self._process.send_signal(signal.SIGTERM)
+            self._process.communicate(timeout=30)
+            self._process = None
+
+
+@contextmanager
+def served(data_dir: Path, port: int = 0) -> Iterator[Server]:
+    server = Server(data_dir, port)
+    try:
+        server.start()
+        yield server
+    finally:
+        server.stop()
+
+
+@pytest.fixture(scope="session")
+def shared_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One server for all tests that do not mind each other's campaigns."""
+    with served(tmp_path_factory.mktemp("shared")) as server:
+        yield server
+
+
+@pytest.fixture
+def own_server(tmp_path: Path) -> Iterator[Server]:
+    """A server with an empty database."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    with served(tmp_path / "data", port) as server:
+        yield server
+
+
+Opener = Callable[..., Dashboard]
+
+
+@pytest.fixture
+def open_dashboard(browser: Browser) -> Iterator[Opener]:
+    """Opens a dashboard in a browser profile of its own; afterwards nothing must have gone wrong in any of them."""
+    wrong: list[str] = []
+    with ExitStack() as stack:
+
+        def open_one(url: str, *, theme: Theme = "light", viewport: Viewport = TABLET) -> Dashboard:
+            context = browser.new_context(base_url=url, color_scheme=theme, viewport=viewport, accept_downloads=True)
+            stack.callback(context.close)
+            page = context.new_page()
+            page.set_default_timeout(20_000)
+            _watch(page, url, wrong)
+            return Dashboard(page, url)
+
+        yield open_one
+    assert wrong == []
+
+
+def _watch(page: Page, url: str, wrong: list[str]) -> None:
+    """Note scripts that failed and requests to any other host."""
+    own = urlsplit(url).netloc
+    page.on("pageerror", lambda error: wrong.append(f"script error: {error}"))
+
+    def look(address: str) -> None:
+        parts = urlsplit(address)
+        if parts.scheme in {"http", "https", "ws", "wss"} and parts.netloc != own:
+            wrong.append(f"request to another host: {address}")
+
+    page.on("request", lambda request: look(request.url))
+    page.on("websocket", lambda socket: look(socket.url))
+
+
+@pytest.fixture
+def dashboard(open_dashboard: Opener, shared_server: Server) -> Dashboard:
+    return open_dashboard(shared_server.url)

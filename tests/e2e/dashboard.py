@@ -1,0 +1,141 @@
+"""The dashboard as a test sees it: what is on the page, what a chart has drawn, and what the API says."""
+
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from playwright.sync_api import Locator, Page, ViewportSize, expect
+
+T = TypeVar("T")
+Theme = Literal["light", "dark"]
+Viewport = ViewportSize
+Json = dict[str, Any]
+
+TABLET: Final = Viewport(width=1024, height=768)
+PHONE: Final = Viewport(width=390, height=844)
+CHARTS: Final = {"takeoffs": "Takeoff curves", "errors": "Error per flight", "gains": "Gains per flight",
+                 "flight": "Record"}  # fmt: skip
+
+_READ_TRACES: Final = """
+gd => gd.data.map(trace => ({
+  meta: trace.meta, name: trace.name, x: Array.from(trace.x ?? []), y: Array.from(trace.y ?? []),
+  dash: trace.line?.dash, width: trace.line?.width,
+}))
+"""
+
+
+class Dashboard:
+    """One tab."""
+
+    def __init__(self, page: Page, url: str) -> None:
+        self.page = page
+        self.url = url
+
+    # ---- pages
+
+    def open(self, path: str = "/") -> None:
+        self.page.goto(path)
+        expect(self.page.get_by_text("Live", exact=True)).to_be_visible()
+
+    def open_campaign(self, campaign_id: int) -> None:
+        self.open(f"/campaigns/{campaign_id}")
+        expect(self.plot("takeoffs")).to_be_visible()
+
+    @property
+    def campaign_id(self) -> int:
+        """The campaign of the page."""
+        found = re.search(r"/campaigns/(\d+)", self.page.url)
+        assert found is not None, self.page.url
+        return int(found.group(1))
+
+    def button(self, name: str) -> Locator:
+        return self.page.get_by_role("button", name=name, exact=True)
+
+    def panel(self, title: str) -> Locator:
+        """The panel with that heading, or one that begins so."""
+        heading = self.page.get_by_role("heading", name=re.compile(rf"^{re.escape(title)}"))
+        return self.page.locator("section").filter(has=heading)
+
+    def choose_speed(self, label: Literal["1×", "10×", "Max"]) -> None:
+        self.page.get_by_role("radiogroup", name="Simulated at").get_by_text(label, exact=True).click()
+
+    def fly(self) -> None:
+        self.button("Fly next trial").click()
+
+    # ---- charts
+
+    def plot(self, chart: str) -> Locator:
+        group = self.page.get_by_role("group", name=re.compile(rf"^{CHARTS[chart]}"))
+        return group.locator(".js-plotly-plot")
+
+    def traces(self, chart: str) -> list[Json]:
+        """What the chart has drawn, in order."""
+        drawn: list[Json] = self.plot(chart).evaluate(_READ_TRACES)
+        return drawn
+
+    def trace(self, chart: str, role: str, **meta: object) -> Json | None:
+        wanted = {"role": role, **meta}.items()
+        return next((one for one in self.traces(chart) if one["meta"].items() >= wanted), None)
+
+    def wait_for_flight(self, number: int) -> None:
+        """Until the curve of that flight is drawn."""
+        self.until(lambda: self.trace("takeoffs", "flight", trial=number) is not None)
+
+    def live_points(self) -> int:
+        live = self.trace("takeoffs", "live")
+        return 0 if live is None else len(live["x"])
+
+    # ---- the API's own word
+
+    def get(self, path: str) -> Any:
+        answer = self.page.request.get(f"{self.url}/api{path}")
+        assert answer.ok, answer.text()
+        return answer.json()
+
+    def post(self, path: str, body: Json | None = None) -> Any:
+        answer = self.page.request.post(f"{self.url}/api{path}", data=body or {})
+        assert answer.ok, answer.text()
+        return answer.json()
+
+    def create(self, vehicle: str = "twin", **definition: object) -> int:
+        """A campaign whose first gains are computed."""
+        made = self.post("/campaigns", {"name": f"On {vehicle}", "vehicle": {"kind": vehicle},
+                                        "definition": definition})  # fmt: skip
+        return self.when_ready(int(made["id"]))
+
+    def when_ready(self, campaign_id: int) -> int:
+        self.until(lambda: self.get(f"/campaigns/{campaign_id}/proposal")["state"] == "ready")
+        return campaign_id
+
+    def trials(self, campaign_id: int) -> list[Json]:
+        found: list[Json] = self.get(f"/campaigns/{campaign_id}/trials")
+        return found
+
+    def fly_headless(self, campaign_id: int, flights: int) -> None:
+        """Fly so many proposals at full speed, over the API."""
+        for number in range(1, flights + 1):
+            self.when_ready(campaign_id)
+            proposal = self.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
+            self.post(f"/campaigns/{campaign_id}/trials", {"proposal_id": proposal["id"], "fly": {"speed": None}})
+            self.until(partial(self._classed, campaign_id, number))
+
+    def _classed(self, campaign_id: int, number: int) -> bool:
+        return any(trial["number"] == number and trial["state"] == "valid" for trial in self.trials(campaign_id))
+
+    def record(self, trial_id: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Time and altitude of a flight as the API gives them."""
+        record = self.get(f"/trials/{trial_id}/trajectory?points=20000")
+        return np.array(record["time_s"]), np.array(record["channels"]["altitude_m"])
+
+    # ---- waiting
+
+    def until(self, holds: Callable[[], bool], *, within_s: float = 60.0) -> None:
+        """Wait until that holds, letting the page live meanwhile."""
+        for _ in range(int(within_s / 0.05)):
+            if holds():
+                return
+            self.page.wait_for_timeout(50)
+        raise AssertionError(f"it did not hold within {within_s:g} s")

@@ -1,0 +1,216 @@
+"""A whole campaign, clicked through; and everything that can come between."""
+
+import re
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import Dashboard
+
+
+def assert_drawn_as_recorded(dashboard: Dashboard, trial: dict[str, object]) -> None:
+    """The curve on the page is the record of the API, to the tenth of a millimetre that figures are rounded to."""
+    drawn = dashboard.trace("takeoffs", "flight", trial=trial["number"])
+    assert drawn is not None, f"flight {trial['number']} is not drawn"
+    time_s, altitude_m = dashboard.record(int(str(trial["id"])))
+    assert len(drawn["x"]) > 100
+    np.testing.assert_allclose(drawn["y"], np.interp(drawn["x"], time_s, altitude_m), atol=2e-3)
+    assert max(drawn["y"]) == pytest.approx(altitude_m.max(), abs=2e-4)
+
+
+def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    dashboard.open("/")
+    expect(page.get_by_role("heading", name="Tune a takeoff in a handful of flights")).to_be_visible()
+    dashboard.button("Create “AR.Drone takeoff to 3 m, simulated”").click()
+    expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
+    campaign_id = dashboard.campaign_id
+    dashboard.choose_speed("Max")
+    finished = page.get_by_role("heading", name=re.compile("^(Converged|Flight budget used)"))
+    for number in range(1, 8):
+        dashboard.fly()
+        row = page.get_by_role("row").filter(has=page.get_by_role("rowheader", name=re.compile(rf"^Flight {number}\b")))
+        expect(row.get_by_text("Valid", exact=True)).to_be_visible(timeout=30_000)
+        trial = dashboard.trials(campaign_id)[number - 1]
+        expect(row).to_contain_text(f"{trial['error']:.3f} m")
+        dashboard.wait_for_flight(number)
+        assert_drawn_as_recorded(dashboard, trial)
+        expect(finished.or_(dashboard.button("Fly next trial"))).to_be_visible()
+        if finished.is_visible():
+            break
+    trials = dashboard.trials(campaign_id)
+    errors = [trial["error"] for trial in trials]
+    assert min(errors) < 0.5 * errors[0]
+    assert dashboard.get(f"/campaigns/{campaign_id}")["state"] == "finished"
+    best = trials[int(np.argmin(errors))]
+    expect(dashboard.panel("Converged").or_(dashboard.panel("Flight budget used"))).to_contain_text(
+        f"Best: flight {best['number']}"
+    )
+    dashboard.until(lambda: len((dashboard.trace("errors", "measured") or {"y": []})["y"]) == len(errors))
+    measured, running = dashboard.trace("errors", "measured"), dashboard.trace("errors", "best so far")
+    assert measured is not None
+    assert running is not None
+    assert measured["y"] == pytest.approx(errors, abs=1e-6)
+    assert running["y"] == pytest.approx(np.minimum.accumulate(errors), abs=1e-6)
+    for name in ("kp", "ki", "kd"):
+        flown = dashboard.trace("gains", "flown", gain=name)
+        assert flown is not None
+        assert flown["y"] == [trial["gains"][name] for trial in trials]
+    emphasised = [one for one in dashboard.traces("takeoffs") if one["meta"].get("standing") == "best"]
+    assert [one["meta"]["trial"] for one in emphasised] == [best["number"]]
+
+
+def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin")
+    dashboard.fly_headless(campaign_id, 1)
+    dashboard.when_ready(campaign_id)
+    dashboard.open_campaign(campaign_id)
+    predicted = dashboard.trace("takeoffs", "prediction")
+    assert predicted is not None
+    assert (predicted["name"], predicted["dash"]) == ("Flight 2, predicted", "dash")
+    assert max(predicted["y"]) > 2.5
+    proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
+    card = dashboard.panel("Next flight: 2")
+    expect(card).to_contain_text(f"{proposal['predicted_error']:.3f} m")
+    for name, change in proposal["changes"].items():
+        row = card.get_by_role("row", name=re.compile(rf"^{name} "))
+        expect(row).to_contain_text(str(round(change["next"])))
+
+
+def test_a_flight_of_ones_own_gains_goes_through_the_same_checks(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("jsbsim")
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("Max")
+    dashboard.button("Edit gains").click()
+    kp = dashboard.page.get_by_label(re.compile("^kp"))
+    kp.fill("-5")
+    dashboard.button("Fly these gains").click()
+    expect(kp).to_have_attribute("aria-invalid", "true")
+    expect(dashboard.page.get_by_text(re.compile("must lie in 0 … 4000"))).to_be_visible()
+    assert dashboard.trials(campaign_id) == []
+    kp.fill("400")
+    dashboard.page.get_by_label(re.compile("^ki")).fill("20")
+    dashboard.button("Fly these gains").click()
+    dashboard.until(lambda: [trial["state"] for trial in dashboard.trials(campaign_id)] == ["valid"])
+    [trial] = dashboard.trials(campaign_id)
+    assert (trial["kind"], trial["gains"]["kp"], trial["gains"]["ki"]) == ("manual", 400, 20)
+
+
+def test_a_flight_marked_invalid_is_left_out_and_can_be_taken_back(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin")
+    dashboard.fly_headless(campaign_id, 2)
+    dashboard.open_campaign(campaign_id)
+    second = dashboard.trials(campaign_id)[1]
+    verdict = dashboard.panel("Flight 2")
+    expect(verdict).to_contain_text(f"{second['error']:.3f} m")
+    verdict.get_by_role("button", name="Mark invalid").click()
+    verdict.get_by_text("Tracking glitch").click()
+    verdict.get_by_role("button", name="Mark invalid").click()
+    expect(verdict.get_by_text("Invalid", exact=True)).to_be_visible()
+    expect(verdict).to_contain_text("Tracking glitch")
+    dashboard.until(lambda: dashboard.trace("errors", "not counted") is not None)
+    not_counted = dashboard.trace("errors", "not counted")
+    assert not_counted is not None
+    assert not_counted["x"] == [2]
+    drawn = dashboard.trace("takeoffs", "flight", trial=2)
+    assert drawn is not None
+    assert drawn["meta"]["standing"] == "invalid"
+    verdict.get_by_role("button", name="Undo: count it as valid").click()
+    expect(verdict.get_by_text("Valid", exact=True)).to_be_visible()
+    dashboard.until(lambda: dashboard.trace("errors", "not counted") is None)
+    measured = dashboard.trace("errors", "measured")
+    assert measured is not None
+    assert measured["x"] == [1, 2]
+
+
+def test_a_campaign_flown_elsewhere_takes_records_as_csv(dashboard: Dashboard) -> None:
+    source = dashboard.create("twin", seed=5)
+    dashboard.fly_headless(source, 1)
+    [flown] = dashboard.trials(source)
+    record = dashboard.page.request.get(f"{dashboard.url}/api/trials/{flown['id']}/trajectory.csv").body()
+    campaign_id = dashboard.create("import")
+    dashboard.open_campaign(campaign_id)
+    expect(dashboard.page.get_by_text("REAL", exact=True).first).to_be_visible()
+
+    def upload(content: bytes) -> None:
+        with dashboard.page.expect_file_chooser() as chooser:
+            dashboard.button("Upload flight record").click()
+        chooser.value.set_files({"name": "flight.csv", "mimeType": "text/csv", "buffer": content})
+
+    upload(b"time_s,altitude_m\n0.0,0.0\n0.1,nan\n0.2,0.3\n")
+    refusal = dashboard.page.get_by_role("alert")
+    expect(refusal).to_contain_text("altitude_m")
+    expect(refusal).to_contain_text("3")
+    upload(record)
+    expect(dashboard.panel("Flight 1")).to_contain_text(f"{flown['error']:.3f} m")
+    [trial] = dashboard.trials(campaign_id)
+    assert trial["error"] == pytest.approx(flown["error"], abs=1e-6)
+    dashboard.wait_for_flight(1)
+    assert_drawn_as_recorded(dashboard, trial)
+
+
+def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin")
+    dashboard.fly_headless(campaign_id, 1)
+    [trial] = dashboard.trials(campaign_id)
+    dashboard.open(f"/campaigns/{campaign_id}/flights/{trial['id']}")
+    drawn = dashboard.trace("flight", "flight")
+    assert drawn is not None
+    time_s, altitude_m = dashboard.record(trial["id"])
+    np.testing.assert_allclose(drawn["y"], np.interp(drawn["x"], time_s, altitude_m), atol=2e-3)
+    with dashboard.page.expect_download() as download:
+        dashboard.page.get_by_role("link", name="Record as CSV").click()
+    lines = download.value.path().read_text().splitlines()
+    assert lines[0].startswith("time_s,")
+    assert len(lines) == 1 + trial["record"]["samples"]
+
+
+def test_the_numbers_behind_a_chart_stand_in_a_table(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin")
+    dashboard.fly_headless(campaign_id, 1)
+    [trial] = dashboard.trials(campaign_id)
+    dashboard.open_campaign(campaign_id)
+    dashboard.button("Error per flight: show the numbers as a table").click()
+    table = dashboard.page.get_by_role("region", name="Error per flight, numbers")
+    expect(table).to_contain_text(f"{trial['error']:.4f}")
+
+
+def test_the_list_finds_campaigns_by_name_and_vehicle(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    flown = dashboard.create("twin")
+    dashboard.fly_headless(flown, 2)
+    dashboard.create("jsbsim")
+    dashboard.open("/")
+    cards = dashboard.page.get_by_role("list", name="Campaigns").get_by_role("listitem")
+    expect(cards).to_have_count(2)
+    best = dashboard.get(f"/campaigns/{flown}")["best"]
+    expect(cards.filter(has_text="On twin")).to_contain_text(f"{best['error']:.3f} m")
+    expect(cards.filter(has_text="On twin").locator("svg path")).not_to_have_count(0)
+    dashboard.page.get_by_label("Search campaigns by name").fill("jsb")
+    expect(cards).to_have_count(1)
+    dashboard.page.get_by_label("Search campaigns by name").fill("nothing like it")
+    expect(dashboard.page.get_by_text("No campaign fits this search.")).to_be_visible()
+
+
+def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None:
+    dashboard.open("/new")
+    page = dashboard.page
+    before = dashboard.get("/campaigns")["total"]
+    page.get_by_role("button", name=re.compile("^Advanced")).click()
+    page.get_by_label("Flights at most").fill("-3")
+    page.get_by_label("kp at least").fill("3000")
+    page.get_by_label("kp at most").fill("2000")
+    dashboard.button("Create campaign").click()
+    expect(page.get_by_label("Flights at most")).to_have_attribute("aria-invalid", "true")
+    page.get_by_label("Flights at most").fill("7")
+    dashboard.button("Create campaign").click()
+    expect(page.get_by_label("kp at most")).to_have_attribute("aria-invalid", "true")
+    assert dashboard.get("/campaigns")["total"] == before
+    page.get_by_label("kp at least").fill("0")
+    dashboard.button("Create campaign").click()
+    expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
+    made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
+    assert made["definition"]["bounds"] == {"kp": [0, 2000]}

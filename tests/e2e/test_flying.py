@@ -1,0 +1,123 @@
+"""While something flies: the live curve, the abort, reloads, and a server that goes away."""
+
+import re
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import Dashboard
+
+
+@pytest.fixture
+def campaign_id(dashboard: Dashboard) -> int:
+    """A campaign on a vehicle that nothing else flies meanwhile, its page open."""
+    created = dashboard.create("jsbsim")
+    dashboard.open_campaign(created)
+    return created
+
+
+def wait_for_live(dashboard: Dashboard, points: int) -> None:
+    dashboard.until(lambda: dashboard.live_points() >= points)
+
+
+def aborted(dashboard: Dashboard, campaign_id: int) -> bool:
+    return bool(dashboard.trials(campaign_id)[-1]["state"] == "aborted")
+
+
+def test_the_live_curve_grows_while_it_flies_and_becomes_the_record(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.fly()
+    lengths = []
+    wait_for_live(dashboard, 1)
+    while not any(trial["state"] == "valid" for trial in dashboard.trials(campaign_id)):
+        lengths.append(dashboard.live_points())
+        dashboard.page.wait_for_timeout(200)
+    growing = [length for length in lengths if length > 0]
+    assert len(set(growing)) >= 4, lengths
+    assert growing == sorted(growing)
+    dashboard.wait_for_flight(1)
+    [trial] = dashboard.trials(campaign_id)
+    assert trial["speed"] == 10
+    drawn = dashboard.trace("takeoffs", "flight", trial=1)
+    assert drawn is not None
+    time_s, altitude_m = dashboard.record(trial["id"])
+    np.testing.assert_allclose(drawn["y"], np.interp(drawn["x"], time_s, altitude_m), atol=2e-3)
+
+
+def test_what_is_drawn_live_is_what_was_measured(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.fly()
+    wait_for_live(dashboard, 200)
+    live = dashboard.trace("takeoffs", "live")
+    assert live is not None
+    dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "valid")
+    time_s, altitude_m = dashboard.record(dashboard.trials(campaign_id)[0]["id"])
+    np.testing.assert_allclose(live["y"], np.interp(live["x"], time_s, altitude_m), atol=5e-3)
+
+
+def test_the_button_aborts_at_once(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    wait_for_live(dashboard, 20)
+    dashboard.page.get_by_role("button", name=re.compile("^ABORT")).click()
+    dashboard.until(lambda: aborted(dashboard, campaign_id), within_s=10)
+    expect(dashboard.panel("Flight 1").get_by_text("Aborted", exact=True)).to_be_visible()
+    expect(dashboard.page.get_by_role("button", name=re.compile("^ABORT"))).to_have_count(0)
+    [trial] = dashboard.trials(campaign_id)
+    assert trial["record"]["duration_s"] < 30
+
+
+def test_space_aborts_whatever_has_the_focus(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    wait_for_live(dashboard, 20)
+    dashboard.button("Rename the campaign").focus()
+    dashboard.page.keyboard.press("Space")
+    dashboard.until(lambda: aborted(dashboard, campaign_id), within_s=10)
+    expect(dashboard.page.get_by_label("Name of the campaign")).to_have_count(0)
+
+
+def test_space_in_a_text_is_a_space(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.choose_speed("10×")
+    dashboard.button("Rename the campaign").click()
+    dashboard.fly()
+    wait_for_live(dashboard, 5)
+    name = dashboard.page.get_by_label("Name of the campaign")
+    name.fill("Two")
+    name.press("Space")
+    name.press_sequentially("words")
+    expect(name).to_have_value("Two words")
+    dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "valid")
+
+
+def test_a_reload_and_a_second_tab_show_the_same_flight(
+    open_dashboard: Opener, dashboard: Dashboard, campaign_id: int, shared_server: Server
+) -> None:
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    wait_for_live(dashboard, 50)
+    dashboard.page.reload()
+    second = open_dashboard(shared_server.url)
+    second.open("/")
+    for tab in (dashboard, second):
+        expect(tab.page.get_by_role("region", name="Flying: On jsbsim")).to_be_visible()
+    wait_for_live(dashboard, 100)
+    live = dashboard.trace("takeoffs", "live")
+    assert live is not None
+    assert live["x"][0] < 0.5, "the curve before the reload is missing"
+    second.page.get_by_role("button", name=re.compile("^ABORT")).click()
+    dashboard.until(lambda: aborted(dashboard, campaign_id), within_s=10)
+    expect(dashboard.page.get_by_role("button", name=re.compile("^ABORT"))).to_have_count(0)
+
+
+def test_the_page_says_that_the_server_is_away_and_catches_up(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    campaign_id = dashboard.create("twin")
+    dashboard.open_campaign(campaign_id)
+    own_server.stop()
+    expect(dashboard.page.get_by_text("Server away")).to_be_visible()
+    expect(dashboard.page.get_by_text("The server does not answer.")).to_be_visible()
+    own_server.start()
+    expect(dashboard.page.get_by_text("Live", exact=True)).to_be_visible()
+    dashboard.fly_headless(campaign_id, 1)
+    expect(dashboard.panel("Flight 1")).to_be_visible()

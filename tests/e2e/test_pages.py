@@ -1,0 +1,150 @@
+"""Every page in both themes and two sizes: readable by everybody, complete without a network, and looked at."""
+
+import gzip
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Theme, Viewport
+
+ROOT = Path(__file__).parents[2]
+SCREENSHOTS = ROOT / "var" / "screenshots"
+README_IMAGE = ROOT / "docs" / "images" / "campaign.png"
+SIZES = {"tablet": TABLET, "phone": PHONE}
+THEMES: tuple[Theme, ...] = ("light", "dark")
+UI_BYTES_GZIPPED = 250_000
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+
+
+@pytest.fixture(scope="module")
+def states(shared_server: Server, browser: Browser) -> dict[str, str]:
+    """The path of a page in each interesting state, by a word for it."""
+    context = browser.new_context()
+    dashboard = Dashboard(context.new_page(), shared_server.url)
+    under_way = dashboard.create("twin", seed=3)
+    dashboard.fly_headless(under_way, 3)
+    finished = dashboard.create("jsbsim", stop={"kind": "budget", "max_flights": 4})
+    dashboard.fly_headless(finished, 4)
+    dashboard.until(lambda: bool(dashboard.get(f"/campaigns/{finished}")["state"] == "finished"))
+    first = dashboard.trials(under_way)[0]
+    dashboard.post(f"/trials/{first['id']}/classify",
+                   {"version": first["version"], "outcome": "invalid", "reason": "Wind gust"})  # fmt: skip
+    paths = {
+        "list": "/",
+        "new": "/new",
+        "ready": f"/campaigns/{dashboard.create('twin', seed=2)}",
+        "under-way": f"/campaigns/{dashboard.when_ready(under_way)}",
+        "finished": f"/campaigns/{finished}",
+        "elsewhere": f"/campaigns/{dashboard.create('import')}",
+        "flight": f"/campaigns/{under_way}/flights/{dashboard.trials(under_way)[2]['id']}",
+        "missing": "/no/such/page",
+    }
+    context.close()
+    return paths
+
+
+PAGES = ("list", "new", "ready", "under-way", "finished", "elsewhere", "flight", "missing")
+
+
+def when_drawn(dashboard: Dashboard) -> None:
+    """Wait until nothing on the page is still being fetched or drawn."""
+    expect(dashboard.page.locator("[aria-busy=true]")).to_have_count(0)
+    for plot in dashboard.page.locator("[role=group] > div:last-child").all():
+        expect(plot).to_have_attribute("data-drawn", "true")
+    dashboard.page.wait_for_timeout(300)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_can_be_read_by_everybody(
+    open_dashboard: Opener, shared_server: Server, states: dict[str, str], name: str, theme: Theme
+) -> None:
+    dashboard = open_dashboard(shared_server.url, theme=theme)
+    dashboard.open(states[name])
+    when_drawn(dashboard)
+    if name == "new":
+        dashboard.page.get_by_role("button", name="Advanced: stop rule, bounds, vehicle settings, seed").click()
+        dashboard.page.wait_for_timeout(400)
+    found = Axe().run(dashboard.page, options={"runOnly": {"type": "tag", "values": RULES}})
+    assert found.violations_count == 0, found.generate_report()
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("theme", THEMES)
+def test_every_page_is_photographed_and_fits_its_screen(
+    open_dashboard: Opener, shared_server: Server, states: dict[str, str], theme: Theme, size: str
+) -> None:
+    dashboard = open_dashboard(shared_server.url, theme=theme, viewport=SIZES[size])
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    for name, path in states.items():
+        dashboard.open(path)
+        when_drawn(dashboard)
+        wide = dashboard.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        assert wide == 0, f"{name} scrolls sideways by {wide} px"
+        dashboard.page.screenshot(path=SCREENSHOTS / f"{name}-{size}-{theme}.png", full_page=True)
+    if theme == "light" and size == "tablet" and os.environ.get("GAINLINE_README_IMAGE"):
+        dashboard.open(states["under-way"])
+        when_drawn(dashboard)
+        README_IMAGE.parent.mkdir(parents=True, exist_ok=True)
+        dashboard.page.screenshot(
+            path=README_IMAGE, clip={"x": 0, "y": 0, "width": 1024, "height": 1120}, full_page=True
+        )
+
+
+def test_the_theme_can_be_switched_and_is_kept(dashboard: Dashboard, states: dict[str, str]) -> None:
+    dashboard.open(states["under-way"])
+    when_drawn(dashboard)
+
+    def ink() -> str:
+        return str(dashboard.plot("takeoffs").evaluate("gd => gd.layout.font.color"))
+
+    light = ink()
+    dashboard.button("Switch to the dark theme").click()
+    dashboard.until(lambda: ink() != light)
+    dashboard.page.reload()
+    expect(dashboard.button("Switch to the light theme")).to_be_visible()
+    when_drawn(dashboard)
+    assert ink() != light
+
+
+@pytest.mark.parametrize("viewport", SIZES.values(), ids=SIZES)
+def test_what_is_pressed_beside_a_drone_is_big_enough_for_a_finger(
+    open_dashboard: Opener, shared_server: Server, states: dict[str, str], viewport: Viewport
+) -> None:
+    dashboard = open_dashboard(shared_server.url, viewport=viewport)
+    dashboard.open(states["under-way"])
+    when_drawn(dashboard)
+    small = [
+        (button.inner_text() or button.get_attribute("aria-label"), box["height"])
+        for button in dashboard.page.locator("button:visible, summary:visible").all()
+        if (box := button.bounding_box()) is not None and box["height"] < 44 and button.inner_text() != "Settings"
+    ]
+    assert small == []
+
+
+def test_the_ui_stays_light_before_its_charts() -> None:
+    assets = ROOT / "frontend" / "dist" / "assets"
+    size: Callable[[Path], int] = lambda path: len(gzip.compress(path.read_bytes(), 9))  # noqa: E731
+    first = [path for path in assets.iterdir() if path.suffix in {".js", ".css"} and "plotly" not in path.name]
+    assert sum(map(size, first)) <= UI_BYTES_GZIPPED, {path.name: size(path) for path in first}
+
+
+def test_nothing_can_be_uploaded_to_the_makers_of_the_charts(dashboard: Dashboard, states: dict[str, str]) -> None:
+    dashboard.open(states["under-way"])
+    when_drawn(dashboard)
+    dashboard.plot("takeoffs").hover()
+    settings = dashboard.plot("takeoffs").evaluate("gd => [gd._context.showSendToCloud, gd._context.plotlyServerURL]")
+    assert settings == [False, ""]
+    titles = dashboard.page.locator(".modebar-btn").evaluate_all("all => all.map(one => one.dataset.title)")
+    assert not [title for title in titles if title and ("share" in title.lower() or "cloud" in title.lower())]
+
+
+@pytest.mark.parametrize("path", ["/campaigns/999999", "/campaigns/abc", "/campaigns/1/flights/999999"])
+def test_an_address_that_leads_nowhere_says_so(dashboard: Dashboard, path: str) -> None:
+    dashboard.open(path)
+    expect(dashboard.page.get_by_text("There is no").first).to_be_visible()
