@@ -20,7 +20,7 @@ import csv
 import io
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self, TypeVar
@@ -36,7 +36,7 @@ from app.schemas import Problem as ProblemDetails
 from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial
 from app.trials.states import FlightState, TrialState
 
-Record = Path | bytes | Mapping[str, Sequence[float]]
+Record = Path | bytes | Mapping[str, Iterable[float]]
 """A flight's record: a CSV file, its content, or columns by name, `time_s` and `altitude_m` among them."""
 
 _ATTEMPTS: Final = 3

@@ -10,10 +10,12 @@ from starlette.middleware.gzip import GZipMiddleware
 from app import __version__
 from app.api import catalogue, errors, events, figures
 from app.api.headers import HeadersMiddleware
+from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
 from app.campaigns.router import router as campaigns
 from app.db.migrate import require_current
 from app.db.session import Database
+from app.errors import NotFoundError
 from app.fleet.router import router as fleet
 from app.jobs.router import router as jobs
 from app.live.link import live_link
@@ -41,7 +43,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app = FastAPI(
         title="Gainline", version=__version__, lifespan=lifespan, openapi_url="/api/openapi.json", docs_url=None,
         redoc_url=None, responses=errors.RESPONSES, generate_unique_id_function=_operation_id,
-        max_body_size=settings.max_upload_bytes,
     )
     app.state.settings = settings
     app.state.database = database
@@ -49,11 +50,19 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(router)
     errors.install(app)
     describe(app)
+    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.too_large)
     app.add_middleware(GZipMiddleware, minimum_size=1000)
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():
         app.frontend("/", directory=settings.ui_dir, fallback="index.html")
+    else:
+        app.add_api_route("/", _no_dashboard, include_in_schema=False)
     return app
+
+
+def _no_dashboard() -> None:
+    raise NotFoundError("built dashboard in", "this installation",
+                        hint="In a checkout, ./dev up builds and serves it. The API under /api works without it.")
 
 
 def _operation_id(route: APIRoute) -> str:

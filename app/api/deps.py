@@ -94,7 +94,3 @@ def json_only(request: Request) -> None:
     if has_body and kind != "application/json":
         raise MediaTypeError(f"The body is {kind or 'of no stated type'}, and JSON is expected here.",
                              hint="Send JSON with the header `Content-Type: application/json`.")
-
-
-JSON_BYTES = 2**20
-"""Largest JSON body."""

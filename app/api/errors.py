@@ -47,6 +47,8 @@ _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
 """Status and title; a class without its own has those of the nearest above it."""
 
 _HTTP: Final[Mapping[int, tuple[str, str]]] = {
+    400: ("The body cannot be read; nothing was changed.",
+          "Send JSON in UTF-8 without deep nesting, or a flight record as `text/csv`."),
     404: ("There is nothing at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
     405: ("{path} does not know the method {method}.", "The methods of each path are listed in /api/openapi.json."),
     413: ("The request is too large; nothing was stored.",
@@ -118,6 +120,11 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
         sentence, hint = _HTTP[error.status_code]
         detail = sentence.format(method=request.method, path=request.url.path)
     return _problem(error.status_code, detail, hint, headers=error.headers)
+
+
+def too_large() -> JSONResponse:
+    """Before the application sees the request."""
+    return _problem(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, *_HTTP[HTTPStatus.REQUEST_ENTITY_TOO_LARGE])
 
 
 async def _system_error(request: Request, error: Exception) -> JSONResponse:

@@ -22,7 +22,10 @@ def _caching(path: str, status: int) -> str:
 
 
 class HeadersMiddleware:
-    """Adds the headers as an answer starts; streams pass through untouched."""
+    """Adds the headers as an answer starts; streams pass through untouched.
+
+    Under /api the wish for a page is not heard, so that an unknown path there gives a problem and not the dashboard.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -31,6 +34,9 @@ class HeadersMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+
+        if scope["path"] == "/api" or scope["path"].startswith("/api/"):
+            scope = {**scope, "headers": [header for header in scope["headers"] if header[0] != b"accept"]}
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":

@@ -4,14 +4,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
-from app.api.deps import JSON_BYTES, Act, CursorText, Id, Limit, Reader, Writer, json_only
+from app.api.deps import Act, CursorText, Id, Limit, Reader, Writer, json_only
 from app.campaigns import service
 from app.campaigns.schemas import Campaign, CampaignEdit, CampaignSummary, Clone, Finish, NewCampaign, NextFlight, Sort
 from app.campaigns.states import CampaignState
 from app.schemas import Page
 
-router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)],
-                   max_body_size=JSON_BYTES)
+router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
 
 
 @router.get("")

@@ -11,7 +11,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
 from app.db.session import open_engine, storage_error
-from app.errors import SchemaError
+from app.errors import SchemaError, StorageError
 
 _APP: Final = Path(__file__).resolve().parent.parent
 _COMMAND: Final = "gainline serve"
@@ -22,7 +22,11 @@ def migrate(database_file: Path) -> None:
 
     Raises SchemaError when it was written by a newer program, StorageError when it cannot be opened or written.
     """
-    database_file.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        database_file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"The data folder {database_file.parent} cannot be made: {error.strerror}.",
+                           hint="Choose another one with --data-dir or GAINLINE_DATA_DIR.") from error
     held = revision_of(database_file)
     if held == newest_revision():
         return

@@ -2,13 +2,12 @@
 
 from fastapi import APIRouter, Depends
 
-from app.api.deps import JSON_BYTES, Act, CursorText, Id, Limit, Reader, json_only
+from app.api.deps import Act, CursorText, Id, Limit, Reader, json_only
 from app.fleet import service
 from app.fleet.schemas import GivenGains, Release, Vehicle
 from app.schemas import Page
 
-router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)],
-                   max_body_size=JSON_BYTES)
+router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])
 
 
 @router.get("")

@@ -4,13 +4,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from app.api.deps import JSON_BYTES, Act, CursorText, Id, Limit, Reader, json_only
+from app.api.deps import Act, CursorText, Id, Limit, Reader, json_only
 from app.jobs import service
 from app.jobs.schemas import Job
 from app.jobs.states import JobState
 from app.schemas import Page
 
-router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json_only)], max_body_size=JSON_BYTES)
+router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json_only)])
 
 
 @router.get("")

@@ -5,12 +5,12 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from starlette.concurrency import run_in_threadpool
 
-from app.api.deps import JSON_BYTES, Act, CurrentDatabase, Id, Live, Reader, Writer, json_only
+from app.api.deps import Act, CurrentDatabase, Id, Live, Reader, Writer, json_only
 from app.api.uploads import REQUEST_BODY, Record
 from app.trials import service
 from app.trials.schemas import Abort, AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial, TrialEdit
 
-router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)], max_body_size=JSON_BYTES)
+router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
 
 
 @router.get("/campaigns/{campaign_id}/trials")

@@ -21,14 +21,14 @@ from app.db.types import utc_now
 from app.errors import BusyError, ConflictError
 from app.fleet import service as fleet
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.moves import check_action, check_version
+from app.moves import check_action, check_move, check_version
 from app.trials import history, repository
 from app.trials.capture import capture
 from app.trials.lifecycle import move_flight, move_trial
 from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
-from app.trials.states import ACTIONS, FlightState, TrialKind, TrialState
+from app.trials.states import ACTIONS, MOVES, FlightState, TrialKind, TrialState
 from app.trials.views import trajectory_view, trial_view, trial_views
 
 
@@ -130,9 +130,9 @@ def classify_trial(session: Session, trial_id: int, said: Classification) -> Tri
     check_version(said.version, row.version, f"Trial {row.number}",
                   {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)})
     check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
+    check_move(MOVES, row.state, outcome, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
-    error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
-    row.error = error if outcome == TrialState.VALID else None
+    row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     move_trial(row, outcome, reason=said.reason)
     row.version += 1
     campaigns.history_changed(session, campaign)

@@ -1,0 +1,44 @@
+"""How much may be sent at once: refused by the stated length where there is one, else as soon as it is passed."""
+
+from collections.abc import Callable
+from http import HTTPStatus
+from typing import Final
+
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+JSON_BYTES: Final = 2**20
+"""Largest JSON body."""
+_UPLOADS: Final = "/trajectory"
+
+
+class BodyLimitMiddleware:
+    """Bounds every request's body: flight records to `upload_bytes`, everything else to 1 MiB."""
+
+    def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[], Response]) -> None:
+        self._app = app
+        self._upload_bytes = upload_bytes
+        self._refuse = refuse
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        limit = self._upload_bytes if scope["path"].endswith(_UPLOADS) else JSON_BYTES
+        stated = Headers(scope=scope).get("content-length", "")
+        if stated.isdecimal() and int(stated) > limit:
+            await self._refuse()(scope, receive, send)
+            return
+        received = 0
+
+        async def receive_bounded() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            if received > limit:
+                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+            return message
+
+        await self._app(scope, receive_bounded, send)

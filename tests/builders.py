@@ -1,0 +1,157 @@
+"""What tests build with: flights with known errors, campaigns over HTTP, and a worker's steps done by hand."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import httpx2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.campaigns import proposing
+from app.core.trajectory import Trajectory
+from app.db.session import Database
+from app.jobs import service as jobs
+from app.trials import flights
+from app.trials.flights import FlightTask
+from app.vehicles.base import Ending, FlightRecord
+
+Json = dict[str, Any]
+
+WINDOW_S = 32.6
+WORKER = "test worker"
+
+
+def create_climb(settling_s: float = 1.0, *, rate_hz: float = 50.0, until_s: float = 33.0) -> Trajectory:
+    """3 m · (1 − exp(−t/τ)): its error over the 32.6 s window is `climb_error(τ)`."""
+    time_s = np.arange(round(until_s * rate_hz) + 1) / rate_hz
+    return Trajectory(time_s, {"altitude_m": 3.0 - 3.0 * np.exp(-time_s / settling_s)}, "test", "vehicle")
+
+
+def climb_error(settling_s: float) -> float:
+    """∫₀ᵀ 3·exp(−t/τ) dt / T."""
+    return 3.0 * settling_s * (1.0 - float(np.exp(-WINDOW_S / settling_s))) / WINDOW_S
+
+
+def create_record(settling_s: float = 1.0, *, ending: Ending = "completed", reason: str = "",
+                  until_s: float = 33.0) -> FlightRecord:
+    """What a vehicle leaves behind."""
+    return FlightRecord(trajectory=create_climb(settling_s, until_s=until_s), ending=ending, reason=reason)
+
+
+def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> bytes:
+    """A flight's record as it is uploaded."""
+    lines = [",".join(columns), *(",".join(f"{number:.9g}" for number in row)
+                                  for row in zip(*columns.values(), strict=True))]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def create_csv(settling_s: float = 1.0, *, until_s: float = 33.0) -> bytes:
+    climb = create_climb(settling_s, until_s=until_s)
+    return csv_of({"time_s": climb.time_s, **climb.channels})
+
+
+def create_campaign(client: httpx2.Client, *, vehicle: str = "twin", **fields: object) -> Json:
+    """A draft."""
+    answer = client.post("/api/campaigns", json={"name": "Test", "vehicle": {"kind": vehicle}, **fields})
+    assert answer.status_code == 201, answer.text
+    campaign: Json = answer.json()
+    return campaign
+
+
+def create_ready_campaign(client: httpx2.Client, database: Database, *, vehicle: str = "twin",
+                          **fields: object) -> Json:
+    """A campaign whose first gains are known."""
+    campaign = create_campaign(client, vehicle=vehicle, **fields)
+    run_jobs(database)
+    ready: Json = get(client, f"/api/campaigns/{campaign['id']}")
+    return ready
+
+
+def create_trial(client: httpx2.Client, campaign_id: int, **fields: object) -> Json:
+    """A trial of the proposal, unless gains are given."""
+    if "gains" not in fields and "proposal_id" not in fields:
+        fields["proposal_id"] = get(client, f"/api/campaigns/{campaign_id}/proposal")["proposal"]["id"]
+    answer = client.post(f"/api/campaigns/{campaign_id}/trials", json=fields)
+    assert answer.status_code == 201, answer.text
+    trial: Json = answer.json()
+    return trial
+
+
+def create_flown_trial(client: httpx2.Client, database: Database, campaign_id: int, settling_s: float = 1.0) -> Json:
+    """A trial of the proposal that landed with a known error, and the next proposal computed."""
+    trial = create_trial(client, campaign_id, fly={"speed": None})
+    land(database, lift_off(database), create_record(settling_s))
+    run_jobs(database)
+    flown: Json = get(client, f"/api/trials/{trial['id']}")
+    return flown
+
+
+def create_imported_trial(client: httpx2.Client, campaign_id: int, content: bytes | None = None) -> Json:
+    """A trial of the proposal with an uploaded record."""
+    trial = create_trial(client, campaign_id)
+    answer = upload(client, trial["id"], create_csv() if content is None else content)
+    assert answer.status_code == 201, answer.text
+    imported: Json = answer.json()
+    return imported
+
+
+def upload(client: httpx2.Client, trial_id: int, content: bytes, kind: str = "text/csv") -> httpx2.Response:
+    return client.post(f"/api/trials/{trial_id}/trajectory", content=content, headers={"Content-Type": kind})
+
+
+def get(client: httpx2.Client, path: str) -> Any:
+    answer = client.get(path)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def problems_of(answer: httpx2.Response) -> dict[str, str]:
+    """The refused fields of a problem document and why."""
+    return {problem["field"]: problem["reason"] for problem in answer.json()["problems"]}
+
+
+def run_jobs(database: Database) -> int:
+    """Carry out every waiting proposal job as a worker does; how many there were."""
+    for count in range(1000):
+        with database.write() as session:
+            job = jobs.claim_job(session, worker=WORKER, kinds=(proposing.PROPOSAL_JOB,), lease_s=30.0)
+            if job is None:
+                return count
+            job_id, campaign_id = job.id, job.campaign_id
+        assert campaign_id is not None
+        with database.read() as session:
+            past = proposing.read_history(session, campaign_id)
+        computed = proposing.compute(past)
+        with database.write() as session:
+            if jobs.finish_job(session, job_id, worker=WORKER):
+                proposing.store_proposal(session, campaign_id, computed)
+    raise AssertionError("jobs make jobs for ever")
+
+
+def claim(database: Database) -> FlightTask:
+    """The flight that waits."""
+    with database.write() as session:
+        task = flights.claim_flight(session, WORKER)
+    assert task is not None
+    return task
+
+
+def stage(database: Database) -> FlightTask:
+    """Claim the flight that waits and have the vehicle take its gains."""
+    task = claim(database)
+    with database.write() as session:
+        flights.record_staged(session, task.flight_id, dict(task.gains))
+    return task
+
+
+def lift_off(database: Database) -> FlightTask:
+    """Claim, stage and begin the flight that waits."""
+    task = stage(database)
+    with database.write() as session:
+        flights.record_lift_off(session, task.flight_id)
+    return task
+
+
+def land(database: Database, task: FlightTask, record: FlightRecord) -> None:
+    with database.write() as session:
+        flights.record_landing(session, task.flight_id, record)

@@ -1,0 +1,73 @@
+"""The migrations make the tables of the models; a database of another revision is refused with what to do."""
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from fastapi.testclient import TestClient
+
+from app.db.migrate import migrate, newest_revision, require_current, revision_of
+from app.db.models import Base
+from app.db.session import open_engine
+from app.errors import SchemaError, StorageError
+from app.main import create_app
+from app.settings import Settings
+
+
+def test_the_migrations_make_exactly_the_tables_of_the_models(migrated_file: Path) -> None:
+    with open_engine(migrated_file).connect() as connection:
+        context = MigrationContext.configure(connection, opts={"render_as_batch": True})
+        assert compare_metadata(context, Base.metadata) == []
+
+
+def test_every_check_of_the_models_is_in_the_database(migrated_file: Path) -> None:
+    with sqlite3.connect(migrated_file) as connection:
+        made = dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'"))
+    for table in Base.metadata.sorted_tables:
+        for constraint in table.constraints:
+            if constraint.__visit_name__ == "check_constraint":
+                assert f'CONSTRAINT {constraint.name} CHECK ({constraint.sqltext})' in made[table.name]  # type: ignore[attr-defined]
+
+
+def test_migrating_again_changes_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "new" / "gainline.sqlite3"
+    migrate(file)
+    before = file.read_bytes()
+    migrate(file)
+    assert file.read_bytes() == before
+    assert revision_of(file) == newest_revision()
+
+
+def set_revision(file: Path, revision: str) -> None:
+    with sqlite3.connect(file) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = ?", (revision,))
+    connection.close()
+
+
+def test_start_up_refuses_a_database_without_tables_and_names_the_command(settings: Settings) -> None:
+    settings.database_file.unlink()
+    with pytest.raises(SchemaError, match="gainline serve"), TestClient(create_app(settings)):
+        pass
+
+
+def test_a_database_of_a_newer_program_is_refused_and_left_alone(settings: Settings) -> None:
+    set_revision(settings.database_file, "9999")
+    for check in (require_current, migrate):
+        with pytest.raises(SchemaError, match="newer Gainline"):
+            check(settings.database_file)
+    assert revision_of(settings.database_file) == "9999"
+
+
+def test_a_file_that_is_no_database_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "gainline.sqlite3"
+    file.write_text("Dear Sir or Madam, " * 100)
+    with pytest.raises(StorageError, match="is not a Gainline database"):
+        migrate(file)
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match="cannot be made"):
+        migrate(tmp_path / "file" / "gainline.sqlite3")

@@ -1,0 +1,97 @@
+"""The Python client against the running application, its own transport included."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.campaigns.schemas import Definition, StopRule
+from app.client import Client, ConflictError, InvalidError, NotFoundError, RefusedError, UnavailableError
+from app.db.session import Database
+from app.trials import flights
+from app.trials.schemas import Classification
+from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
+
+
+@pytest.fixture
+def gainline(client: TestClient) -> Client:
+    return Client(http=client)
+
+
+def test_ask_and_tell(gainline: Client, database: Database, tmp_path: Path) -> None:
+    campaign = gainline.create_campaign("Mine", vehicle="import", definition=Definition(
+        seed=3, stop=StopRule(kind="budget", max_flights=9)))
+    run_jobs(database)
+    proposal = gainline.ask(campaign.id)
+    assert (proposal.kind, proposal.gains) == ("start", {"kp": 283, "ki": 13, "kd": 82})
+    climb = create_climb(2.0)
+    record = {"time_s": climb.time_s, "altitude_m": climb["altitude_m"]}
+    trial = gainline.tell(campaign.id, proposal, record, note="dusk")
+    assert (trial.state, trial.note) == ("valid", "dusk")
+    assert trial.error == pytest.approx(climb_error(2.0), rel=1e-4)
+    run_jobs(database)
+    file = tmp_path / "flight.csv"
+    file.write_bytes(create_csv(1.5))
+    assert gainline.tell(campaign.id, gainline.ask(campaign.id), file).number == 2
+    run_jobs(database)
+    assert gainline.tell(campaign.id, {"kp": 300, "ki": 20, "kd": 90}, create_csv(1.4)).kind == "manual"
+    assert [found.number for found in gainline.trials(campaign.id)] == [1, 2, 3]
+    assert gainline.trajectory(trial.id, points=100).samples == 1651
+    assert gainline.trajectory_csv(trial.id).startswith(b"time_s,altitude_m\n")
+    run_jobs(database)
+    classed = gainline.classify(trial, Classification(version=trial.version, outcome="invalid", reason="rain"))
+    assert classed.state == "invalid"
+
+
+def test_fly_and_wait(gainline: Client, database: Database) -> None:
+    campaign = gainline.create_campaign("Mine", vehicle="twin", options={"scatter": 0.0})
+    run_jobs(database)
+    trial = gainline.fly(campaign.id, gainline.ask(campaign.id))
+    land(database, lift_off(database), create_record())
+    assert gainline.wait(trial.id).state == "valid"
+
+
+def test_a_flight_that_did_not_take_place_is_raised(gainline: Client, database: Database) -> None:
+    campaign = gainline.create_campaign("Mine", vehicle="twin")
+    run_jobs(database)
+    trial = gainline.fly(campaign.id, gainline.ask(campaign.id))
+    task = claim(database)
+    with database.write() as session:
+        flights.record_failure(session, task.flight_id, "the vehicle did not answer.")
+    with pytest.raises(RefusedError, match="was not flown: the vehicle did not answer"):
+        gainline.wait(trial.id)
+
+
+def test_all_campaigns_come_page_by_page(gainline: Client) -> None:
+    made = [gainline.create_campaign(f"C{index}").id for index in range(3)]
+    assert [campaign.id for campaign in gainline.campaigns()] == made[::-1]
+    assert [campaign.name for campaign in gainline.campaigns(search="c1")] == ["C1"]
+
+
+def test_refusals_are_raised_with_the_servers_own_words(gainline: Client, database: Database) -> None:
+    with pytest.raises(NotFoundError, match="There is no campaign 99") as missing:
+        gainline.campaign(99)
+    assert missing.value.status == 404
+    campaign = gainline.create_campaign("Mine", vehicle="import")
+    run_jobs(database)
+    with pytest.raises(InvalidError) as refused:
+        gainline.fly(campaign.id, {"kp": -1, "ki": 13, "kd": 82})
+    assert [problem.field for problem in refused.value.problems] == ["gains.kp"]
+    with pytest.raises(ConflictError, match="cannot be flown from here"):
+        gainline.fly(campaign.id, {"kp": 283, "ki": 13, "kd": 82})
+    with pytest.raises(ConflictError):
+        gainline.finish(campaign.id)
+
+
+def test_asking_without_a_worker_ends_with_what_to_look_for(gainline: Client) -> None:
+    campaign = gainline.create_campaign("Mine")
+    with pytest.raises(UnavailableError, match="Look whether a worker runs"):
+        gainline.ask(campaign.id, timeout_s=0.0)
+
+
+def test_a_server_that_is_not_there_is_raised_with_what_to_do() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    with Client(f"http://127.0.0.1:{port}") as gainline, pytest.raises(UnavailableError, match="gainline serve"):
+        gainline.campaign(1)

@@ -1,0 +1,112 @@
+"""Every pair of states of every machine, against the lists of the domain."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from itertools import product
+from typing import Any
+
+import pytest
+
+from app.campaigns import states as campaigns
+from app.errors import ConflictError
+from app.fleet import states as fleet
+from app.jobs import states as jobs
+from app.moves import allowed, check_action, check_move, check_version
+from app.trials import states as trials
+
+# What the domain allows, written apart from the program's tables: "from: to, to".
+TRIAL = """
+planned: staged, cancelled, captured
+staged: flying, planned, cancelled
+flying: captured, aborted, lost
+captured: valid, aborted, invalid
+valid: invalid
+aborted: invalid
+invalid: valid, aborted
+lost: captured, invalid
+cancelled:
+"""
+CAMPAIGN = """
+draft: ready
+ready: flying
+flying: deciding
+deciding: flying, finished
+finished: archived
+archived:
+"""
+JOB = """
+queued: running, cancelled
+running: done, failed, cancelled, queued
+done:
+failed: queued
+cancelled: queued
+"""
+FLIGHT = """
+requested: running, cancelled
+running: landed, aborted, failed, lost, cancelled
+landed:
+aborted:
+failed:
+lost:
+cancelled:
+"""
+VEHICLE = """
+disconnected: ready, quarantined
+ready: staged, disconnected, quarantined
+staged: flying, ready, quarantined
+flying: ready, quarantined
+quarantined: ready, disconnected
+"""
+
+Moves = Mapping[Any, frozenset[Any]]
+MACHINES: dict[str, tuple[Moves, str]] = {
+    "trial": (trials.MOVES, TRIAL), "campaign": (campaigns.MOVES, CAMPAIGN), "job": (jobs.MOVES, JOB),
+    "flight": (trials.FLIGHT_MOVES, FLIGHT), "vehicle": (fleet.MOVES, VEHICLE),
+}
+
+
+def listed(text: str) -> set[tuple[str, str]]:
+    lines = [line.split(":") for line in text.strip().splitlines()]
+    return {(start, to.strip()) for start, ends in lines for to in ends.split(",") if to.strip()}
+
+
+PAIRS = [(name, start, to) for name, (moves, _) in MACHINES.items() for start, to in product(moves, repeat=2)]
+
+
+@pytest.mark.parametrize(("machine", "start", "to"), PAIRS)
+def test_only_the_moves_of_the_domain_exist(machine: str, start: StrEnum, to: StrEnum) -> None:
+    moves, text = MACHINES[machine]
+    if (start.value, to.value) in listed(text):
+        assert check_move(moves, start, to, "It") == to
+    else:
+        with pytest.raises(ConflictError, match=f"It is {start} and cannot become {to}"):
+            check_move(moves, start, to, "It")
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_every_state_has_its_line_in_the_table(machine: str) -> None:
+    moves, text = MACHINES[machine]
+    assert set(moves) == set(type(next(iter(moves))).__members__.values())
+    assert {line.split(":")[0] for line in text.strip().splitlines()} == {state.value for state in moves}
+
+
+@pytest.mark.parametrize("states", [trials.TrialState, trials.FlightState, campaigns.CampaignState, jobs.JobState,
+                                    fleet.VehicleState])
+def test_every_lifecycle_is_drawn_in_its_docstring(states: type[StrEnum]) -> None:
+    assert states.__doc__ is not None
+    missing = [state.value for state in states if state.value not in states.__doc__.lower()]
+    assert not missing
+
+
+def test_a_refused_action_says_when_it_is_possible() -> None:
+    with pytest.raises(ConflictError, match="only while it is cancelled or failed"):
+        check_action(jobs.ACTIONS, "retry", jobs.JobState.DONE, "Job 1")
+    assert allowed(jobs.ACTIONS, jobs.JobState.RUNNING) == ["cancel"]
+
+
+def test_an_edit_of_an_outdated_version_names_what_changed() -> None:
+    check_version(3, 3, "It", {})
+    with pytest.raises(ConflictError) as caught:
+        check_version(2, 3, "It", {"name": ("new", "mine"), "note": ("same", "same")})
+    assert [problem.field for problem in caught.value.problems] == ["version", "name"]
+    assert caught.value.problems[1].reason == "is now “new”; you sent “mine”"

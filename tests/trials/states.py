@@ -1,0 +1,58 @@
+"""A trial in every state, brought there by the same steps as in life."""
+
+from fastapi.testclient import TestClient
+
+from app.db.models import VehicleRow
+from app.db.session import Database
+from app.trials import flights
+from app.trials.states import TrialState
+from tests.builders import Json, create_ready_campaign, create_record, create_trial, csv_of, land, lift_off, stage
+
+
+def make_vehicle_real(database: Database, kind: str = "twin") -> None:
+    """From now on this kind counts as a real aircraft."""
+    with database.write() as session:
+        session.query(VehicleRow).filter(VehicleRow.kind == kind).one().is_real = True
+
+
+def csv_with_a_gap(gap_s: float = 1.0) -> bytes:
+    climb = create_record().trajectory
+    kept = (climb.time_s < 5.0) | (climb.time_s >= 5.0 + gap_s)
+    return csv_of({"time_s": climb.time_s[kept], "altitude_m": climb["altitude_m"][kept]})
+
+
+def create_trial_in(state: TrialState, client: TestClient, database: Database) -> Json:
+    """A trial of a new campaign on the twin, in that state; its class is the program's wherever it may be."""
+    campaign = create_ready_campaign(client, database)
+    if state == TrialState.PLANNED:
+        return create_trial(client, campaign["id"])
+    if state == TrialState.CANCELLED:
+        trial = create_trial(client, campaign["id"])
+        client.post(f"/api/trials/{trial['id']}/cancel")
+    else:
+        trial = create_trial(client, campaign["id"], fly={"speed": None})
+        _fly(state, database)
+    found: Json = client.get(f"/api/trials/{trial['id']}").json()
+    assert found["state"] == state
+    return found
+
+
+def _fly(state: TrialState, database: Database) -> None:
+    if state == TrialState.STAGED:
+        stage(database)
+        return
+    if state == TrialState.CAPTURED:
+        make_vehicle_real(database)
+    task = lift_off(database)
+    match state:
+        case TrialState.LOST:
+            with database.write() as session:
+                flights.lose_running_flights(session)
+        case TrialState.ABORTED:
+            land(database, task, create_record(ending="aborted", reason="by hand", until_s=4.0))
+        case TrialState.INVALID:
+            land(database, task, create_record(until_s=20.0))
+        case TrialState.VALID | TrialState.CAPTURED:
+            land(database, task, create_record())
+        case _:
+            assert state == TrialState.FLYING

@@ -1,0 +1,273 @@
+"""A flight's way through the database, and what it does to its trial, its campaign and its vehicle."""
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.core.definition import flight_seed
+from app.db.session import Database
+from app.errors import ConflictError
+from app.trials import flights
+from app.vehicles.base import FlightRecord
+from tests.builders import (
+    claim,
+    climb_error,
+    create_climb,
+    create_flown_trial,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    land,
+    lift_off,
+    run_jobs,
+    stage,
+)
+from tests.trials.states import csv_with_a_gap, make_vehicle_real
+
+DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def test_a_claimed_flight_carries_everything_that_the_worker_needs(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition={"seed": 7})
+    trial = create_trial(client, campaign["id"], fly={"speed": 10})
+    task = claim(database)
+    assert (task.trial_id, task.campaign_id, task.experiment) == (trial["id"], campaign["id"], "takeoff")
+    assert task.gains == task.safe_gains == DEFAULT_GAINS
+    assert (task.vehicle_kind, task.vehicle_options["scatter"], task.speed) == ("twin", 1.0, 10.0)
+    assert task.seed == flight_seed(7, 1)
+    with database.write() as session:
+        assert flights.claim_flight(session, "another") is None
+
+
+def test_a_landed_flight_is_scored_as_it_is_stored_and_classed_by_the_program(
+        client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), create_record(1.0))
+    trial = get(client, "/api/trials/1")
+    assert (trial["state"], trial["read_back"]) == ("valid", DEFAULT_GAINS)
+    # 50 Hz trapezoids of an exponential: (dt/τ)²/12 = 3e-5 of the value; single precision adds less.
+    assert trial["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
+    assert trial["overshoot_m"] == 0.0
+    assert trial["record"]["samples"] == 1651
+    assert trial["verdict"].startswith("0.092 m: the first valid flight; 0.326 m was predicted")
+    after = get(client, f"/api/campaigns/{campaign['id']}")
+    assert (after["state"], after["best"]["trial_id"], after["flying"]) == ("deciding", trial["id"], None)
+
+
+def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    create_trial(client, campaign["id"], fly={"speed": None})
+    stage(database)
+    assert get(client, f"/api/campaigns/{campaign['id']}")["definition_digest"] is None
+    with database.write() as session:
+        flights.record_lift_off(session, 1)
+    flying = get(client, f"/api/campaigns/{campaign['id']}")
+    assert flying["state"] == "flying"
+    assert len(flying["definition_digest"]) == 64
+    assert flying["flying"] == {"trial_id": 1, "trial_number": 1}
+    land(database, claim_task(database), create_record())
+    answer = client.patch(f"/api/campaigns/{campaign['id']}", json={"version": 1, "definition": {"seed": 2}})
+    assert answer.status_code == 409
+
+
+def claim_task(database: Database) -> flights.FlightTask:
+    """The task of the only flight, which runs."""
+    return flights.FlightTask(flight_id=1, trial_id=1, campaign_id=1, experiment="takeoff", vehicle_kind="twin",
+                              vehicle_options={}, safe_gains={}, gains={}, seed=0, speed=None)
+
+
+def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    task = claim(database)
+    with database.write() as session:
+        flights.record_staged(session, task.flight_id, {"kp": 282, "ki": 13, "kd": 82})
+    with pytest.raises(ConflictError, match="must not fly"), database.write() as session:
+        flights.record_lift_off(session, task.flight_id)
+    with database.write() as session:
+        flights.record_failure(session, task.flight_id, "the vehicle did not take the gains")
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
+    assert after["flight"]["problem"] == "the vehicle did not take the gains"
+    assert "fly" in after["actions"]
+    ledger = get(client, f"/api/vehicles/{campaign['vehicle']['id']}/ledger")["items"]
+    assert (ledger[0]["asked"], ledger[0]["read_back"]) == (DEFAULT_GAINS, {"kp": 282, "ki": 13, "kd": 82})
+
+
+def test_an_aborted_flight_keeps_its_record_and_is_history_without_an_error(
+        client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), create_record(ending="aborted", reason="too close to the wall", until_s=4.0))
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["error"], after["reason"]) == ("aborted", None, "too close to the wall")
+    assert after["record"]["duration_s"] == pytest.approx(4.0)
+    assert run_jobs(database) == 1
+    assert get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["kind"] == "start"
+
+
+def test_an_abort_before_the_first_sample_is_aborted_too(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    record = create_record()
+    empty = FlightRecord(trajectory=create_climb(until_s=0.0), ending="aborted", reason="at once")
+    assert len(empty.trajectory) == 1 < len(record.trajectory)
+    land(database, lift_off(database), empty)
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "aborted"
+    assert run_jobs(database) == 1
+
+
+def test_a_worker_that_died_leaves_a_lost_flight_that_is_not_flown_again(
+        client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    lift_off(database)
+    with database.write() as session:
+        assert flights.lose_running_flights(session) == [trial["id"]]
+        assert flights.claim_flight(session, "the next worker") is None
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["flight"]["state"]) == ("lost", "lost")
+    assert "fly" not in after["actions"]
+    assert get(client, f"/api/campaigns/{campaign['id']}")["state"] == "deciding"
+    assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
+
+
+def test_a_worker_that_died_before_lift_off_leaves_a_planned_trial(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    stage(database)
+    with database.write() as session:
+        assert flights.lose_running_flights(session) == []
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
+    assert client.post(f"/api/trials/{trial['id']}/fly").status_code == 202
+
+
+def test_the_record_of_a_lost_flight_can_be_recovered_once(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    task = lift_off(database)
+    with database.write() as session:
+        flights.lose_running_flights(session)
+    for _ in range(2):
+        with database.write() as session:
+            flights.recover_record(session, task.flight_id, create_record(2.0))
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert after["state"] == "valid"
+    assert after["error"] == pytest.approx(climb_error(2.0), rel=1e-4)
+
+
+def test_a_landing_reported_twice_counts_once(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    create_trial(client, campaign["id"], fly={"speed": None})
+    task = lift_off(database)
+    for settling_s in (1.0, 2.0):
+        land(database, task, create_record(settling_s))
+    assert get(client, "/api/trials/1")["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
+
+
+def test_a_flight_of_a_real_vehicle_waits_for_a_person_and_blocks_the_next(
+        client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    make_vehicle_real(database)
+    trial = create_flown_trial(client, database, campaign["id"])
+    assert (trial["state"], trial["error"]) == ("captured", None)
+    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")
+    assert proposal["state"] == "none"
+    assert proposal["problem"]["title"] == "Flight 1 waits for its class."
+    assert get(client, f"/api/campaigns/{campaign['id']}")["next_action"] == "Say whether flight 1 counts"
+    answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": DEFAULT_GAINS})
+    assert (answer.status_code, answer.json()["detail"]) == (409, "Flight 1 waits for its class.")
+    said = client.post(f"/api/trials/{trial['id']}/classify",
+                       json={"version": 1, "outcome": "valid", "reason": "a clean flight"})
+    assert said.json()["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
+    run_jobs(database)
+    assert get(client, f"/api/campaigns/{campaign['id']}/proposal")["state"] == "ready"
+
+
+def test_a_real_vehicle_whose_flight_was_lost_is_quarantined_until_a_person_releases_it(
+        client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    make_vehicle_real(database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    lift_off(database)
+    with database.write() as session:
+        flights.lose_running_flights(session)
+    vehicle = f"/api/vehicles/{campaign['vehicle']['id']}"
+    assert get(client, vehicle)["state"] == "quarantined"
+    client.post(f"/api/trials/{trial['id']}/classify", json={"version": 1, "outcome": "invalid", "reason": "crashed"})
+    refused = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": DEFAULT_GAINS, "fly": {}})
+    assert refused.status_code == 409
+    assert "quarantined" in refused.json()["detail"]
+    assert client.post(f"{vehicle}/release", json={"statement": "safe gains read back by hand"}).status_code == 200
+    assert client.post(f"/api/campaigns/{campaign['id']}/trials",
+                       json={"gains": DEFAULT_GAINS, "fly": {}}).status_code == 201
+
+
+def test_unverified_safe_gains_quarantine_even_a_vehicle_that_landed(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    create_trial(client, campaign["id"], fly={"speed": None})
+    task = lift_off(database)
+    land(database, task, create_record())
+    with database.write() as session:
+        flights.quarantine_vehicle(session, task.flight_id, "the safe gains did not read back")
+    vehicle = get(client, f"/api/vehicles/{campaign['vehicle']['id']}")
+    assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "the safe gains did not read back")
+
+
+def test_one_vehicle_has_one_flight_whoever_asks(client: TestClient, database: Database) -> None:
+    first, second = (create_ready_campaign(client, database)["id"] for _ in range(2))
+    create_trial(client, first, fly={"speed": None})
+    refused = client.post(f"/api/campaigns/{second}/trials", json={"gains": DEFAULT_GAINS, "fly": {}})
+    assert (refused.status_code, refused.json()["title"]) == (409, "Vehicle busy")
+    assert f"trial 1 of campaign {first}" in refused.json()["detail"]
+    assert get(client, f"/api/campaigns/{second}/trials") == []  # the trial was not planned either
+    land(database, lift_off(database), create_record())
+    create_trial(client, second, fly={"speed": None})
+
+
+def test_a_flight_that_no_worker_has_begun_can_be_aborted(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    answer = client.post(f"/api/trials/{trial['id']}/abort")
+    assert (answer.status_code, answer.json()["accepted"]) == (202, True)
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
+    assert client.post(f"/api/trials/{trial['id']}/abort").status_code == 409
+
+
+def test_an_abort_that_no_worker_hears_says_so(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    lift_off(database)
+    answer = client.post(f"/api/trials/{trial['id']}/abort")
+    assert answer.status_code == 409
+    assert "remote control" in answer.json()["hint"]
+
+
+def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    task = stage(database)
+    assert client.post(f"/api/trials/{trial['id']}/cancel").status_code == 200
+    with pytest.raises(ConflictError), database.write() as session:
+        flights.record_lift_off(session, task.flight_id)
+    with database.write() as session:
+        flights.record_failure(session, task.flight_id, "cancelled")
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "cancelled"
+    assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
+
+
+def test_a_gap_makes_a_flight_invalid_until_somebody_says_otherwise(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, vehicle="import")
+    trial = create_trial(client, campaign["id"])
+    uploaded = client.post(f"/api/trials/{trial['id']}/trajectory", content=csv_with_a_gap(),
+                           headers={"Content-Type": "text/csv"}).json()
+    assert (uploaded["state"], uploaded["error"]) == ("invalid", None)
+    assert "gap of 1.02 s after 4.980 s" in uploaded["reason"]
+    counted = client.post(f"/api/trials/{trial['id']}/classify", json={
+        "version": uploaded["version"], "outcome": "valid", "reason": "the video shows nothing odd"}).json()
+    assert counted["state"] == "valid"
+    # The trapezoid over the gap lies above the convex curve: at most gap³/12 · |f''| / window more.
+    assert counted["error"] == pytest.approx(climb_error(1.0), rel=1e-2)

@@ -1,0 +1,116 @@
+"""What people and workers can do to a trial in each of its states, and that nothing else ever happens to it."""
+
+from collections.abc import Callable
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy.orm import Session
+
+from app.db.session import Database
+from app.errors import ConflictError
+from app.trials import flights
+from app.trials.states import MOVES, TrialState
+from tests.builders import Json, create_csv, create_record, get, upload
+from tests.trials.states import create_trial_in
+
+Act = Callable[[TestClient, Json], int]
+
+
+def classify(outcome: str) -> Act:
+    def act(client: TestClient, trial: Json) -> int:
+        return client.post(f"/api/trials/{trial['id']}/classify", json={
+            "version": trial["version"], "outcome": outcome, "reason": "looked at it"}).status_code
+    return act
+
+
+def post(action: str) -> Act:
+    return lambda client, trial: client.post(f"/api/trials/{trial['id']}/{action}").status_code
+
+
+ACTS: dict[str, Act] = {
+    "fly": post("fly"),
+    "cancel": post("cancel"),
+    "upload": lambda client, trial: upload(client, trial["id"], create_csv()).status_code,
+    "class valid": classify("valid"),
+    "class aborted": classify("aborted"),
+    "class invalid": classify("invalid"),
+}
+
+# Act: state → the state after it. Whatever is not here is refused with 409 and changes nothing. The invalid trial's
+# record ends too early to be scored, so it cannot be made valid (422).
+POSSIBLE: dict[tuple[str, str], str] = {
+    ("fly", "planned"): "planned",
+    ("cancel", "planned"): "cancelled", ("cancel", "staged"): "cancelled",
+    ("upload", "lost"): "valid",
+    ("class valid", "captured"): "valid",
+    ("class aborted", "captured"): "aborted", ("class aborted", "invalid"): "aborted",
+    ("class invalid", "captured"): "invalid", ("class invalid", "valid"): "invalid",
+    ("class invalid", "aborted"): "invalid", ("class invalid", "lost"): "invalid",
+}
+
+
+@pytest.mark.parametrize("state", TrialState)
+@pytest.mark.parametrize("act", ACTS)
+def test_a_person_can_do_what_the_state_allows_and_nothing_else(
+        client: TestClient, database: Database, act: str, state: TrialState) -> None:
+    trial = create_trial_in(state, client, database)
+    status = ACTS[act](client, trial)
+    after = get(client, f"/api/trials/{trial['id']}")["state"]
+    if (act, state.value) in POSSIBLE:
+        assert status in {200, 201, 202}
+        assert after == POSSIBLE[act, state.value]
+    else:
+        assert status == (422 if (act, state) == ("class valid", TrialState.INVALID) else 409)
+        assert after == state
+
+
+@pytest.mark.parametrize("state", TrialState)
+def test_a_note_can_be_written_in_every_state(client: TestClient, database: Database, state: TrialState) -> None:
+    trial = create_trial_in(state, client, database)
+    answer = client.patch(f"/api/trials/{trial['id']}", json={"version": trial["version"], "note": "windy"})
+    assert (answer.status_code, answer.json()["note"], answer.json()["state"]) == (200, "windy", state)
+
+
+@pytest.mark.parametrize("state", TrialState)
+def test_the_offered_actions_are_those_that_work(client: TestClient, database: Database, state: TrialState) -> None:
+    offered = set(create_trial_in(state, client, database)["actions"])
+    works = {act.split()[0].replace("class", "classify") for act, start in POSSIBLE if start == state}
+    if state in {TrialState.STAGED, TrialState.FLYING}:
+        works.add("abort")
+    assert offered == works | {"note"}
+
+
+Step = Callable[[Session, int], object]
+STEPS: dict[str, Step] = {
+    "staged": lambda session, flight: flights.record_staged(session, flight, {"kp": 283, "ki": 13, "kd": 82}),
+    "lift-off": flights.record_lift_off,
+    "landing": lambda session, flight: flights.record_landing(session, flight, create_record()),
+    "short landing": lambda session, flight: flights.record_landing(session, flight, create_record(until_s=9.0)),
+    "abort": lambda session, flight: flights.record_landing(session, flight, create_record(ending="aborted")),
+    "loss": lambda session, flight: flights.record_loss(session, flight, "gone"),
+    "failure": lambda session, flight: flights.record_failure(session, flight, "refused"),
+    "withdrawal": lambda session, flight: flights.record_withdrawal(session, flight, "ended"),
+    "restart": lambda session, _flight: flights.lose_running_flights(session),
+    "recovery": lambda session, flight: flights.recover_record(session, flight, create_record()),
+    "quarantine": lambda session, flight: flights.quarantine_vehicle(session, flight, "not verified"),
+}
+
+
+def reachable(start: TrialState) -> set[TrialState]:
+    """By one move, or through `captured` to its class in one step."""
+    one = set(MOVES[start])
+    return {start} | one | (set(MOVES[TrialState.CAPTURED]) if TrialState.CAPTURED in one else set())
+
+
+@pytest.mark.parametrize("state", [state for state in TrialState
+                                   if state not in {TrialState.PLANNED, TrialState.CANCELLED}])
+@pytest.mark.parametrize("step", STEPS)
+def test_no_step_of_a_worker_moves_a_trial_past_the_table(
+        client: TestClient, database: Database, step: str, state: TrialState) -> None:
+    trial = create_trial_in(state, client, database)
+    try:
+        with database.write() as session:
+            STEPS[step](session, trial["flight"]["id"])
+    except ConflictError:
+        assert get(client, f"/api/trials/{trial['id']}")["state"] == state
+    assert get(client, f"/api/trials/{trial['id']}")["state"] in reachable(state)
