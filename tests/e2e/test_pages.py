@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, FloatRect, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Theme, Viewport
@@ -48,9 +48,6 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
     return paths
 
 
-PAGES = ("list", "new", "ready", "under-way", "finished", "elsewhere", "flight", "missing")
-
-
 def when_drawn(dashboard: Dashboard) -> None:
     """Wait until nothing on the page is still being fetched or drawn."""
     expect(dashboard.page.locator("[aria-busy=true]")).to_have_count(0)
@@ -59,41 +56,36 @@ def when_drawn(dashboard: Dashboard) -> None:
     dashboard.page.wait_for_timeout(300)
 
 
-@pytest.mark.parametrize("theme", THEMES)
-@pytest.mark.parametrize("name", PAGES)
-def test_a_page_can_be_read_by_everybody(
-    open_dashboard: Opener, shared_server: Server, states: dict[str, str], name: str, theme: Theme
-) -> None:
-    dashboard = open_dashboard(shared_server.url, theme=theme)
-    dashboard.open(states[name])
-    when_drawn(dashboard)
-    if name == "new":
-        dashboard.page.get_by_role("button", name="Advanced: stop rule, bounds, vehicle settings, seed").click()
-        dashboard.page.wait_for_timeout(400)
-    found = Axe().run(dashboard.page, options={"runOnly": {"type": "tag", "values": RULES}})
-    assert found.violations_count == 0, found.generate_report()
-
-
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("theme", THEMES)
-def test_every_page_is_photographed_and_fits_its_screen(
+def test_every_page_can_be_read_by_everybody_and_fits_its_screen(
     open_dashboard: Opener, shared_server: Server, states: dict[str, str], theme: Theme, size: str
 ) -> None:
     dashboard = open_dashboard(shared_server.url, theme=theme, viewport=SIZES[size])
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    refused = []
     for name, path in states.items():
         dashboard.open(path)
         when_drawn(dashboard)
         wide = dashboard.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        assert wide == 0, f"{name} scrolls sideways by {wide} px"
+        refused += [f"{name} scrolls sideways by {wide} px"] if wide else []
         dashboard.page.screenshot(path=SCREENSHOTS / f"{name}-{size}-{theme}.png", full_page=True)
-    if theme == "light" and size == "tablet" and os.environ.get("GAINLINE_README_IMAGE"):
-        dashboard.open(states["under-way"])
-        when_drawn(dashboard)
-        README_IMAGE.parent.mkdir(parents=True, exist_ok=True)
-        dashboard.page.screenshot(
-            path=README_IMAGE, clip={"x": 0, "y": 0, "width": 1024, "height": 1120}, full_page=True
-        )
+        for button in dashboard.page.locator("button[aria-expanded=false]:visible").all():
+            button.click()
+        found = Axe().run(dashboard.page, options={"runOnly": {"type": "tag", "values": RULES}})
+        refused += [f"{name}: {found.generate_report()}"] if found.violations_count else []
+    assert refused == []
+
+
+@pytest.mark.skipif(
+    not os.environ.get("GAINLINE_README_IMAGE"), reason="set GAINLINE_README_IMAGE=1 to renew the image"
+)
+def test_the_image_of_the_readme_is_taken(dashboard: Dashboard, states: dict[str, str]) -> None:
+    dashboard.open(states["under-way"])
+    when_drawn(dashboard)
+    README_IMAGE.parent.mkdir(parents=True, exist_ok=True)
+    clip = FloatRect(x=0, y=0, width=1024, height=1120)
+    dashboard.page.screenshot(path=README_IMAGE, clip=clip, full_page=True)
 
 
 def test_the_theme_can_be_switched_and_is_kept(dashboard: Dashboard, states: dict[str, str]) -> None:
@@ -121,7 +113,7 @@ def test_what_is_pressed_beside_a_drone_is_big_enough_for_a_finger(
     when_drawn(dashboard)
     small = [
         (button.inner_text() or button.get_attribute("aria-label"), box["height"])
-        for button in dashboard.page.locator("button:visible, summary:visible").all()
+        for button in dashboard.page.locator("button:visible:not(.modebar-btn), summary:visible").all()
         if (box := button.bounding_box()) is not None and box["height"] < 44 and button.inner_text() != "Settings"
     ]
     assert small == []

@@ -1,5 +1,6 @@
-import { Button, Menu } from "@mantine/core";
+import { Button, Select } from "@mantine/core";
 import { IconArchive, IconCopy } from "@tabler/icons-react";
+import { useState } from "react";
 import { useNavigate } from "react-router";
 import { useArchive, useClone } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
@@ -20,14 +21,13 @@ interface Props {
 /** The campaign's result, and what to do with it. */
 export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const navigate = useNavigate();
+  const [vehicle, setVehicle] = useState(campaign.vehicle.kind);
   const clone = useClone(campaign.id);
   const archive = useArchive(campaign.id);
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
   const best = bestOf(campaign, trials);
   const first = trials.find((trial) => trial.state === "valid");
   const change = percentChange(best?.error, first?.error);
-  const cloneTo = (kind?: string): void =>
-    clone.mutate(kind, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
   return (
     <Panel title={campaignWords("finished", campaign.outcome).word}>
       <div className={classes["stack"]}>
@@ -53,21 +53,27 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             Look at flight {best.number}
           </Button>
         )}
-        <Menu width="target" position="bottom-start">
-          <Menu.Target>
-            <Button leftSection={<IconCopy size={20} aria-hidden />} loading={clone.isPending}>
-              Clone this campaign
-            </Button>
-          </Menu.Target>
-          <Menu.Dropdown>
-            <Menu.Label c="var(--dim)">The same settings, on</Menu.Label>
-            {kinds.map((kind) => (
-              <Menu.Item key={kind.name} mih={48} onClick={() => cloneTo(kind.name)}>
-                {kind.title}
-              </Menu.Item>
-            ))}
-          </Menu.Dropdown>
-        </Menu>
+        <div className={classes["clone"]}>
+          <Select
+            label="The same settings again, on"
+            allowDeselect={false}
+            data={kinds.map(({ name, title }) => ({ value: name, label: title }))}
+            value={vehicle}
+            onChange={(kind) => setVehicle(kind ?? vehicle)}
+          />
+          <Button
+            leftSection={<IconCopy size={20} aria-hidden />}
+            loading={clone.isPending}
+            onClick={() =>
+              // The same vehicle keeps its settings, another one starts from its own defaults.
+              clone.mutate(vehicle === campaign.vehicle.kind ? undefined : vehicle, {
+                onSuccess: ({ id }) => void navigate(`/campaigns/${id}`),
+              })
+            }
+          >
+            Clone
+          </Button>
+        </div>
         {campaign.actions.includes("archive") && (
           <Button
             variant="subtle"

@@ -15,6 +15,7 @@ export function loadPlotly(): Promise<typeof Plotly> {
 
 /** Nothing leaves this machine: Plotly's own upload and edit buttons stay out. */
 export const CONFIG = {
+  displayModeBar: window.matchMedia("(pointer: coarse)").matches ? false : "hover",
   displaylogo: false,
   showSendToCloud: false,
   plotlyServerURL: "",
