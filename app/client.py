@@ -41,8 +41,16 @@ Record = Path | bytes | Mapping[str, Iterable[float]]
 
 _ATTEMPTS: Final = 3
 _PAUSE_S: Final = 0.2
-_LANDED: Final = frozenset({TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID,
-                            TrialState.LOST, TrialState.CANCELLED})
+_LANDED: Final = frozenset(
+    {
+        TrialState.CAPTURED,
+        TrialState.VALID,
+        TrialState.ABORTED,
+        TrialState.INVALID,
+        TrialState.LOST,
+        TrialState.CANCELLED,
+    }
+)
 _NOT_FLOWN: Final = frozenset({FlightState.FAILED, FlightState.CANCELLED})
 
 M = TypeVar("M", bound=BaseModel)
@@ -52,8 +60,9 @@ T = TypeVar("T")
 class RefusedError(GainlineError):
     """The server has refused; `status` and `title` are those of its answer."""
 
-    def __init__(self, message: str, *, hint: str, problems: tuple[Problem, ...] = (), status: int = 0,
-                 title: str = "") -> None:
+    def __init__(
+        self, message: str, *, hint: str, problems: tuple[Problem, ...] = (), status: int = 0, title: str = ""
+    ) -> None:
         super().__init__(message, hint=hint, problems=problems)
         self.status = status
         self.title = title
@@ -76,7 +85,11 @@ class UnavailableError(RefusedError):
 
 
 _REFUSALS: Final[Mapping[int, type[RefusedError]]] = {
-    404: NotFoundError, 409: ConflictError, 413: InvalidError, 415: InvalidError, 422: InvalidError,
+    404: NotFoundError,
+    409: ConflictError,
+    413: InvalidError,
+    415: InvalidError,
+    422: InvalidError,
     503: UnavailableError,
 }
 
@@ -84,15 +97,17 @@ _REFUSALS: Final[Mapping[int, type[RefusedError]]] = {
 class Client:
     """A connection to one server; give your own `http` client for special needs (proxies, tests)."""
 
-    def __init__(self, address: str = "http://127.0.0.1:8000", *, timeout_s: float = 30.0,
-                 http: httpx2.Client | None = None) -> None:
+    def __init__(
+        self, address: str = "http://127.0.0.1:8000", *, timeout_s: float = 30.0, http: httpx2.Client | None = None
+    ) -> None:
         self._http = http or httpx2.Client(base_url=address, timeout=timeout_s)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     def close(self) -> None:
@@ -111,11 +126,20 @@ class Client:
     def campaign(self, campaign_id: int) -> Campaign:
         return self._get(f"/api/campaigns/{campaign_id}", Campaign)
 
-    def create_campaign(self, name: str, *, vehicle: str = "jsbsim", options: Mapping[str, OptionValue] | None = None,
-                        definition: Definition | None = None) -> Campaign:
+    def create_campaign(
+        self,
+        name: str,
+        *,
+        vehicle: str = "jsbsim",
+        options: Mapping[str, OptionValue] | None = None,
+        definition: Definition | None = None,
+    ) -> Campaign:
         """A campaign with working defaults for whatever is left out."""
-        new = NewCampaign(name=name, vehicle=VehicleChoice(kind=vehicle, options=dict(options or {})),
-                          definition=definition or Definition())
+        new = NewCampaign(
+            name=name,
+            vehicle=VehicleChoice(kind=vehicle, options=dict(options or {})),
+            definition=definition or Definition(),
+        )
         return self._post("/api/campaigns", Campaign, new)
 
     def finish(self, campaign_id: int) -> Campaign:
@@ -128,6 +152,7 @@ class Client:
         `recommended` is `stop` once the campaign's own rule has ended it. Raises ConflictError when there can be none
         (an unclassed flight blocks it), RefusedError when computing it failed, UnavailableError after `timeout_s`.
         """
+
         def ready() -> Proposal | None:
             found = self._get(f"/api/campaigns/{campaign_id}/proposal", NextFlight)
             if found.problem is not None:
@@ -135,38 +160,54 @@ class Client:
                 raise kind(f"{found.problem.title} {found.problem.detail}".strip(), hint=found.problem.hint)
             return found.proposal if found.state == "ready" else None
 
-        return _wait(ready, timeout_s, f"There is no proposal for campaign {campaign_id} after {timeout_s:g} s.",
-                     "Look whether a worker runs (GET /api/health), then ask again.")
+        return _wait(
+            ready,
+            timeout_s,
+            f"There is no proposal for campaign {campaign_id} after {timeout_s:g} s.",
+            "Look whether a worker runs (GET /api/health), then ask again.",
+        )
 
-    def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *,
-             note: str = "") -> Trial:
+    def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *, note: str = "") -> Trial:
         """Hand in a flight made elsewhere, with the gains it was flown with; it comes back scored and classed."""
         trial = self._plan(campaign_id, flown, note=note, fly=None)
         return self.upload(trial.id, record)
 
     def upload(self, trial_id: int, record: Record) -> Trial:
         """Hand in the record of a planned trial, or the recovered one of a lost flight."""
-        return self._request("POST", f"/api/trials/{trial_id}/trajectory", Trial.model_validate_json,
-                             content=_csv(record), kind="text/csv")
+        return self._request(
+            "POST",
+            f"/api/trials/{trial_id}/trajectory",
+            Trial.model_validate_json,
+            content=_csv(record),
+            kind="text/csv",
+        )
 
-    def fly(self, campaign_id: int, gains: Proposal | Mapping[str, float], *, speed: float | None = None,
-            note: str = "") -> Trial:
+    def fly(
+        self, campaign_id: int, gains: Proposal | Mapping[str, float], *, speed: float | None = None, note: str = ""
+    ) -> Trial:
         """Ask for a flight of a simulated vehicle (`speed` times as fast as life, None: as fast as possible)."""
         return self._plan(campaign_id, gains, note=note, fly=FlightOrder(speed=speed))
 
     def wait(self, trial_id: int, *, timeout_s: float = 120.0) -> Trial:
         """The trial once its flight is over. Raises RefusedError when it was not flown, UnavailableError after
         `timeout_s`."""
+
         def landed() -> Trial | None:
             trial = self.trial(trial_id)
             flight = trial.flight
             if trial.state not in _LANDED and flight is not None and flight.state in _NOT_FLOWN:
-                raise RefusedError(f"Trial {trial.number} was not flown: {flight.problem}",
-                                   hint="It is planned as before; fly it again or cancel it.")
+                raise RefusedError(
+                    f"Trial {trial.number} was not flown: {flight.problem}",
+                    hint="It is planned as before; fly it again or cancel it.",
+                )
             return trial if trial.state in _LANDED else None
 
-        return _wait(landed, timeout_s, f"Trial {trial_id} has not landed after {timeout_s:g} s.",
-                     "Look whether a worker runs (GET /api/health), then wait again.")
+        return _wait(
+            landed,
+            timeout_s,
+            f"Trial {trial_id} has not landed after {timeout_s:g} s.",
+            "Look whether a worker runs (GET /api/health), then wait again.",
+        )
 
     def abort(self, trial_id: int) -> AbortAnswer:
         """End a flight now."""
@@ -190,10 +231,14 @@ class Client:
         """The whole record."""
         return self._request("GET", f"/api/trials/{trial_id}/trajectory.csv", bytes)
 
-    def _plan(self, campaign_id: int, gains: Proposal | Mapping[str, float], *, note: str,
-              fly: FlightOrder | None) -> Trial:
-        asked = NewTrial(proposal_id=gains.id, note=note, fly=fly) if isinstance(gains, Proposal) else NewTrial(
-            gains=dict(gains), note=note, fly=fly)
+    def _plan(
+        self, campaign_id: int, gains: Proposal | Mapping[str, float], *, note: str, fly: FlightOrder | None
+    ) -> Trial:
+        asked = (
+            NewTrial(proposal_id=gains.id, note=note, fly=fly)
+            if isinstance(gains, Proposal)
+            else NewTrial(gains=dict(gains), note=note, fly=fly)
+        )
         return self._post(f"/api/campaigns/{campaign_id}/trials", Trial, asked)
 
     def _get(self, path: str, kind: type[M], query: Mapping[str, str] | None = None) -> M:
@@ -203,17 +248,27 @@ class Client:
         content = b"" if body is None else body.model_dump_json().encode()
         return self._request("POST", path, kind.model_validate_json, content=content)
 
-    def _request(self, method: str, path: str, read: Callable[[bytes], T], *, content: bytes = b"",
-                 kind: str = "application/json", query: Mapping[str, str] | None = None) -> T:
+    def _request(
+        self,
+        method: str,
+        path: str,
+        read: Callable[[bytes], T],
+        *,
+        content: bytes = b"",
+        kind: str = "application/json",
+        query: Mapping[str, str] | None = None,
+    ) -> T:
         headers = {"Content-Type": kind, "Idempotency-Key": uuid.uuid4().hex} if method == "POST" else {}
         for left in reversed(range(_ATTEMPTS)):
             try:
                 answer = self._http.request(method, path, content=content or None, headers=headers, params=query)
             except httpx2.TransportError as error:
                 if not left:
-                    raise UnavailableError(f"{self._http.base_url} cannot be reached: {error}.", title="No connection",
-                                           hint="Start the dashboard (`gainline serve`), or check the address.",
-                                           ) from error
+                    raise UnavailableError(
+                        f"{self._http.base_url} cannot be reached: {error}.",
+                        title="No connection",
+                        hint="Start the dashboard (`gainline serve`), or check the address.",
+                    ) from error
                 time.sleep(_PAUSE_S)
             else:
                 if answer.is_success:
@@ -227,8 +282,11 @@ def _refusal(answer: httpx2.Response) -> RefusedError:
     try:
         said = ProblemDetails.model_validate_json(answer.content)
     except ValidationError:
-        return kind(f"The server answered {answer.status_code} {answer.reason_phrase}.", status=answer.status_code,
-                    hint="Check that the address is that of a Gainline server of this version.")
+        return kind(
+            f"The server answered {answer.status_code} {answer.reason_phrase}.",
+            status=answer.status_code,
+            hint="Check that the address is that of a Gainline server of this version.",
+        )
     problems = tuple(Problem(problem.field, problem.reason) for problem in said.problems)
     return kind(said.detail, hint=said.hint, problems=problems, status=said.status, title=said.title)
 

@@ -1,26 +1,40 @@
 """The application's errors, grown from the core's root. What one means over HTTP is said in `app.api.errors` alone.
 
-    GainlineError                 (app.core.errors)
-    ├── InputError                something that came in is not usable
-    │   ├── GainsError            a gain vector that may not be flown
-    │   ├── TrajectoryError       a recorded flight that cannot be scored
-    │   ├── KeyReusedError        an idempotency key that already stands for another request
-    │   ├── TooLargeError         more bytes than the program takes
-    │   └── MediaTypeError        a kind of content that is not read here
-    ├── NotFoundError             there is no such thing
-    ├── ConflictError             it is not possible now: the state or the version forbids it
-    │   └── BusyError             the vehicle is flying for somebody else
-    ├── StorageError              the database cannot take or give what it should; nothing was changed
-    ├── SchemaError               the database belongs to another version of the program
-    ├── AlreadyRunningError       another process of the program holds the database
-    └── AddressError              the host and port asked for cannot be listened on
+GainlineError                 (app.core.errors)
+├── InputError                something that came in is not usable
+│   ├── GainsError            a gain vector that may not be flown
+│   ├── TrajectoryError       a recorded flight that cannot be scored
+│   ├── KeyReusedError        an idempotency key that already stands for another request
+│   ├── TooLargeError         more bytes than the program takes
+│   └── MediaTypeError        a kind of content that is not read here
+├── NotFoundError             there is no such thing
+├── ConflictError             it is not possible now: the state or the version forbids it
+│   └── BusyError             the vehicle is flying for somebody else
+├── StorageError              the database cannot take or give what it should; nothing was changed
+├── SchemaError               the database belongs to another version of the program
+├── AlreadyRunningError       another process of the program holds the database
+└── AddressError              the host and port asked for cannot be listened on
 """
 
 from app.core.errors import GainlineError, GainsError, InputError, Problem, TrajectoryError
 
-__all__ = ["AddressError", "AlreadyRunningError", "BusyError", "ConflictError", "GainlineError", "GainsError",
-           "InputError", "KeyReusedError", "MediaTypeError", "NotFoundError", "Problem", "SchemaError", "StorageError",
-           "TooLargeError", "TrajectoryError"]
+__all__ = [
+    "AddressError",
+    "AlreadyRunningError",
+    "BusyError",
+    "ConflictError",
+    "GainlineError",
+    "GainsError",
+    "InputError",
+    "KeyReusedError",
+    "MediaTypeError",
+    "NotFoundError",
+    "Problem",
+    "SchemaError",
+    "StorageError",
+    "TooLargeError",
+    "TrajectoryError",
+]
 
 
 class KeyReusedError(InputError):
@@ -39,8 +53,10 @@ class NotFoundError(GainlineError):
     """There is no such thing."""
 
     def __init__(self, what: str, identity: object, *, hint: str = "") -> None:
-        super().__init__(f"There is no {what} {identity}.",
-                         hint=hint or "It may have been deleted, or the number is mistyped; look it up in its list.")
+        super().__init__(
+            f"There is no {what} {identity}.",
+            hint=hint or "It may have been deleted, or the number is mistyped; look it up in its list.",
+        )
 
 
 class ConflictError(GainlineError):

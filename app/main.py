@@ -41,8 +41,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         database.close()
 
     app = FastAPI(
-        title="Gainline", version=__version__, lifespan=lifespan, openapi_url="/api/openapi.json", docs_url=None,
-        redoc_url=None, responses=errors.RESPONSES, generate_unique_id_function=_operation_id,
+        title="Gainline",
+        version=__version__,
+        lifespan=lifespan,
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        responses=errors.RESPONSES,
+        generate_unique_id_function=_operation_id,
     )
     app.state.settings = settings
     app.state.database = database
@@ -61,8 +67,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 def _no_dashboard() -> None:
-    raise NotFoundError("built dashboard in", "this installation",
-                        hint="In a checkout, ./dev up builds and serves it. The API under /api works without it.")
+    raise NotFoundError(
+        "built dashboard in",
+        "this installation",
+        hint="In a checkout, ./dev up builds and serves it. The API under /api works without it.",
+    )
 
 
 def _operation_id(route: APIRoute) -> str:

@@ -19,8 +19,10 @@ def check_move(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S
 def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, what: str) -> None:
     """Raises ConflictError when `action` is not possible in `state`."""
     if state not in actions[action]:
-        raise ConflictError(f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
-                            hint="Load it again: it has changed since, or something else has to be done first.")
+        raise ConflictError(
+            f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
+            hint="Load it again: it has changed since, or something else has to be done first.",
+        )
 
 
 def allowed(actions: Mapping[str, frozenset[S]], state: S) -> list[str]:
@@ -35,11 +37,16 @@ def check_version(sent: int, held: int, what: str, differences: Mapping[str, tup
     """
     if sent == held:
         return
-    problems = tuple(Problem(field, f"is now {_short(now)}; you sent {_short(wanted)}")
-                     for field, (now, wanted) in differences.items() if now != wanted)
-    raise ConflictError(f"{what} was changed by somebody else (version {held}, you edited version {sent}).",
-                        hint="Load it again, look at what changed, and make your edit on that.",
-                        problems=(Problem("version", f"is {held}, got {sent}"), *problems))
+    problems = tuple(
+        Problem(field, f"is now {_short(now)}; you sent {_short(wanted)}")
+        for field, (now, wanted) in differences.items()
+        if now != wanted
+    )
+    raise ConflictError(
+        f"{what} was changed by somebody else (version {held}, you edited version {sent}).",
+        hint="Load it again, look at what changed, and make your edit on that.",
+        problems=(Problem("version", f"is {held}, got {sent}"), *problems),
+    )
 
 
 def _short(value: object) -> str:

@@ -25,22 +25,31 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -
     folder = data_dir / "log"
     folder.mkdir(parents=True, exist_ok=True)
     to_file = logging.handlers.RotatingFileHandler(
-        folder / f"{role}.log", maxBytes=MAX_LOG_BYTES, backupCount=KEPT_LOGS, delay=True, encoding="utf-8")
+        folder / f"{role}.log", maxBytes=MAX_LOG_BYTES, backupCount=KEPT_LOGS, delay=True, encoding="utf-8"
+    )
     to_file.setFormatter(_formatter(structlog.processors.JSONRenderer()))
     to_stderr = logging.StreamHandler()
-    to_stderr.setFormatter(_formatter(
-        structlog.dev.ConsoleRenderer() if sys.stderr.isatty() else structlog.processors.JSONRenderer()))
+    to_stderr.setFormatter(
+        _formatter(structlog.dev.ConsoleRenderer() if sys.stderr.isatty() else structlog.processors.JSONRenderer())
+    )
     if sys.stderr.isatty():
         to_stderr.setLevel(logging.WARNING)
     logging.basicConfig(level=level.upper(), handlers=[to_file, to_stderr], force=True)
     logging.raiseExceptions = False  # a full disk must not turn every log line into a traceback
     structlog.configure(
-        processors=[structlog.stdlib.filter_by_level, *_SHARED, structlog.processors.format_exc_info,
-                    structlog.stdlib.ProcessorFormatter.wrap_for_formatter],
-        logger_factory=structlog.stdlib.LoggerFactory(), cache_logger_on_first_use=True)
+        processors=[
+            structlog.stdlib.filter_by_level,
+            *_SHARED,
+            structlog.processors.format_exc_info,
+            structlog.stdlib.ProcessorFormatter.wrap_for_formatter,
+        ],
+        logger_factory=structlog.stdlib.LoggerFactory(),
+        cache_logger_on_first_use=True,
+    )
 
 
 def _formatter(renderer: Processor) -> logging.Formatter:
     return structlog.stdlib.ProcessorFormatter(
         foreign_pre_chain=[*_SHARED, structlog.processors.format_exc_info],
-        processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer])
+        processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer],
+    )

@@ -45,8 +45,9 @@ class Pool:
         self._executor = self._start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         with self._lock:
             self._closed = True
             self._lifeline.close()
@@ -67,12 +68,18 @@ class Pool:
                 return executor.submit(function, *args, **kwargs).result()
             except BrokenExecutor:
                 self._replace(executor, function.__qualname__)
-        raise CrashedError(f"The process that computed {function.__qualname__} died {ATTEMPTS} times.",
-                           hint="It may have run out of memory. Free some and retry the job; the log says more.")
+        raise CrashedError(
+            f"The process that computed {function.__qualname__} died {ATTEMPTS} times.",
+            hint="It may have run out of memory. Free some and retry the job; the log says more.",
+        )
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self._processes, mp_context=get_context("spawn"), initializer=_settle_in,
-                                   initargs=(self._held, self._prepare))
+        return ProcessPoolExecutor(
+            self._processes,
+            mp_context=get_context("spawn"),
+            initializer=_settle_in,
+            initargs=(self._held, self._prepare),
+        )
 
     def _replace(self, broken: ProcessPoolExecutor, task: str) -> None:
         with self._lock:

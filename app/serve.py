@@ -80,9 +80,11 @@ def exposure(host: str) -> str | None:
             return None
     except ValueError:
         pass  # a name: it may be anything
-    return (f"Warning: listening on {host}, so anybody who can reach this machine over the network can see, change and "
-            "delete every campaign and start simulated flights: Gainline has no accounts yet. "
-            "Real vehicles fly only from a server on loopback (--host 127.0.0.1).")
+    return (
+        f"Warning: listening on {host}, so anybody who can reach this machine over the network can see, change and "
+        "delete every campaign and start simulated flights: Gainline has no accounts yet. "
+        "Real vehicles fly only from a server on loopback (--host 127.0.0.1)."
+    )
 
 
 class _Server(uvicorn.Server):
@@ -113,8 +115,13 @@ def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], 
     def closing() -> None:
         application.state.live.close()
 
-    config = uvicorn.Config(application, log_config=None, access_log=False, server_header=False,
-                            timeout_graceful_shutdown=STREAMS_END_WITHIN_S)
+    config = uvicorn.Config(
+        application,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
+    )
     _Server(config, ready=ready, closing=closing).run(sockets=[listener])
 
 
@@ -128,7 +135,8 @@ def _already_served(settings: Settings, error: LockedError) -> AlreadyRunningErr
     return AlreadyRunningError(
         f"Another Gainline server ({error.holder or 'its process is unknown'}) already uses {settings.database_file}.",
         hint=(f"Open {where}, " if where else "Use that one, ")
-        + "stop it first, or give this server a folder of its own with --data-dir. The running server is not affected.")
+        + "stop it first, or give this server a folder of its own with --data-dir. The running server is not affected.",
+    )
 
 
 def _no_address(host: str, port: int, error: OSError) -> AddressError:

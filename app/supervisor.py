@@ -37,8 +37,9 @@ class Supervisor(Generic[T]):
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._stopping.set()
         self._thread.join()
         process = self._process
@@ -71,8 +72,14 @@ class Supervisor(Generic[T]):
                 continue
             lived_s = time.monotonic() - started_s
             pause_s = FIRST_PAUSE_S if lived_s > HEALTHY_AFTER_S else min(2 * pause_s, LONGEST_PAUSE_S)
-            _log.error("child died and is started again", child=self._name, pid=process.pid, code=process.exitcode,
-                       lived_s=round(lived_s, 1), pause_s=pause_s)
+            _log.error(
+                "child died and is started again",
+                child=self._name,
+                pid=process.pid,
+                code=process.exitcode,
+                lived_s=round(lived_s, 1),
+                pause_s=pause_s,
+            )
             if not self._stopping.wait(pause_s):
                 self._process = self._start()
                 started_s = time.monotonic()

@@ -68,7 +68,8 @@ def run_worker(settings: Settings) -> None:
             f"Another Gainline worker ({error.holder or 'its process is unknown'}) already works for "
             f"{settings.database_file}.",
             hint="One is enough: `gainline serve` brings its own. Stop that one first, or start this one with another "
-                 "data folder (GAINLINE_DATA_DIR).") from error
+            "data folder (GAINLINE_DATA_DIR).",
+        ) from error
 
 
 def run_supervised_worker(settings: Settings) -> None:
@@ -120,10 +121,17 @@ class Worker:
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
-            live = stack.enter_context(LiveServer(
-                live_address(self._settings.data_dir), abort=self._airspace.abort, hello=self._hello))
-            deck = FlightDeck(database, self._settings.data_dir, self._airspace, live.publish, worker=self._name,
-                              closing=self._ending.event)
+            live = stack.enter_context(
+                LiveServer(live_address(self._settings.data_dir), abort=self._airspace.abort, hello=self._hello)
+            )
+            deck = FlightDeck(
+                database,
+                self._settings.data_dir,
+                self._airspace,
+                live.publish,
+                worker=self._name,
+                closing=self._ending.event,
+            )
             stack.callback(deck.close)
             computing = stack.enter_context(ThreadPoolExecutor(SPARE_PROCESSORS, thread_name_prefix="job"))
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
@@ -136,8 +144,9 @@ class Worker:
             self._loop(database, deck, flying, desk, computing)
             _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trials())
 
-    def _loop(self, database: Database, deck: FlightDeck, flying: Executor, desk: ProposalDesk,
-              computing: Executor) -> None:
+    def _loop(
+        self, database: Database, deck: FlightDeck, flying: Executor, desk: ProposalDesk, computing: Executor
+    ) -> None:
         with DatabaseWatch(database.file) as watch:
             while not self._ending.event.is_set():
                 try:

@@ -32,16 +32,19 @@ def climb_error(settling_s: float) -> float:
     return 3.0 * settling_s * (1.0 - float(np.exp(-WINDOW_S / settling_s))) / WINDOW_S
 
 
-def create_record(settling_s: float = 1.0, *, ending: Ending = "completed", reason: str = "",
-                  until_s: float = 33.0) -> FlightRecord:
+def create_record(
+    settling_s: float = 1.0, *, ending: Ending = "completed", reason: str = "", until_s: float = 33.0
+) -> FlightRecord:
     """What a vehicle leaves behind."""
     return FlightRecord(trajectory=create_climb(settling_s, until_s=until_s), ending=ending, reason=reason)
 
 
 def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> bytes:
     """A flight's record as it is uploaded."""
-    lines = [",".join(columns), *(",".join(f"{number:.9g}" for number in row)
-                                  for row in zip(*columns.values(), strict=True))]
+    lines = [
+        ",".join(columns),
+        *(",".join(f"{number:.9g}" for number in row) for row in zip(*columns.values(), strict=True)),
+    ]
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -58,8 +61,9 @@ def create_campaign(client: httpx2.Client, *, vehicle: str = "twin", **fields: o
     return campaign
 
 
-def create_ready_campaign(client: httpx2.Client, database: Database, *, vehicle: str = "twin",
-                          **fields: object) -> Json:
+def create_ready_campaign(
+    client: httpx2.Client, database: Database, *, vehicle: str = "twin", **fields: object
+) -> Json:
     """A campaign whose first gains are known."""
     campaign = create_campaign(client, vehicle=vehicle, **fields)
     run_jobs(database)

@@ -20,8 +20,9 @@ def gainline(client: TestClient) -> Client:
 
 
 def test_ask_and_tell(gainline: Client, database: Database, tmp_path: Path) -> None:
-    campaign = gainline.create_campaign("Mine", vehicle="import", definition=Definition(
-        seed=3, stop=StopRule(kind="budget", max_flights=9)))
+    campaign = gainline.create_campaign(
+        "Mine", vehicle="import", definition=Definition(seed=3, stop=StopRule(kind="budget", max_flights=9))
+    )
     run_jobs(database)
     proposal = gainline.ask(campaign.id)
     assert (proposal.kind, proposal.gains) == ("start", {"kp": 283, "ki": 13, "kd": 82})

@@ -57,7 +57,8 @@ def test_every_answer_says_what_a_page_may_load(dashboard: TestClient) -> None:
             headers = client.get(path, headers=PAGE).headers
             assert headers["content-security-policy"] == (
                 "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
-                "object-src 'none'; base-uri 'none'; frame-ancestors 'none'; form-action 'self'")
+                "object-src 'none'; base-uri 'none'; frame-ancestors 'none'; form-action 'self'"
+            )
             assert headers["x-content-type-options"] == "nosniff"
 
 
@@ -81,10 +82,20 @@ def test_the_catalogue_offers_what_a_campaign_can_be_made_of(client: TestClient)
     assert [experiment["name"] for experiment in catalogue["experiments"]] == ["takeoff"]
     assert {strategy["name"] for strategy in catalogue["strategies"]} == {"gradient", "simplex", "manual"}
     assert {kind["name"]: kind["can_fly"] for kind in catalogue["vehicle_kinds"]} == {
-        "jsbsim": True, "twin": True, "import": False}
+        "jsbsim": True,
+        "twin": True,
+        "import": False,
+    }
     assert catalogue["experiments"][0]["gains"][0] == {
-        "name": "kp", "title": "Proportional gain", "unit": "counts", "lower": 0, "upper": 4000, "scale": 400,
-        "default": 283, "integer": True}
+        "name": "kp",
+        "title": "Proportional gain",
+        "unit": "counts",
+        "lower": 0,
+        "upper": 4000,
+        "scale": 400,
+        "default": 283,
+        "integer": True,
+    }
 
 
 def test_every_preset_makes_a_campaign(client: TestClient) -> None:

@@ -60,8 +60,11 @@ quarantined: ready, disconnected
 
 Moves = Mapping[Any, frozenset[Any]]
 MACHINES: dict[str, tuple[Moves, str]] = {
-    "trial": (trials.MOVES, TRIAL), "campaign": (campaigns.MOVES, CAMPAIGN), "job": (jobs.MOVES, JOB),
-    "flight": (trials.FLIGHT_MOVES, FLIGHT), "vehicle": (fleet.MOVES, VEHICLE),
+    "trial": (trials.MOVES, TRIAL),
+    "campaign": (campaigns.MOVES, CAMPAIGN),
+    "job": (jobs.MOVES, JOB),
+    "flight": (trials.FLIGHT_MOVES, FLIGHT),
+    "vehicle": (fleet.MOVES, VEHICLE),
 }
 
 
@@ -90,8 +93,9 @@ def test_every_state_has_its_line_in_the_table(machine: str) -> None:
     assert {line.split(":")[0] for line in text.strip().splitlines()} == {state.value for state in moves}
 
 
-@pytest.mark.parametrize("states", [trials.TrialState, trials.FlightState, campaigns.CampaignState, jobs.JobState,
-                                    fleet.VehicleState])
+@pytest.mark.parametrize(
+    "states", [trials.TrialState, trials.FlightState, campaigns.CampaignState, jobs.JobState, fleet.VehicleState]
+)
 def test_every_lifecycle_is_drawn_in_its_docstring(states: type[StrEnum]) -> None:
     assert states.__doc__ is not None
     missing = [state.value for state in states if state.value not in states.__doc__.lower()]

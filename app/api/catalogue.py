@@ -105,16 +105,31 @@ def get_health(live: Live) -> Health:
 @router.get("/catalogue")
 def get_catalogue() -> Catalogue:
     """Everything that a campaign can be made of."""
-    return Catalogue.model_validate({
-        "experiments": [{"name": each.name, "title": each.title, "output": each.output, "error_unit": each.error_unit,
-                         "gains": each.space.gains} for each in EXPERIMENTS.values()],
-        "strategies": list(STRATEGIES.values()),
-        "vehicle_kinds": list(VEHICLE_KINDS.values()),
-        "presets": [_preset(name) for name in preset_names()],
-    }, from_attributes=True)
+    return Catalogue.model_validate(
+        {
+            "experiments": [
+                {
+                    "name": each.name,
+                    "title": each.title,
+                    "output": each.output,
+                    "error_unit": each.error_unit,
+                    "gains": each.space.gains,
+                }
+                for each in EXPERIMENTS.values()
+            ],
+            "strategies": list(STRATEGIES.values()),
+            "vehicle_kinds": list(VEHICLE_KINDS.values()),
+            "presets": [_preset(name) for name in preset_names()],
+        },
+        from_attributes=True,
+    )
 
 
 def _preset(name: str) -> PresetInfo:
     file = read_preset(name)
-    return PresetInfo(name=name, title=file.name, line=file.description, campaign=NewCampaign.model_validate(
-        file.model_dump(exclude={"description"})))
+    return PresetInfo(
+        name=name,
+        title=file.name,
+        line=file.description,
+        campaign=NewCampaign.model_validate(file.model_dump(exclude={"description"})),
+    )

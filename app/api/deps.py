@@ -19,9 +19,15 @@ M = TypeVar("M", bound=BaseModel)
 Id = Annotated[int, Path(ge=1, le=2**63 - 1)]
 Limit = Annotated[int, Query(ge=1, le=200, description="how many items the page may hold")]
 CursorText = Annotated[str | None, Query(max_length=500, description="`next_cursor` of the page before")]
-IdempotencyKey = Annotated[str | None, Header(
-    alias="Idempotency-Key", min_length=1, max_length=200,
-    description="a text of the caller's own, new for each act: the same request sent again with it is harmless")]
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        description="a text of the caller's own, new for each act: the same request sent again with it is harmless",
+    ),
+]
 
 
 def _database(request: Request) -> Database:
@@ -92,5 +98,7 @@ def json_only(request: Request) -> None:
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     has_body = request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers
     if has_body and kind != "application/json":
-        raise MediaTypeError(f"The body is {kind or 'of no stated type'}, and JSON is expected here.",
-                             hint="Send JSON with the header `Content-Type: application/json`.")
+        raise MediaTypeError(
+            f"The body is {kind or 'of no stated type'}, and JSON is expected here.",
+            hint="Send JSON with the header `Content-Type: application/json`.",
+        )

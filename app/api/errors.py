@@ -47,12 +47,16 @@ _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
 """Status and title; a class without its own has those of the nearest above it."""
 
 _HTTP: Final[Mapping[int, tuple[str, str]]] = {
-    400: ("The body cannot be read; nothing was changed.",
-          "Send JSON in UTF-8 without deep nesting, or a flight record as `text/csv`."),
+    400: (
+        "The body cannot be read; nothing was changed.",
+        "Send JSON in UTF-8 without deep nesting, or a flight record as `text/csv`.",
+    ),
     404: ("There is nothing at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
     405: ("{path} does not know the method {method}.", "The methods of each path are listed in /api/openapi.json."),
-    413: ("The request is too large; nothing was stored.",
-          "A JSON body has at most 1 MiB, a flight record at most 200 000 rows and 48 MiB."),
+    413: (
+        "The request is too large; nothing was stored.",
+        "A JSON body has at most 1 MiB, a flight record at most 200 000 rows and 48 MiB.",
+    ),
 }
 """What the framework refuses by itself."""
 
@@ -81,27 +85,49 @@ def kind_of(error: GainlineError) -> tuple[HTTPStatus, str]:
     return next(_KINDS[kind] for kind in type(error).__mro__ if kind in _KINDS)
 
 
-def _problem(status: int, detail: str, hint: str, problems: Iterable[ProblemField] = (), *,
-             title: str = "", headers: Mapping[str, str] | None = None) -> JSONResponse:
+def _problem(
+    status: int,
+    detail: str,
+    hint: str,
+    problems: Iterable[ProblemField] = (),
+    *,
+    title: str = "",
+    headers: Mapping[str, str] | None = None,
+) -> JSONResponse:
     kind = f"urn:gainline:{title.lower().replace(' ', '-')}" if title else "about:blank"
-    body = Problem(type=kind, title=title or HTTPStatus(status).phrase, status=status, detail=detail, hint=hint,
-                   problems=list(problems))
+    body = Problem(
+        type=kind,
+        title=title or HTTPStatus(status).phrase,
+        status=status,
+        detail=detail,
+        hint=hint,
+        problems=list(problems),
+    )
     return JSONResponse(body.model_dump(), status, headers, media_type=MEDIA_TYPE)
 
 
 async def _own_error(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, GainlineError)
     status, title = kind_of(error)
-    return _problem(status, error.message, error.hint,
-                    [ProblemField(field=problem.field, reason=problem.reason) for problem in error.problems],
-                    title=title)
+    return _problem(
+        status,
+        error.message,
+        error.hint,
+        [ProblemField(field=problem.field, reason=problem.reason) for problem in error.problems],
+        title=title,
+    )
 
 
 async def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     problems = [_refused(found) for found in error.errors()]
-    return _problem(HTTPStatus.UNPROCESSABLE_ENTITY, "The request has fields that cannot be used; nothing was changed.",
-                    "Correct the named fields and send the request again.", problems, title="Unusable input")
+    return _problem(
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+        "The request has fields that cannot be used; nothing was changed.",
+        "Correct the named fields and send the request again.",
+        problems,
+        title="Unusable input",
+    )
 
 
 def _refused(found: Mapping[str, Any]) -> ProblemField:
@@ -130,15 +156,21 @@ def too_large() -> JSONResponse:
 async def _system_error(request: Request, error: Exception) -> JSONResponse:
     """A full disk may also show outside of the database, for instance while an upload is set aside."""
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
-        return await _own_error(request, StorageError(
-            "The disk is full; nothing of this request was stored.",
-            hint="Free some space, then do the same again; everything stored before is intact."))
+        return await _own_error(
+            request,
+            StorageError(
+                "The disk is full; nothing of this request was stored.",
+                hint="Free some space, then do the same again; everything stored before is intact.",
+            ),
+        )
     return await _unforeseen(request, error)
 
 
 async def _unforeseen(request: Request, error: Exception) -> JSONResponse:
     number = uuid.uuid4().hex[:12]
     _log.error("unforeseen error", error_id=number, method=request.method, path=request.url.path, exc_info=error)
-    return _problem(HTTPStatus.INTERNAL_SERVER_ERROR,
-                    f"The program made a mistake (number {number}); nothing of this request was stored.",
-                    f"Try again. If it happens again, report it with the number {number} and the log.")
+    return _problem(
+        HTTPStatus.INTERNAL_SERVER_ERROR,
+        f"The program made a mistake (number {number}); nothing of this request was stored.",
+        f"Try again. If it happens again, report it with the number {number} and the log.",
+    )

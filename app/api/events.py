@@ -21,8 +21,9 @@ router = APIRouter(prefix="/api", tags=["events"])
 
 
 @router.get("/events", response_class=EventSourceResponse)
-async def events(live: Live, database: CurrentDatabase,
-                 last_event_id: Annotated[str | None, Header()] = None) -> AsyncIterator[ServerSentEvent]:
+async def events(
+    live: Live, database: CurrentDatabase, last_event_id: Annotated[str | None, Header()] = None
+) -> AsyncIterator[ServerSentEvent]:
     """Follow everything that happens.
 
     `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
@@ -32,8 +33,12 @@ async def events(live: Live, database: CurrentDatabase,
     """
     with live.hub.subscribe() as stream:
         sent, known = await asyncio.to_thread(_start, database, last_event_id)
-        yield ServerSentEvent(event="hello", id=None if last_event_id else str(sent), retry=RETRY_MS,
-                              data={"version": __version__, "worker": live.worker_running})
+        yield ServerSentEvent(
+            event="hello",
+            id=None if last_event_id else str(sent),
+            retry=RETRY_MS,
+            data={"version": __version__, "worker": live.worker_running},
+        )
         if not known:
             yield ServerSentEvent(event="reset", id=str(sent), data={})
         for change in await asyncio.to_thread(_backlog, database, sent):
@@ -65,8 +70,11 @@ def _backlog(database: Database, event_id: int) -> list[Change]:
 def _event(item: Change | Telemetry | FlightPhase | LinkState) -> ServerSentEvent:
     match item:
         case Change():
-            return ServerSentEvent(event="change", id=str(item.id), data={
-                "topic": item.topic, "entity_id": item.entity_id, "campaign_id": item.campaign_id})
+            return ServerSentEvent(
+                event="change",
+                id=str(item.id),
+                data={"topic": item.topic, "entity_id": item.entity_id, "campaign_id": item.campaign_id},
+            )
         case LinkState():
             return ServerSentEvent(event="worker", data={"worker": item.worker})
         case Telemetry() | FlightPhase():

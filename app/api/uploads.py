@@ -17,11 +17,21 @@ _IN_MEMORY_BYTES: Final = 2**20
 _CHUNK_BYTES: Final = 2**18
 _RAW: Final = frozenset({"text/csv", "application/csv", "text/plain", "application/octet-stream"})
 
-REQUEST_BODY: Final = {"requestBody": {"required": True, "content": {
-    "text/csv": {"schema": {"type": "string", "format": "binary"}},
-    "multipart/form-data": {"schema": {
-        "type": "object", "required": ["file"], "properties": {"file": {"type": "string", "format": "binary"}}}},
-}}}
+REQUEST_BODY: Final = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "text/csv": {"schema": {"type": "string", "format": "binary"}},
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+        },
+    }
+}
 """For OpenAPI."""
 
 
@@ -50,13 +60,18 @@ async def _chunks(request: Request, kind: str) -> AsyncIterator[bytes]:
             yield chunk
         return
     if kind != "multipart/form-data":
-        raise MediaTypeError(f"A record of type {kind or 'that is not stated'} is not read here.",
-                             hint="Send the file as `Content-Type: text/csv`, or as the form field `file`.")
+        raise MediaTypeError(
+            f"A record of type {kind or 'that is not stated'} is not read here.",
+            hint="Send the file as `Content-Type: text/csv`, or as the form field `file`.",
+        )
     async with request.form(max_files=1, max_fields=4) as form:
         part = form.get("file")
         if not isinstance(part, UploadFile):
-            raise InputError("The form holds no file.", hint="Send the record in the form field `file`.",
-                             problems=(Problem("file", "is missing"),))
+            raise InputError(
+                "The form holds no file.",
+                hint="Send the record in the form field `file`.",
+                problems=(Problem("file", "is missing"),),
+            )
         while chunk := await part.read(_CHUNK_BYTES):
             yield chunk
 

@@ -43,8 +43,11 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
 
     problems = [*_refusals(lambda: check_definition(definition), "definition."), *_refusals(take_options, "")]
     if problems:
-        raise InputError("This campaign cannot be used.", problems=tuple(problems),
-                         hint="Correct the named fields and send it again; nothing was changed.")
+        raise InputError(
+            "This campaign cannot be used.",
+            problems=tuple(problems),
+            hint="Correct the named fields and send it again; nothing was changed.",
+        )
     return definition, options
 
 

@@ -59,8 +59,12 @@ def read_history(session: Session, campaign_id: int) -> History:
     """The campaign's definition and its flights with their trajectories as stored. Raises NotFoundError."""
     row = repository.get_one(session, campaign_id)
     definition = definition_of(row)
-    return History(campaign_id=campaign_id, definition=definition, flights=history.flights_of(session, campaign_id),
-                   digest=history.history_digest(definition.digest(), history.trials_of(session, campaign_id)))
+    return History(
+        campaign_id=campaign_id,
+        definition=definition,
+        flights=history.flights_of(session, campaign_id),
+        digest=history.history_digest(definition.digest(), history.trials_of(session, campaign_id)),
+    )
 
 
 def compute(past: History) -> Computed:
@@ -68,10 +72,13 @@ def compute(past: History) -> Computed:
     definition, flights = past.definition, past.flights
     proposal = next_proposal(definition, flights)
     return Computed(
-        history_digest=past.digest, proposal=proposal,
-        gate=check_policy(definition, get_experiment(definition.experiment), space_of(definition), proposal.gains,
-                          flights),
-        stop_verdict=verdict(definition.stop, [flight.error for flight in flights], proposal.kind))
+        history_digest=past.digest,
+        proposal=proposal,
+        gate=check_policy(
+            definition, get_experiment(definition.experiment), space_of(definition), proposal.gains, flights
+        ),
+        stop_verdict=verdict(definition.stop, [flight.error for flight in flights], proposal.kind),
+    )
 
 
 def store_proposal(session: Session, campaign_id: int, computed: Computed) -> ProposalRow:
@@ -84,10 +91,16 @@ def store_proposal(session: Session, campaign_id: int, computed: Computed) -> Pr
     proposal = computed.proposal
     predicted = None if proposal.predicted is None else history.store_trajectory(session, proposal.predicted)
     row = ProposalRow(
-        campaign_id=campaign_id, history_digest=computed.history_digest, kind=proposal.kind, gains=proposal.gains,
-        predicted_error=proposal.predicted_error, predicted_id=None if predicted is None else predicted.id,
-        explanation=asdict(proposal.explanation), gate=gate_json(computed.gate),
-        stop_verdict=asdict(computed.stop_verdict))
+        campaign_id=campaign_id,
+        history_digest=computed.history_digest,
+        kind=proposal.kind,
+        gains=proposal.gains,
+        predicted_error=proposal.predicted_error,
+        predicted_id=None if predicted is None else predicted.id,
+        explanation=asdict(proposal.explanation),
+        gate=gate_json(computed.gate),
+        stop_verdict=asdict(computed.stop_verdict),
+    )
     session.add(row)
     session.flush()
     trials = history.trials_of(session, campaign_id)
@@ -115,8 +128,10 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     if row is None or row.campaign_id != campaign.id:
         raise NotFoundError("proposal", proposal_id, hint="Ask for the campaign's proposal and use its id.")
     if is_stale(campaign, row, history.trials_of(session, campaign.id)):
-        raise ConflictError(f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
-                            hint="Ask for the campaign's proposal again and decide on the new one.")
+        raise ConflictError(
+            f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
+            hint="Ask for the campaign's proposal again and decide on the new one.",
+        )
     return row
 
 
@@ -125,8 +140,7 @@ def is_stale(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]
     return row.history_digest != history.history_digest(definition_of(campaign).digest(), trials)
 
 
-def end_campaign(campaign: CampaignRow, trials: Sequence[TrialRow], outcome: Outcome,
-                 reason: str) -> None:
+def end_campaign(campaign: CampaignRow, trials: Sequence[TrialRow], outcome: Outcome, reason: str) -> None:
     """Finish a campaign; what was only planned is cancelled."""
     move_campaign(campaign, CampaignState.FINISHED)
     campaign.outcome, campaign.stop_reason = outcome, reason

@@ -20,8 +20,12 @@ _NO_ERROR: Final = 1e300
 """Where campaigns without an error stand among the errors: last."""
 
 _BEST_ERROR: Final = func.coalesce(
-    select(func.min(TrialRow.error)).where(TrialRow.campaign_id == CampaignRow.id, TrialRow.state == TrialState.VALID)
-    .correlate(CampaignRow).scalar_subquery(), _NO_ERROR)
+    select(func.min(TrialRow.error))
+    .where(TrialRow.campaign_id == CampaignRow.id, TrialRow.state == TrialState.VALID)
+    .correlate(CampaignRow)
+    .scalar_subquery(),
+    _NO_ERROR,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +58,16 @@ def get_one(session: Session, campaign_id: int) -> CampaignRow:
     return row
 
 
-def page(session: Session, *, search: str, states: Collection[CampaignState], vehicles: Collection[str], sort: Sort,
-         after: Position | None, limit: int) -> tuple[list[tuple[CampaignRow, Position]], int]:
+def page(
+    session: Session,
+    *,
+    search: str,
+    states: Collection[CampaignState],
+    vehicles: Collection[str],
+    sort: Sort,
+    after: Position | None,
+    limit: int,
+) -> tuple[list[tuple[CampaignRow, Position]], int]:
     """The campaigns after that position, one more than `limit`, each with its own; and the number of all."""
     wanted = _filters(search, states, vehicles)
     total = session.scalar(select(func.count(CampaignRow.id)).join(CampaignRow.vehicle).where(*wanted)) or 0
@@ -65,8 +77,9 @@ def page(session: Session, *, search: str, states: Collection[CampaignState], ve
         here, there = tuple_(order.value, CampaignRow.id), tuple_(value, literal(after[1]))
         wanted.append(here < there if order.descending else here > there)
     directed = (order.value.desc(), CampaignRow.id.desc()) if order.descending else (order.value, CampaignRow.id)
-    found = session.execute(select(CampaignRow, order.value).join(CampaignRow.vehicle).where(*wanted)
-                            .order_by(*directed).limit(limit + 1)).all()
+    found = session.execute(
+        select(CampaignRow, order.value).join(CampaignRow.vehicle).where(*wanted).order_by(*directed).limit(limit + 1)
+    ).all()
     return [(row, (_in_cursor(value), row.id)) for row, value in found], total
 
 
@@ -93,5 +106,6 @@ def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
 
 
 def latest_proposal(session: Session, campaign_id: int) -> ProposalRow | None:
-    return session.scalar(select(ProposalRow).where(ProposalRow.campaign_id == campaign_id)
-                          .order_by(ProposalRow.id.desc()).limit(1))
+    return session.scalar(
+        select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id.desc()).limit(1)
+    )

@@ -14,14 +14,19 @@ router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[De
 
 
 @router.get("")
-def list_campaigns(session: Reader,
-                   search: Annotated[str, Query(max_length=200, description="part of the name")] = "",
-                   state: Annotated[list[CampaignState] | None, Query()] = None,
-                   vehicle: Annotated[list[str] | None, Query(description="kinds of vehicle")] = None,
-                   sort: Sort = Sort.NEWEST, limit: Limit = 50, cursor: CursorText = None) -> Page[CampaignSummary]:
+def list_campaigns(
+    session: Reader,
+    search: Annotated[str, Query(max_length=200, description="part of the name")] = "",
+    state: Annotated[list[CampaignState] | None, Query()] = None,
+    vehicle: Annotated[list[str] | None, Query(description="kinds of vehicle")] = None,
+    sort: Sort = Sort.NEWEST,
+    limit: Limit = 50,
+    cursor: CursorText = None,
+) -> Page[CampaignSummary]:
     """Campaigns with what a card shows of them."""
-    return service.list_campaigns(session, search=search, states=state or [], vehicles=vehicle or [], sort=sort,
-                                  limit=limit, cursor=cursor)
+    return service.list_campaigns(
+        session, search=search, states=state or [], vehicles=vehicle or [], sort=sort, limit=limit, cursor=cursor
+    )
 
 
 @router.post("", status_code=status.HTTP_201_CREATED)

@@ -32,12 +32,21 @@ from app.trials import history
 from app.trials.lifecycle import cancel_planned
 
 
-def list_campaigns(session: Session, *, search: str, states: Collection[CampaignState], vehicles: Collection[str],
-                   sort: Sort, limit: int, cursor: str | None) -> Page[CampaignSummary]:
+def list_campaigns(
+    session: Session,
+    *,
+    search: str,
+    states: Collection[CampaignState],
+    vehicles: Collection[str],
+    sort: Sort,
+    limit: int,
+    cursor: str | None,
+) -> Page[CampaignSummary]:
     """One page of cards. Raises InputError for a cursor that is none of this list's."""
     after = None if cursor is None else decode_cursor(sort, cursor, repository.cursor_kind(sort))
-    found, total = repository.page(session, search=search, states=states, vehicles=vehicles, sort=sort, after=after,
-                                   limit=limit)
+    found, total = repository.page(
+        session, search=search, states=states, vehicles=vehicles, sort=sort, after=after, limit=limit
+    )
     following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
     return Page(items=summaries(session, [row for row, _ in found[:limit]]), total=total, next_cursor=following)
 
@@ -71,10 +80,20 @@ def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Cam
     """Raises ConflictError when somebody else was faster, or when the definition is frozen."""
     row = repository.get_one(session, campaign_id)
     definition = None if edit.definition is None else edit.definition.model_dump(mode="json")
-    check_version(edit.version, row.version, f"Campaign {row.id}", {
-        field: (now, sent) for field, now, sent in (
-            ("name", row.name, edit.name), ("definition", row.definition, definition),
-            ("vehicle.kind", row.vehicle.kind, edit.vehicle.kind if edit.vehicle else None)) if sent is not None})
+    check_version(
+        edit.version,
+        row.version,
+        f"Campaign {row.id}",
+        {
+            field: (now, sent)
+            for field, now, sent in (
+                ("name", row.name, edit.name),
+                ("definition", row.definition, definition),
+                ("vehicle.kind", row.vehicle.kind, edit.vehicle.kind if edit.vehicle else None),
+            )
+            if sent is not None
+        },
+    )
     if edit.definition is not None or edit.vehicle is not None:
         _define(session, row, edit)
     if edit.name is not None:
@@ -145,14 +164,22 @@ def history_changed(session: Session, row: CampaignRow) -> None:
     request_proposal(session, row)
 
 
-def _add(session: Session, name: str, asked: Definition, choice: VehicleChoice, *,
-         parent_id: int | None) -> CampaignRow:
+def _add(
+    session: Session, name: str, asked: Definition, choice: VehicleChoice, *, parent_id: int | None
+) -> CampaignRow:
     definition, options = check_campaign(asked, choice)
     space = get_experiment(definition.experiment).space
     vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
     row = CampaignRow(
-        name=name, state=CampaignState.DRAFT, experiment=definition.experiment, strategy=definition.strategy,
-        definition=stored(definition), vehicle=vehicle, vehicle_options=options, parent_id=parent_id)
+        name=name,
+        state=CampaignState.DRAFT,
+        experiment=definition.experiment,
+        strategy=definition.strategy,
+        definition=stored(definition),
+        vehicle=vehicle,
+        vehicle_options=options,
+        parent_id=parent_id,
+    )
     session.add(row)
     session.flush()
     request_proposal(session, row)
@@ -175,5 +202,7 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
 
 def _require_no_flight(session: Session, row: CampaignRow) -> None:
     if (flight := history.flight_under_way(session, row.id)) is not None:
-        raise BusyError(f"Campaign {row.id} has a flight under way (trial {flight.trial_id}).",
-                        hint="Wait until it is over, or abort it.")
+        raise BusyError(
+            f"Campaign {row.id} has a flight under way (trial {flight.trial_id}).",
+            hint="Wait until it is over, or abort it.",
+        )

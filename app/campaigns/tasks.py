@@ -84,9 +84,13 @@ class ProposalDesk:
                 self._fail(job, error)
             except Exception as error:  # noqa: BLE001 - the edge of the thread
                 _log.exception("job failed by a mistake of the program")
-                self._fail(job, GainlineError(
-                    f"The program made a mistake ({type(error).__name__}: {error}).",
-                    hint="Try again; if it happens again, report it with the worker's log."))
+                self._fail(
+                    job,
+                    GainlineError(
+                        f"The program made a mistake ({type(error).__name__}: {error}).",
+                        hint="Try again; if it happens again, report it with the worker's log.",
+                    ),
+                )
             finally:
                 self._at_work.discard(job.id)
 
@@ -112,6 +116,11 @@ def prepare() -> None:
     experiment = get_experiment(definition.experiment)
     default = experiment.space.default
     flown = experiment.simulate(default, experiment.nominal_model)
-    flight = Flight(number=1, gains=experiment.space.mapping(default), trajectory=flown,
-                    error=experiment.error(flown), outcome="valid")
+    flight = Flight(
+        number=1,
+        gains=experiment.space.mapping(default),
+        trajectory=flown,
+        error=experiment.error(flown),
+        outcome="valid",
+    )
     proposing.compute(proposing.History(campaign_id=0, definition=definition, flights=(flight,), digest=""))

@@ -49,12 +49,24 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     trials = history.trials_of(session, row.id)
     flight = history.flight_under_way(session, row.id)
     return Campaign(
-        id=row.id, version=row.version, name=row.name, state=row.state, outcome=row.outcome,
-        stop_reason=row.stop_reason, definition=Definition.model_validate(row.definition),
-        definition_digest=row.definition_digest, vehicle=fleet.campaign_vehicle(row), parent_id=row.parent_id,
-        best=_best(trials), trials=_counts(trials), flying=_flying(flight, trials),
-        next_action=_next_action(row, trials), actions=_actions(row, flight), created_at=row.created_at,
-        updated_at=row.updated_at)
+        id=row.id,
+        version=row.version,
+        name=row.name,
+        state=row.state,
+        outcome=row.outcome,
+        stop_reason=row.stop_reason,
+        definition=Definition.model_validate(row.definition),
+        definition_digest=row.definition_digest,
+        vehicle=fleet.campaign_vehicle(row),
+        parent_id=row.parent_id,
+        best=_best(trials),
+        trials=_counts(trials),
+        flying=_flying(flight, trials),
+        next_action=_next_action(row, trials),
+        actions=_actions(row, flight),
+        created_at=row.created_at,
+        updated_at=row.updated_at,
+    )
 
 
 def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSummary]:
@@ -68,10 +80,20 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
 def _summary(row: CampaignRow, trials: Sequence[TrialRow]) -> CampaignSummary:
     valid = [trial for trial in trials if trial.state == TrialState.VALID]
     return CampaignSummary(
-        id=row.id, name=row.name, state=row.state, outcome=row.outcome, vehicle=fleet.campaign_vehicle(row),
-        experiment=row.experiment, strategy=row.strategy, flights=_counts(trials).flown, best=_best(trials),
-        first_error=valid[0].error if valid else None, next_action=_next_action(row, trials), spark=_sparks(trials),
-        updated_at=row.updated_at)
+        id=row.id,
+        name=row.name,
+        state=row.state,
+        outcome=row.outcome,
+        vehicle=fleet.campaign_vehicle(row),
+        experiment=row.experiment,
+        strategy=row.strategy,
+        flights=_counts(trials).flown,
+        best=_best(trials),
+        first_error=valid[0].error if valid else None,
+        next_action=_next_action(row, trials),
+        spark=_sparks(trials),
+        updated_at=row.updated_at,
+    )
 
 
 def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
@@ -81,10 +103,15 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
     latest = repository.latest_proposal(session, row.id)
     shown = None if latest is None else proposal_view(row, latest, trials)
     if (waiting := history.unclassed(trials)) is not None:
-        return NextFlight(state="none", proposal=shown, problem=Trouble(
-            title=f"Flight {waiting.number} waits for its class.",
-            detail="The next gains depend on whether it counts.",
-            hint="Say whether it is valid, aborted or invalid."))
+        return NextFlight(
+            state="none",
+            proposal=shown,
+            problem=Trouble(
+                title=f"Flight {waiting.number} waits for its class.",
+                detail="The next gains depend on whether it counts.",
+                hint="Say whether it is valid, aborted or invalid.",
+            ),
+        )
     job = jobs.latest_job(session, row.id, PROPOSAL_JOB)
     if job is not None and job.state in {JobState.QUEUED, JobState.RUNNING}:
         return NextFlight(state="computing", proposal=shown, problem=None)
@@ -92,22 +119,39 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
         return NextFlight(state="ready", proposal=shown, problem=None)
     if job is not None and job.state == JobState.FAILED:
         return NextFlight(state="failed", proposal=shown, problem=jobs.trouble(job))
-    return NextFlight(state="none", proposal=shown, problem=Trouble(
-        title="There is no proposal for the present flights.", detail="Its computation was cancelled.",
-        hint="Compute it again."))
+    return NextFlight(
+        state="none",
+        proposal=shown,
+        problem=Trouble(
+            title="There is no proposal for the present flights.",
+            detail="Its computation was cancelled.",
+            hint="Compute it again.",
+        ),
+    )
 
 
 def proposal_view(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> Proposal:
     best = history.best_of(trials)
     now = best.gains if best is not None else campaign.vehicle.safe_gains
     said = row.stop_verdict
-    verdict = StopVerdict(stop=said["stop"], reason=said["reason"] or "", sentence=said["why"],
-                          threshold=said["threshold"])
+    verdict = StopVerdict(
+        stop=said["stop"], reason=said["reason"] or "", sentence=said["why"], threshold=said["threshold"]
+    )
     return Proposal(
-        id=row.id, campaign_id=row.campaign_id, kind=row.kind, recommended=_recommended(row.kind, verdict),
-        gains=row.gains, changes=_changes(now, row.gains), predicted_error=row.predicted_error,
-        explanation=_explanation(row), gate=Gate.model_validate(row.gate), stop_verdict=verdict,
-        history_digest=row.history_digest, stale=is_stale(campaign, row, trials), computed_at=row.computed_at)
+        id=row.id,
+        campaign_id=row.campaign_id,
+        kind=row.kind,
+        recommended=_recommended(row.kind, verdict),
+        gains=row.gains,
+        changes=_changes(now, row.gains),
+        predicted_error=row.predicted_error,
+        explanation=_explanation(row),
+        gate=Gate.model_validate(row.gate),
+        stop_verdict=verdict,
+        history_digest=row.history_digest,
+        stale=is_stale(campaign, row, trials),
+        computed_at=row.computed_at,
+    )
 
 
 def _explanation(row: ProposalRow) -> Explanation:
@@ -123,8 +167,10 @@ def _recommended(kind: str, verdict: StopVerdict) -> Literal["step", "repeat", "
 
 
 def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[str, GainChange]:
-    return {name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
-            for name, value in following.items()}
+    return {
+        name: GainChange(now=now.get(name, value), next=value, delta=value - now.get(name, value))
+        for name, value in following.items()
+    }
 
 
 def _best(trials: Sequence[TrialRow]) -> BestTrial | None:
@@ -137,8 +183,13 @@ def _best(trials: Sequence[TrialRow]) -> BestTrial | None:
 def _counts(trials: Sequence[TrialRow]) -> TrialCounts:
     states = Counter(trial.state for trial in trials)
     return TrialCounts(
-        total=len(trials), flown=sum(states[state] for state in history.FLOWN), valid=states[TrialState.VALID],
-        aborted=states[TrialState.ABORTED], invalid=states[TrialState.INVALID], lost=states[TrialState.LOST])
+        total=len(trials),
+        flown=sum(states[state] for state in history.FLOWN),
+        valid=states[TrialState.VALID],
+        aborted=states[TrialState.ABORTED],
+        invalid=states[TrialState.INVALID],
+        lost=states[TrialState.LOST],
+    )
 
 
 def _flying(flight: FlightRow | None, trials: Sequence[TrialRow]) -> FlyingTrial | None:
@@ -169,7 +220,14 @@ def _sparks(trials: Sequence[TrialRow]) -> list[SparkCurve]:
     flown = [trial for trial in trials if trial.curve and trial.state in {TrialState.VALID, TrialState.CAPTURED}]
     best = history.best_of(flown)
     chosen = {trial.number for trial in (*flown[:1], *([best] if best is not None else []))}
-    chosen |= {trial.number for trial in flown[-(SPARKS - len(chosen)):]}
-    return [SparkCurve(trial_number=trial.number, best=trial is best, time_s=[point[0] for point in trial.curve or []],
-                       values=[point[1] for point in trial.curve or []])
-            for trial in flown if trial.number in chosen]
+    chosen |= {trial.number for trial in flown[-(SPARKS - len(chosen)) :]}
+    return [
+        SparkCurve(
+            trial_number=trial.number,
+            best=trial is best,
+            time_s=[point[0] for point in trial.curve or []],
+            values=[point[1] for point in trial.curve or []],
+        )
+        for trial in flown
+        if trial.number in chosen
+    ]

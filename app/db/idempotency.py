@@ -27,7 +27,8 @@ def carry_out_once(session: Session, key: str, fingerprint: str, answer: type[M]
             raise KeyReusedError(
                 f"The idempotency key {key!r} was used before, for another request.",
                 hint="Use a new key for every act, and the same key only to send the very same request again.",
-                problems=(Problem("Idempotency-Key", "stands for another request"),))
+                problems=(Problem("Idempotency-Key", "stands for another request"),),
+            )
         return answer.model_validate_json(known.answer)
     session.execute(delete(IdempotencyRow).where(IdempotencyRow.created_at < utc_now() - KEPT))
     result = work(session)

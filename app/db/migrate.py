@@ -25,8 +25,10 @@ def migrate(database_file: Path) -> None:
     try:
         database_file.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StorageError(f"The data folder {database_file.parent} cannot be made: {error.strerror}.",
-                           hint="Choose another one with --data-dir or GAINLINE_DATA_DIR.") from error
+        raise StorageError(
+            f"The data folder {database_file.parent} cannot be made: {error.strerror}.",
+            hint="Choose another one with --data-dir or GAINLINE_DATA_DIR.",
+        ) from error
     held = revision_of(database_file)
     if held == newest_revision():
         return
@@ -40,8 +42,10 @@ def migrate(database_file: Path) -> None:
             command.upgrade(config, "head")
             broken = connection.execute(text("PRAGMA foreign_key_check")).first()
             if broken is not None:
-                raise SchemaError(f"After its migration {database_file} refers to rows that are gone ({broken}).",
-                                  hint="Restore the last backup and report this.")
+                raise SchemaError(
+                    f"After its migration {database_file} refers to rows that are gone ({broken}).",
+                    hint="Restore the last backup and report this.",
+                )
             connection.commit()
     except DBAPIError as error:
         if (known := storage_error(error, database_file)) is not None:
@@ -58,8 +62,10 @@ def require_current(database_file: Path) -> None:
         return
     if held is not None and held not in _known_revisions():
         raise _newer(database_file, held)
-    raise SchemaError(f"The database {database_file} is at revision {held or 'none'}, not {newest_revision()}.",
-                      hint=f"Run `{_COMMAND}`, which brings it up to date, or `alembic upgrade head` in a checkout.")
+    raise SchemaError(
+        f"The database {database_file} is at revision {held or 'none'}, not {newest_revision()}.",
+        hint=f"Run `{_COMMAND}`, which brings it up to date, or `alembic upgrade head` in a checkout.",
+    )
 
 
 def revision_of(database_file: Path) -> str | None:
@@ -97,5 +103,7 @@ def _config() -> Config:
 
 
 def _newer(database_file: Path, revision: str) -> SchemaError:
-    return SchemaError(f"The database {database_file} was written by a newer Gainline (revision {revision}).",
-                       hint="Start that version, or choose another data folder with --data-dir.")
+    return SchemaError(
+        f"The database {database_file} was written by a newer Gainline (revision {revision}).",
+        hint="Start that version, or choose another data folder with --data-dir.",
+    )

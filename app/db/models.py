@@ -48,8 +48,12 @@ _NEVER_REUSE_IDS: Final = {"sqlite_autoincrement": True}
 class Base(DeclarativeBase):
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
-        datetime: UtcDateTime, JsonObject: _JSON, GainsJson: _JSON, OptionsJson: _JSON,
-        list[str]: _JSON, list[list[float]]: _JSON,
+        datetime: UtcDateTime,
+        JsonObject: _JSON,
+        GainsJson: _JSON,
+        OptionsJson: _JSON,
+        list[str]: _JSON,
+        list[list[float]]: _JSON,
     }
 
 
@@ -193,8 +197,13 @@ class FlightRow(Base, Reported):
     __tablename__ = "flight"
     __table_args__ = (
         _state_check(FlightState),
-        Index("uq_flight_vehicle_under_way", "vehicle_id", unique=True, sqlite_where=text(_UNDER_WAY_SQL),
-              postgresql_where=text(_UNDER_WAY_SQL)),
+        Index(
+            "uq_flight_vehicle_under_way",
+            "vehicle_id",
+            unique=True,
+            sqlite_where=text(_UNDER_WAY_SQL),
+            postgresql_where=text(_UNDER_WAY_SQL),
+        ),
         _NEVER_REUSE_IDS,
     )
 

@@ -22,8 +22,9 @@ def record_changes(session: Session, _context: UOWTransaction) -> None:
     changed = [row for row in (*session.new, *session.dirty, *session.deleted) if isinstance(row, Reported)]
     for row in changed:
         topic, entity_id, campaign_id = row.reported_as()
-        stored = session.connection().execute(insert(EventRow).values(
-            topic=topic, entity_id=entity_id, campaign_id=campaign_id, at=utc_now()))
+        stored = session.connection().execute(
+            insert(EventRow).values(topic=topic, entity_id=entity_id, campaign_id=campaign_id, at=utc_now())
+        )
         (event_id,) = stored.inserted_primary_key or (0,)
         if event_id % _PRUNE_EVERY == 0:
             session.connection().execute(delete(EventRow).where(EventRow.id <= event_id - KEPT_EVENTS))

@@ -45,5 +45,8 @@ def instant(text: str | float) -> datetime:
 
 
 def _refused(reason: str) -> InputError:
-    return InputError("This page cannot be found.", problems=(Problem("cursor", reason),),
-                      hint="Begin without a cursor, and pass on `next_cursor` unchanged.")
+    return InputError(
+        "This page cannot be found.",
+        problems=(Problem("cursor", reason),),
+        hint="Begin without a cursor, and pass on `next_cursor` unchanged.",
+    )

@@ -43,8 +43,12 @@ def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
 
 def _on_connect(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> None:
     connection.isolation_level = None  # the "begin" event says how a transaction begins, not the driver
-    for pragma in ("journal_mode = WAL", "synchronous = NORMAL", "foreign_keys = ON",
-                   f"busy_timeout = {_BUSY_TIMEOUT_MS}"):
+    for pragma in (
+        "journal_mode = WAL",
+        "synchronous = NORMAL",
+        "foreign_keys = ON",
+        f"busy_timeout = {_BUSY_TIMEOUT_MS}",
+    ):
         connection.execute(f"PRAGMA {pragma}")
 
 
@@ -102,18 +106,32 @@ def storage_error(error: DBAPIError, database_file: Path) -> StorageError | None
 
 
 _TROUBLES: Final = {
-    "is full": ("The disk that holds {file} is full; nothing of this request was stored.",
-                "Free some space there, then do the same again; everything stored before is intact."),
-    "disk i/o error": ("The disk that holds {file} could not be written or read; nothing of this request was stored.",
-                       "Check its free space and its health, then do the same again."),
-    "is locked": ("The database was busy for longer than five seconds; nothing of this request was stored.",
-                  "Do the same again. If it happens often, look for another program that holds {file} open."),
-    "readonly database": ("The database {file} may not be written by this user; nothing of this request was stored.",
-                          "Give this user the right to write the file and its folder, then do the same again."),
-    "unable to open": ("The database {file} cannot be opened.",
-                       "Check that its folder exists and that this user may write there."),
-    "malformed": ("The database {file} is damaged.",
-                  "Stop Gainline and restore the last backup; keep the damaged file, most of it can be recovered."),
-    "not a database": ("The file {file} is not a Gainline database.",
-                       "Choose another data folder (GAINLINE_DATA_DIR), or move this file away."),
+    "is full": (
+        "The disk that holds {file} is full; nothing of this request was stored.",
+        "Free some space there, then do the same again; everything stored before is intact.",
+    ),
+    "disk i/o error": (
+        "The disk that holds {file} could not be written or read; nothing of this request was stored.",
+        "Check its free space and its health, then do the same again.",
+    ),
+    "is locked": (
+        "The database was busy for longer than five seconds; nothing of this request was stored.",
+        "Do the same again. If it happens often, look for another program that holds {file} open.",
+    ),
+    "readonly database": (
+        "The database {file} may not be written by this user; nothing of this request was stored.",
+        "Give this user the right to write the file and its folder, then do the same again.",
+    ),
+    "unable to open": (
+        "The database {file} cannot be opened.",
+        "Check that its folder exists and that this user may write there.",
+    ),
+    "malformed": (
+        "The database {file} is damaged.",
+        "Stop Gainline and restore the last backup; keep the damaged file, most of it can be recovered.",
+    ),
+    "not a database": (
+        "The file {file} is not a Gainline database.",
+        "Choose another data folder (GAINLINE_DATA_DIR), or move this file away.",
+    ),
 }

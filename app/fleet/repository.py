@@ -24,8 +24,7 @@ def every(session: Session) -> Sequence[VehicleRow]:
     return session.scalars(select(VehicleRow).order_by(VehicleRow.id)).all()
 
 
-def flights(session: Session, vehicle_id: int, *, before_id: int | None,
-            limit: int) -> tuple[Sequence[FlightRow], int]:
+def flights(session: Session, vehicle_id: int, *, before_id: int | None, limit: int) -> tuple[Sequence[FlightRow], int]:
     """The newest flights before that id, one more than `limit`, and the number of all."""
     wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id)
     total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0

@@ -22,8 +22,14 @@ def vehicle_of_kind(session: Session, kind: str, *, safe_gains: Gains) -> Vehicl
     described = get_kind(kind)
     if (known := repository.of_kind_or_none(session, kind)) is not None:
         return known
-    row = VehicleRow(kind=kind, title=described.title, is_real=described.is_real, safe_gains=dict(safe_gains),
-                     state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED, concern="")
+    row = VehicleRow(
+        kind=kind,
+        title=described.title,
+        is_real=described.is_real,
+        safe_gains=dict(safe_gains),
+        state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
+        concern="",
+    )
     session.add(row)
     session.flush()
     return row
@@ -32,11 +38,14 @@ def vehicle_of_kind(session: Session, kind: str, *, safe_gains: Gains) -> Vehicl
 def require_ready(row: VehicleRow) -> None:
     """Raises ConflictError when the vehicle cannot be asked to fly."""
     if not can_fly(row):
-        raise ConflictError(f"{row.title} cannot be flown from here.",
-                            hint="Fly it elsewhere, then upload the record of the flight to the planned trial.")
+        raise ConflictError(
+            f"{row.title} cannot be flown from here.",
+            hint="Fly it elsewhere, then upload the record of the flight to the planned trial.",
+        )
     if row.state == VehicleState.QUARANTINED:
-        raise ConflictError(f"{row.title} is quarantined: {row.concern}",
-                            hint="Look at the vehicle, verify its gains, then release it.")
+        raise ConflictError(
+            f"{row.title} is quarantined: {row.concern}", hint="Look at the vehicle, verify its gains, then release it."
+        )
     check_action(ACTIONS, "fly", row.state, row.title)
 
 
@@ -67,8 +76,15 @@ def classed_by_program(row: VehicleRow) -> bool:
 def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
     """A campaign's vehicle with the campaign's settings of it."""
     vehicle = row.vehicle
-    return CampaignVehicle(id=vehicle.id, kind=vehicle.kind, title=vehicle.title, is_real=vehicle.is_real,
-                           can_fly=can_fly(vehicle), state=vehicle.state, options=row.vehicle_options)
+    return CampaignVehicle(
+        id=vehicle.id,
+        kind=vehicle.kind,
+        title=vehicle.title,
+        is_real=vehicle.is_real,
+        can_fly=can_fly(vehicle),
+        state=vehicle.state,
+        options=row.vehicle_options,
+    )
 
 
 def list_vehicles(session: Session) -> list[Vehicle]:
@@ -84,8 +100,18 @@ def list_given_gains(session: Session, vehicle_id: int, *, limit: int, cursor: s
     repository.get_one(session, vehicle_id)
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.flights(session, vehicle_id, before_id=before, limit=limit)
-    items = [GivenGains(flight_id=row.id, campaign_id=row.campaign_id, trial_id=row.trial_id, asked=row.gains,
-                        read_back=row.read_back, outcome=row.state, asked_at=row.claimed_at) for row in rows[:limit]]
+    items = [
+        GivenGains(
+            flight_id=row.id,
+            campaign_id=row.campaign_id,
+            trial_id=row.trial_id,
+            asked=row.gains,
+            read_back=row.read_back,
+            outcome=row.state,
+            asked_at=row.claimed_at,
+        )
+        for row in rows[:limit]
+    ]
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
     return Page(items=items, total=total, next_cursor=following)
 
@@ -101,6 +127,14 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str) -> Vehicl
 
 
 def _view(row: VehicleRow) -> Vehicle:
-    return Vehicle(id=row.id, kind=row.kind, title=row.title, is_real=row.is_real, can_fly=can_fly(row),
-                   state=row.state, concern=row.concern, safe_gains=row.safe_gains,
-                   actions=[action for action in allowed(ACTIONS, row.state) if action != "fly" or can_fly(row)])
+    return Vehicle(
+        id=row.id,
+        kind=row.kind,
+        title=row.title,
+        is_real=row.is_real,
+        can_fly=can_fly(row),
+        state=row.state,
+        concern=row.concern,
+        safe_gains=row.safe_gains,
+        actions=[action for action in allowed(ACTIONS, row.state) if action != "fly" or can_fly(row)],
+    )

@@ -20,12 +20,14 @@ def get_one(session: Session, job_id: int) -> JobRow:
 
 def held_by_or_none(session: Session, job_id: int, worker: str) -> JobRow | None:
     """The job, while it runs and is this worker's."""
-    return session.scalar(select(JobRow).where(JobRow.id == job_id, JobRow.worker == worker,
-                                               JobRow.state == JobState.RUNNING))
+    return session.scalar(
+        select(JobRow).where(JobRow.id == job_id, JobRow.worker == worker, JobRow.state == JobState.RUNNING)
+    )
 
 
-def page(session: Session, *, states: Collection[JobState], campaign_id: int | None, before_id: int | None,
-         limit: int) -> tuple[Sequence[JobRow], int]:
+def page(
+    session: Session, *, states: Collection[JobState], campaign_id: int | None, before_id: int | None, limit: int
+) -> tuple[Sequence[JobRow], int]:
     """The newest jobs before that id, one more than `limit`, and the number of all."""
     wanted = select(JobRow)
     if states:
@@ -40,8 +42,9 @@ def page(session: Session, *, states: Collection[JobState], campaign_id: int | N
 
 def first_waiting(session: Session, kinds: Collection[str]) -> JobRow | None:
     """The job that has waited longest."""
-    return session.scalar(select(JobRow).where(JobRow.state == JobState.QUEUED, JobRow.kind.in_(kinds))
-                          .order_by(JobRow.id).limit(1))
+    return session.scalar(
+        select(JobRow).where(JobRow.state == JobState.QUEUED, JobRow.kind.in_(kinds)).order_by(JobRow.id).limit(1)
+    )
 
 
 def running(session: Session, *, lease_before: datetime | None = None) -> Sequence[JobRow]:
@@ -53,10 +56,14 @@ def running(session: Session, *, lease_before: datetime | None = None) -> Sequen
 
 
 def latest_of_campaign(session: Session, campaign_id: int, kind: str) -> JobRow | None:
-    return session.scalar(select(JobRow).where(JobRow.campaign_id == campaign_id, JobRow.kind == kind)
-                          .order_by(JobRow.id.desc()).limit(1))
+    return session.scalar(
+        select(JobRow).where(JobRow.campaign_id == campaign_id, JobRow.kind == kind).order_by(JobRow.id.desc()).limit(1)
+    )
 
 
 def waiting_of_campaign(session: Session, campaign_id: int, kind: str) -> JobRow | None:
-    return session.scalar(select(JobRow).where(JobRow.campaign_id == campaign_id, JobRow.kind == kind,
-                                               JobRow.state == JobState.QUEUED).limit(1))
+    return session.scalar(
+        select(JobRow)
+        .where(JobRow.campaign_id == campaign_id, JobRow.kind == kind, JobRow.state == JobState.QUEUED)
+        .limit(1)
+    )

@@ -14,9 +14,13 @@ router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json
 
 
 @router.get("")
-def list_jobs(session: Reader, state: Annotated[list[JobState] | None, Query()] = None,
-              campaign_id: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None, limit: Limit = 50,
-              cursor: CursorText = None) -> Page[Job]:
+def list_jobs(
+    session: Reader,
+    state: Annotated[list[JobState] | None, Query()] = None,
+    campaign_id: Annotated[int | None, Query(ge=1, le=2**63 - 1)] = None,
+    limit: Limit = 50,
+    cursor: CursorText = None,
+) -> Page[Job]:
     """Jobs, the newest first."""
     return service.list_jobs(session, states=state or [], campaign_id=campaign_id, limit=limit, cursor=cursor)
 

@@ -24,8 +24,9 @@ MAX_ATTEMPTS: Final = 3
 """A job that lost its worker so many times probably killed it, and is failed."""
 
 
-def enqueue_job(session: Session, kind: str, *, campaign_id: int | None = None,
-                payload: Mapping[str, object] | None = None) -> JobRow:
+def enqueue_job(
+    session: Session, kind: str, *, campaign_id: int | None = None, payload: Mapping[str, object] | None = None
+) -> JobRow:
     """A job that waits. One of the same kind for the same campaign that still waits serves for both."""
     if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
         return waiting
@@ -46,16 +47,26 @@ def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s:
     return row
 
 
-def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float, progress: float | None = None,
-                  note: str | None = None) -> bool:
+def heartbeat_job(
+    session: Session,
+    job_id: int,
+    *,
+    worker: str,
+    lease_s: float,
+    progress: float | None = None,
+    note: str | None = None,
+) -> bool:
     """Extend the lease and tell the progress (0 … 1). False when the job is no longer this worker's: stop it."""
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
     # Not through the row: a heartbeat alone is no change that a browser has to hear of.
-    session.execute(update(JobRow).where(JobRow.id == job_id)
-                    .values(lease_until=utc_now() + timedelta(seconds=lease_s))
-                    .execution_options(synchronize_session=False))
+    session.execute(
+        update(JobRow)
+        .where(JobRow.id == job_id)
+        .values(lease_until=utc_now() + timedelta(seconds=lease_s))
+        .execution_options(synchronize_session=False)
+    )
     if progress is not None:
         row.progress = progress
     if note is not None:
@@ -78,8 +89,7 @@ def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
-    _fail(row, error.message, error.hint,
-          [f"{problem.field}: {problem.reason}" for problem in error.problems])
+    _fail(row, error.message, error.hint, [f"{problem.field}: {problem.reason}" for problem in error.problems])
     return True
 
 
@@ -98,8 +108,9 @@ def latest_job(session: Session, campaign_id: int, kind: str) -> JobRow | None:
     return repository.latest_of_campaign(session, campaign_id, kind)
 
 
-def list_jobs(session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int,
-              cursor: str | None) -> Page[Job]:
+def list_jobs(
+    session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int, cursor: str | None
+) -> Page[Job]:
     """The newest first."""
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.page(session, states=states, campaign_id=campaign_id, before_id=before, limit=limit)
@@ -133,9 +144,19 @@ def retry_job(session: Session, job_id: int) -> Job:
 
 def job_view(row: JobRow) -> Job:
     return Job(
-        id=row.id, kind=row.kind, state=row.state, campaign_id=row.campaign_id, progress=row.progress,
-        progress_note=row.progress_note, problem=trouble(row), attempts=row.attempts, created_at=row.created_at,
-        started_at=row.started_at, finished_at=row.finished_at, actions=allowed(ACTIONS, row.state))
+        id=row.id,
+        kind=row.kind,
+        state=row.state,
+        campaign_id=row.campaign_id,
+        progress=row.progress,
+        progress_note=row.progress_note,
+        problem=trouble(row),
+        attempts=row.attempts,
+        created_at=row.created_at,
+        started_at=row.started_at,
+        finished_at=row.finished_at,
+        actions=allowed(ACTIONS, row.state),
+    )
 
 
 def trouble(row: JobRow) -> Trouble | None:
@@ -145,8 +166,12 @@ def trouble(row: JobRow) -> Trouble | None:
 
 def _requeue(row: JobRow) -> int:
     if row.attempts >= MAX_ATTEMPTS:
-        _fail(row, f"The worker went away {row.attempts} times while it did this.",
-              "Look into the worker's log, then retry the job.", [])
+        _fail(
+            row,
+            f"The worker went away {row.attempts} times while it did this.",
+            "Look into the worker's log, then retry the job.",
+            [],
+        )
     else:
         _move(row, JobState.QUEUED)
         row.worker, row.lease_until, row.progress = None, None, 0.0

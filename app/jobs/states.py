@@ -8,11 +8,11 @@ from typing import Final
 class JobState(StrEnum):
     """Numeric work. It is pure, so a job whose worker died simply waits again.
 
-        queued ──→ running ──→ done
-          ↑  │        ├──────→ failed ───→ queued (retried)
-          │  │        ├──────→ cancelled ─→ queued (retried)
-          │  └─→ cancelled
-          └───────────┘ the worker went away
+    queued ──→ running ──→ done
+      ↑  │        ├──────→ failed ───→ queued (retried)
+      │  │        ├──────→ cancelled ─→ queued (retried)
+      │  └─→ cancelled
+      └───────────┘ the worker went away
     """
 
     QUEUED = "queued"

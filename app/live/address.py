@@ -30,6 +30,8 @@ def _private_folder() -> Path:
     folder.mkdir(mode=0o700, exist_ok=True)
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid() or stat.S_IMODE(status.st_mode) & 0o077:
-        raise InputError(f"{folder} is not a private folder of this user, so the worker cannot listen there.",
-                         hint="Remove it, or choose a data folder with a shorter path (--data-dir).")
+        raise InputError(
+            f"{folder} is not a private folder of this user, so the worker cannot listen there.",
+            hint="Remove it, or choose a data folder with a shorter path (--data-dir).",
+        )
     return folder

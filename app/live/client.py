@@ -29,8 +29,9 @@ class LiveClient:
     `on_message` gets whatever the worker says; `on_link` is told when the connection comes and goes.
     """
 
-    def __init__(self, path: Path, *, on_message: Callable[[FromWorker], None],
-                 on_link: Callable[[bool], None]) -> None:
+    def __init__(
+        self, path: Path, *, on_message: Callable[[FromWorker], None], on_link: Callable[[bool], None]
+    ) -> None:
         self._path = path
         self._on_message = on_message
         self._on_link = on_link
@@ -107,4 +108,5 @@ def _link_down(why: str) -> LinkDownError:
     return LinkDownError(
         f"The worker could not be told: {why}.",
         hint="If a vehicle is in the air, use its own remote control now. A supervised worker is restarted within "
-             "seconds; a separate one is started with `gainline worker`.")
+        "seconds; a separate one is started with `gainline worker`.",
+    )

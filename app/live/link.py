@@ -21,8 +21,9 @@ class Live:
 
     def __init__(self, data_dir: Path) -> None:
         self.hub = Hub()
-        self.client = LiveClient(live_address(data_dir), on_message=self._heard,
-                                 on_link=lambda up: self.hub.publish(LinkState(worker=up)))
+        self.client = LiveClient(
+            live_address(data_dir), on_message=self._heard, on_link=lambda up: self.hub.publish(LinkState(worker=up))
+        )
 
     @property
     def worker_running(self) -> bool:
@@ -60,7 +61,9 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
 
 def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[T], None]) -> Callable[[T], None]:
     """The same call, made from any thread; what comes after the loop has ended is for nobody."""
+
     def later(item: T) -> None:
         with suppress(RuntimeError):
             loop.call_soon_threadsafe(call, item)
+
     return later

@@ -89,4 +89,5 @@ def decode(line: bytes) -> Message:
         first = error.errors()[0]
         raise InputError(
             f"The live link carried a line that is no message: {'.'.join(map(str, first['loc']))} {first['msg']}.",
-            hint="Run the web process and the worker from the same version of Gainline.") from error
+            hint="Run the web process and the worker from the same version of Gainline.",
+        ) from error

@@ -56,8 +56,9 @@ class LiveServer:
         asyncio.run_coroutine_threadsafe(self._open(listener), self._loop).result()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
@@ -96,8 +97,10 @@ class LiveServer:
     def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
         message = decode(line)
         if not isinstance(message, Abort):
-            raise InputError(f"A client sent {message.type!r}, which only the worker sends.",
-                             hint="Connect to the worker's socket with Gainline only.")
+            raise InputError(
+                f"A client sent {message.type!r}, which only the worker sends.",
+                hint="Connect to the worker's socket with Gainline only.",
+            )
         accepted = self._abort(message.trial_id, message.reason)
         _log.info("abort asked", trial_id=message.trial_id, reason=message.reason, accepted=accepted)
         writer.write(encode(AbortAnswer(request=message.request, trial_id=message.trial_id, accepted=accepted)))

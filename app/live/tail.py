@@ -24,8 +24,10 @@ def changes_after(database: Database, event_id: int) -> Iterator[Change]:
     """Every change after that event up to now, read in short transactions."""
     while True:
         with database.read() as session:
-            batch = [Change(id=row.id, topic=row.topic, entity_id=row.entity_id, campaign_id=row.campaign_id)
-                     for row in events_after(session, event_id, limit=BATCH)]
+            batch = [
+                Change(id=row.id, topic=row.topic, entity_id=row.entity_id, campaign_id=row.campaign_id)
+                for row in events_after(session, event_id, limit=BATCH)
+            ]
         yield from batch
         if len(batch) < BATCH:
             return

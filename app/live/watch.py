@@ -20,13 +20,13 @@ class DatabaseWatch:
         self._database = database
 
     def __enter__(self) -> Self:
-        self._connection = sqlite3.connect(
-            f"file:{quote(str(self._database))}?mode=ro", uri=True, isolation_level=None)
+        self._connection = sqlite3.connect(f"file:{quote(str(self._database))}?mode=ro", uri=True, isolation_level=None)
         self._seen = -1
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._connection.close()
 
     def changed(self) -> bool:

@@ -12,8 +12,9 @@ from app.trials.scoring import score
 from app.trials.states import TrialState
 
 
-def capture(session: Session, campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, *,
-            aborted: str | None = None) -> None:
+def capture(
+    session: Session, campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, *, aborted: str | None = None
+) -> None:
     """Store a flight's record and class it: `aborted` with its reason, else by the program where it may.
 
     A flight of a real vehicle stays captured until a person has classed it. Raises TrajectoryError when the

@@ -111,8 +111,10 @@ class Cockpit:
                 yield said
         except (EOFError, OSError) as error:
             self._process.join(ENDS_WITHIN_S)
-            raise VehicleError(f"The process that flew died (exit code {self._process.exitcode}).",
-                               hint="Look at the vehicle. The worker's log may say more; then fly again.") from error
+            raise VehicleError(
+                f"The process that flew died (exit code {self._process.exitcode}).",
+                hint="Look at the vehicle. The worker's log may say more; then fly again.",
+            ) from error
 
     def take_off(self) -> None:
         self._send(TakeOff())
@@ -178,8 +180,10 @@ def _work(pipe: Connection) -> None:
 
 def _fly(pipe: Connection, orders: Orders) -> None:
     try:
-        with _control(orders), open_vehicle(orders.vehicle_kind, orders.vehicle_options,
-                                            safe_gains=orders.safe_gains) as vehicle:
+        with (
+            _control(orders),
+            open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
+        ):
             pipe.send(Staged(vehicle.stage(orders.gains)))
             if isinstance(pipe.recv(), TakeOff):
                 pipe.send(Landed(_take_off(pipe, orders, vehicle)))
@@ -202,6 +206,7 @@ def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle) -> FlightRecor
 
 def _listener(pipe: Connection, trial_id: int) -> Callable[[], str | None]:
     """Looks into the pipe, which takes microseconds."""
+
     def should_abort() -> str | None:
         try:
             while pipe.poll():
@@ -211,6 +216,7 @@ def _listener(pipe: Connection, trial_id: int) -> Callable[[], str | None]:
         except (EOFError, OSError):
             return "the worker is gone"
         return None
+
     return should_abort
 
 
@@ -222,5 +228,7 @@ def _control(orders: Orders) -> Iterator[None]:
         with exclusive(orders.lock, keep_waiting=lambda: time.monotonic() < deadline_s):
             yield
     except LockedError as error:
-        raise VehicleError(f"The vehicle is still under the control of {error.holder or 'another process'}.",
-                           hint="Wait until that process has landed it, or end the process; then fly again.") from error
+        raise VehicleError(
+            f"The vehicle is still under the control of {error.holder or 'another process'}.",
+            hint="Wait until that process has landed it, or end the process; then fly again.",
+        ) from error

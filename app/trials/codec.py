@@ -48,16 +48,24 @@ def pack(trajectory: Trajectory) -> Packed:
     plain = table.tobytes()
     planes = table.view(np.uint8).reshape(len(columns), -1, _WIDTH).transpose(0, 2, 1)
     return Packed(
-        codec=VERSION, columns=columns, samples=table.shape[1], duration_s=float(table[0, -1] - table[0, 0]),
-        source=trajectory.source, clock=trajectory.clock, checksum=_checksum(columns, plain),
-        data=zstandard.ZstdCompressor(level=_LEVEL).compress(planes.tobytes()))
+        codec=VERSION,
+        columns=columns,
+        samples=table.shape[1],
+        duration_s=float(table[0, -1] - table[0, 0]),
+        source=trajectory.source,
+        clock=trajectory.clock,
+        checksum=_checksum(columns, plain),
+        data=zstandard.ZstdCompressor(level=_LEVEL).compress(planes.tobytes()),
+    )
 
 
 def unpack(packed: Packed) -> Trajectory:
     """The trajectory, every number as single precision holds it. Raises StorageError when the record is damaged."""
     if packed.codec != VERSION:
-        raise StorageError(f"A flight record has the unknown version {packed.codec}.",
-                           hint="It was written by a newer Gainline; open it with that one.")
+        raise StorageError(
+            f"A flight record has the unknown version {packed.codec}.",
+            hint="It was written by a newer Gainline; open it with that one.",
+        )
     size = len(packed.columns) * packed.samples * _WIDTH
     try:
         planes = zstandard.ZstdDecompressor().decompress(packed.data, max_output_size=size)
@@ -73,20 +81,26 @@ def unpack(packed: Packed) -> Trajectory:
 
 def _require_storable(columns: list[str], table: Table) -> None:
     if table.shape[1] == 0:
-        raise TrajectoryError("This record is empty.", hint="Send a record with at least two samples.",
-                              problems=(Problem(_TIME, "has no samples"),))
+        raise TrajectoryError(
+            "This record is empty.",
+            hint="Send a record with at least two samples.",
+            problems=(Problem(_TIME, "has no samples"),),
+        )
     finite = np.isfinite(table)
     if not finite.all():
         column, sample = (int(index) for index in np.argwhere(~finite)[0])
         raise TrajectoryError(
-            "This record holds a number that cannot be stored.", hint="Correct the record and send it again.",
-            problems=(Problem(columns[column], f"is not finite, or larger than 3.4e38, at sample {sample}"),))
+            "This record holds a number that cannot be stored.",
+            hint="Correct the record and send it again.",
+            problems=(Problem(columns[column], f"is not finite, or larger than 3.4e38, at sample {sample}"),),
+        )
     if (np.diff(table[0]) <= 0).any():
         sample = int(np.argmax(np.diff(table[0]) <= 0)) + 1
         raise TrajectoryError(
             "The time stamps of this record do not rise once they are stored (single precision).",
             hint="Let time start near zero at the command, and sample no faster than 100 kHz.",
-            problems=(Problem(_TIME, f"does not rise at sample {sample}"),))
+            problems=(Problem(_TIME, f"does not rise at sample {sample}"),),
+        )
 
 
 def _checksum(columns: list[str], plain: bytes) -> str:
@@ -94,5 +108,7 @@ def _checksum(columns: list[str], plain: bytes) -> str:
 
 
 def _damaged() -> StorageError:
-    return StorageError("A stored flight record is damaged: its checksum does not fit.",
-                        hint="Restore it from a backup; the trial's other figures are intact.")
+    return StorageError(
+        "A stored flight record is damaged: its checksum does not fit.",
+        hint="Restore it from a backup; the trial's other figures are intact.",
+    )

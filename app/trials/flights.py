@@ -49,9 +49,17 @@ def claim_flight(session: Session, worker: str) -> FlightTask | None:
     flight.worker, flight.claimed_at = worker, utc_now()
     trial, campaign = flight.trial, campaigns.get_row(session, flight.campaign_id)
     return FlightTask(
-        flight_id=flight.id, trial_id=trial.id, campaign_id=campaign.id, experiment=campaign.experiment,
-        vehicle_kind=flight.vehicle.kind, vehicle_options=dict(campaign.vehicle_options),
-        safe_gains=dict(flight.vehicle.safe_gains), gains=dict(flight.gains), seed=trial.seed, speed=flight.speed)
+        flight_id=flight.id,
+        trial_id=trial.id,
+        campaign_id=campaign.id,
+        experiment=campaign.experiment,
+        vehicle_kind=flight.vehicle.kind,
+        vehicle_options=dict(campaign.vehicle_options),
+        safe_gains=dict(flight.vehicle.safe_gains),
+        gains=dict(flight.gains),
+        seed=trial.seed,
+        speed=flight.speed,
+    )
 
 
 def record_staged(session: Session, flight_id: int, read_back: dict[str, float]) -> None:
@@ -70,8 +78,10 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     flight = _running(session, flight_id)
     trial = flight.trial
     if trial.read_back != trial.gains:
-        raise ConflictError(f"Trial {trial.number} must not fly: the vehicle holds {trial.read_back}.",
-                            hint="Stage it again; if it happens again, look at the vehicle's link.")
+        raise ConflictError(
+            f"Trial {trial.number} must not fly: the vehicle holds {trial.read_back}.",
+            hint="Stage it again; if it happens again, look at the vehicle's link.",
+        )
     move_trial(trial, TrialState.FLYING, reason="")
     trial.flown_at = utc_now()
     fleet.move_vehicle(flight.vehicle, VehicleState.FLYING)

@@ -90,8 +90,17 @@ class Monitor:
 
     def sample(self, sample: Sample) -> None:
         self._score(sample.time_s, abs(sample.set_point_m - getattr(sample, self._output)))
-        self._rows.append((sample.time_s, sample.altitude_m, sample.climb_rate_m_s, sample.set_point_m,
-                           sample.reference_m, sample.thrust, sample.battery_v))
+        self._rows.append(
+            (
+                sample.time_s,
+                sample.altitude_m,
+                sample.climb_rate_m_s,
+                sample.set_point_m,
+                sample.reference_m,
+                sample.thrust,
+                sample.battery_v,
+            )
+        )
         now_s = time.monotonic()
         if now_s >= self._due_s:
             self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
@@ -101,8 +110,15 @@ class Monitor:
         """Send what has been gathered."""
         if self._rows:
             rows, self._rows = self._rows, []
-            self._publish(Telemetry(campaign_id=self._campaign_id, trial_id=self._trial_id, time_s=rows[-1][0],
-                                    samples=rows, error_so_far=self.error_so_far))
+            self._publish(
+                Telemetry(
+                    campaign_id=self._campaign_id,
+                    trial_id=self._trial_id,
+                    time_s=rows[-1][0],
+                    samples=rows,
+                    error_so_far=self.error_so_far,
+                )
+            )
 
     @property
     def error_so_far(self) -> float | None:

@@ -18,8 +18,9 @@ from app.trials.states import HISTORY, TrialState
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
-FLOWN: Final = frozenset({TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID,
-                          TrialState.LOST})
+FLOWN: Final = frozenset(
+    {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
+)
 """States of trials that have left the ground."""
 
 
@@ -32,8 +33,10 @@ def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The valid and aborted flights with their trajectories as stored."""
     rows = counted(trials_of(session, campaign_id))
     records = repository.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
-    return tuple(_flight(row, _unpacked(records[row.trajectory_id]) if row.trajectory_id is not None else _NOTHING)
-                 for row in rows)
+    return tuple(
+        _flight(row, _unpacked(records[row.trajectory_id]) if row.trajectory_id is not None else _NOTHING)
+        for row in rows
+    )
 
 
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
@@ -48,8 +51,10 @@ def counted(trials: Sequence[TrialRow]) -> list[TrialRow]:
 
 def history_digest(definition_digest: str, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from; differs as soon as any of it does."""
-    flights = [[row.number, row.gains, row.state, row.error,
-                row.trajectory.checksum if row.trajectory is not None else None] for row in counted(trials)]
+    flights = [
+        [row.number, row.gains, row.state, row.error, row.trajectory.checksum if row.trajectory is not None else None]
+        for row in counted(trials)
+    ]
     content = json.dumps([definition_digest, flights], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
 
@@ -91,17 +96,33 @@ def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
     """Written once; the database refuses any change. Raises TrajectoryError when single precision cannot hold it."""
     packed = pack(trajectory)
     row = TrajectoryRow(
-        codec=packed.codec, columns=packed.columns, samples=packed.samples, duration_s=packed.duration_s,
-        source=packed.source, clock=packed.clock, checksum=packed.checksum, data=packed.data)
+        codec=packed.codec,
+        columns=packed.columns,
+        samples=packed.samples,
+        duration_s=packed.duration_s,
+        source=packed.source,
+        clock=packed.clock,
+        checksum=packed.checksum,
+        data=packed.data,
+    )
     session.add(row)
     session.flush()
     return row
 
 
 def _unpacked(row: TrajectoryRow) -> Trajectory:
-    return unpack(Packed(
-        codec=row.codec, columns=row.columns, samples=row.samples, duration_s=row.duration_s, source=row.source,
-        clock=row.clock, checksum=row.checksum, data=row.data))
+    return unpack(
+        Packed(
+            codec=row.codec,
+            columns=row.columns,
+            samples=row.samples,
+            duration_s=row.duration_s,
+            source=row.source,
+            clock=row.clock,
+            checksum=row.checksum,
+            data=row.data,
+        )
+    )
 
 
 def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:

@@ -20,8 +20,11 @@ def get_one(session: Session, trial_id: int) -> TrialRow:
 def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[TrialRow]:
     """Their trials in the order of their numbers, with what describes their records, without the samples."""
     return session.scalars(
-        select(TrialRow).where(TrialRow.campaign_id.in_(campaign_ids)).options(joinedload(TrialRow.trajectory))
-        .order_by(TrialRow.campaign_id, TrialRow.number)).all()
+        select(TrialRow)
+        .where(TrialRow.campaign_id.in_(campaign_ids))
+        .options(joinedload(TrialRow.trajectory))
+        .order_by(TrialRow.campaign_id, TrialRow.number)
+    ).all()
 
 
 def next_number(session: Session, campaign_id: int) -> int:
@@ -31,8 +34,9 @@ def next_number(session: Session, campaign_id: int) -> int:
 
 def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
     """The records with their samples, by id."""
-    rows = session.scalars(select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids))
-                           .options(undefer(TrajectoryRow.data)))
+    rows = session.scalars(
+        select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids)).options(undefer(TrajectoryRow.data))
+    )
     return {row.id: row for row in rows}
 
 
@@ -48,19 +52,23 @@ def flight_of_vehicle_under_way(session: Session, vehicle_id: int) -> FlightRow 
 
 
 def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRow | None:
-    return session.scalar(select(FlightRow).where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(UNDER_WAY))
-                          .order_by(FlightRow.id).limit(1))
+    return session.scalar(
+        select(FlightRow)
+        .where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(UNDER_WAY))
+        .order_by(FlightRow.id)
+        .limit(1)
+    )
 
 
 def first_requested(session: Session) -> FlightRow | None:
     """The flight that has waited longest."""
-    return session.scalar(select(FlightRow).where(FlightRow.state == FlightState.REQUESTED)
-                          .order_by(FlightRow.id).limit(1))
+    return session.scalar(
+        select(FlightRow).where(FlightRow.state == FlightState.REQUESTED).order_by(FlightRow.id).limit(1)
+    )
 
 
 def running(session: Session) -> Sequence[FlightRow]:
-    return session.scalars(select(FlightRow).where(FlightRow.state == FlightState.RUNNING)
-                           .order_by(FlightRow.id)).all()
+    return session.scalars(select(FlightRow).where(FlightRow.state == FlightState.RUNNING).order_by(FlightRow.id)).all()
 
 
 def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:

@@ -47,8 +47,9 @@ async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body:
     """End a flight now. Goes straight to the worker and waits for no storage; asking again is harmless."""
     reason = (body or Abort()).reason
     if live.worker_running and (await live.abort(trial_id, reason)).accepted:
-        return AbortAnswer(trial_id=trial_id, accepted=True,
-                           sentence="The worker ends the flight and restores the safe gains.")
+        return AbortAnswer(
+            trial_id=trial_id, accepted=True, sentence="The worker ends the flight and restores the safe gains."
+        )
     return await run_in_threadpool(_withdraw, database, trial_id, reason)
 
 
@@ -70,21 +71,34 @@ def classify_trial(act: Act, trial_id: Id, body: Classification) -> Trial:
 
 
 @router.get("/trials/{trial_id}/trajectory")
-def get_trajectory(session: Reader, trial_id: Id,
-                   points: Annotated[int, Query(ge=10, le=20_000)] = 1000) -> Trajectory:
+def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(ge=10, le=20_000)] = 1000) -> Trajectory:
     """The record thinned to at most so many points, peaks kept."""
     return service.get_trajectory(session, trial_id, points)
 
 
-@router.get("/trials/{trial_id}/trajectory.csv", response_class=Response, responses={
-    200: {"content": {"text/csv": {"schema": {"type": "string"}}},
-          "headers": {"X-Checksum-SHA256": {"schema": {"type": "string"},
-                                            "description": "checksum of the stored record"}}}})
+@router.get(
+    "/trials/{trial_id}/trajectory.csv",
+    response_class=Response,
+    responses={
+        200: {
+            "content": {"text/csv": {"schema": {"type": "string"}}},
+            "headers": {
+                "X-Checksum-SHA256": {"schema": {"type": "string"}, "description": "checksum of the stored record"}
+            },
+        }
+    },
+)
 def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
     """The whole record, every number exactly as it is stored (single precision, nine digits)."""
     export = service.export_trajectory(session, trial_id)
-    return Response(export.csv, media_type="text/csv", headers={
-        "Content-Disposition": f'attachment; filename="{export.file_name}"', "X-Checksum-SHA256": export.checksum})
+    return Response(
+        export.csv,
+        media_type="text/csv",
+        headers={
+            "Content-Disposition": f'attachment; filename="{export.file_name}"',
+            "X-Checksum-SHA256": export.checksum,
+        },
+    )
 
 
 records = APIRouter(prefix="/api", tags=["trials"])

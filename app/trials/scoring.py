@@ -32,8 +32,9 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
         error = experiment.error(trajectory, accept_gaps=accept_gaps)
     except TrajectoryError as found:
         refusal = "; ".join(f"{problem.field} {problem.reason}" for problem in found.problems) or found.message
-    return Score(error=error, refusal=refusal, overshoot=_overshoot(experiment, trajectory),
-                 curve=_curve(experiment, trajectory))
+    return Score(
+        error=error, refusal=refusal, overshoot=_overshoot(experiment, trajectory), curve=_curve(experiment, trajectory)
+    )
 
 
 def thinned(time_s: Samples, values: Samples, points: int) -> NDArray[np.uint64]:
@@ -41,7 +42,8 @@ def thinned(time_s: Samples, values: Samples, points: int) -> NDArray[np.uint64]
     if len(time_s) <= points:
         return np.arange(len(time_s), dtype=np.uint64)
     indices: NDArray[np.uint64] = _DOWNSAMPLER.downsample(
-        np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
+        np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points
+    )
     return indices
 
 
@@ -61,5 +63,7 @@ def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:
         return []
     flown = trajectory.time_s >= 0.0
     time_s, values = trajectory.time_s[flown], trajectory[experiment.output][flown]
-    return [[round(float(time_s[index]), 3), round(float(values[index]), 4)]
-            for index in thinned(time_s, values, CURVE_POINTS)]
+    return [
+        [round(float(time_s[index]), 3), round(float(values[index]), 4)]
+        for index in thinned(time_s, values, CURVE_POINTS)
+    ]

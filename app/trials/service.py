@@ -57,15 +57,25 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
     elif new.gains is not None and new.proposal_id is None:
         asked = new.gains
     else:
-        raise InputError("A trial flies a proposal or gains of one's own.", hint="Send exactly one of the two.",
-                         problems=(Problem("proposal_id", "or gains, exactly one of the two, must be given"),))
+        raise InputError(
+            "A trial flies a proposal or gains of one's own.",
+            hint="Send exactly one of the two.",
+            problems=(Problem("proposal_id", "or gains, exactly one of the two, must be given"),),
+        )
     gains, gate = _through_the_gate(session, campaign, asked)
     number = repository.next_number(session, campaign_id)
     row = TrialRow(
-        campaign_id=campaign_id, number=number, state=TrialState.PLANNED, gains=gains,
-        kind=_kind(session, campaign, gains, proposal), proposal_id=None if proposal is None else proposal.id,
-        predicted_error=None if proposal is None else proposal.predicted_error, gate=proposing.gate_json(gate),
-        note=new.note, seed=flight_seed(definition_of(campaign).seed, number))
+        campaign_id=campaign_id,
+        number=number,
+        state=TrialState.PLANNED,
+        gains=gains,
+        kind=_kind(session, campaign, gains, proposal),
+        proposal_id=None if proposal is None else proposal.id,
+        predicted_error=None if proposal is None else proposal.predicted_error,
+        gate=proposing.gate_json(gate),
+        note=new.note,
+        seed=flight_seed(definition_of(campaign).seed, number),
+    )
     session.add(row)
     session.flush()
     if new.fly is not None:
@@ -93,10 +103,14 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
         move_flight(flight, FlightState.CANCELLED, problem=reason)
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
-        raise ConflictError(f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
-                            hint="Abort again. If a vehicle is in the air, use its own remote control now.")
-    raise ConflictError(f"Trial {row.number} is {row.state}: there is no flight to abort.",
-                        hint="Load it again; the flight is over, or was never asked for.")
+        raise ConflictError(
+            f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
+            hint="Abort again. If a vehicle is in the air, use its own remote control now.",
+        )
+    raise ConflictError(
+        f"Trial {row.number} is {row.state}: there is no flight to abort.",
+        hint="Load it again; the flight is over, or was never asked for.",
+    )
 
 
 def cancel_trial(session: Session, trial_id: int) -> Trial:
@@ -127,8 +141,12 @@ def classify_trial(session: Session, trial_id: int, said: Classification) -> Tri
     """
     row = repository.get_one(session, trial_id)
     outcome = TrialState(said.outcome)
-    check_version(said.version, row.version, f"Trial {row.number}",
-                  {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)})
+    check_version(
+        said.version,
+        row.version,
+        f"Trial {row.number}",
+        {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)},
+    )
     check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
     check_move(MOVES, row.state, outcome, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
@@ -157,8 +175,10 @@ def import_trajectory(session: Session, trial_id: int, trajectory: Trajectory) -
         campaigns.history_changed(session, campaign)
         return trial_view(session, campaign, row)
     if fleet.can_fly(campaign.vehicle):
-        raise ConflictError(f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
-                            hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.")
+        raise ConflictError(
+            f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
+            hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
+        )
     _require_open(session, campaign)
     campaigns.begin_flying(campaign)
     row.flown_at = utc_now()
@@ -189,8 +209,9 @@ def export_trajectory(session: Session, trial_id: int) -> Export:
     assert row.trajectory is not None
     table = np.column_stack([record.time_s, *record.channels.values()])
     lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
-    return Export(f"campaign-{row.campaign_id}-trial-{row.number}.csv", "\n".join(lines) + "\n",
-                  row.trajectory.checksum)
+    return Export(
+        f"campaign-{row.campaign_id}-trial-{row.number}.csv", "\n".join(lines) + "\n", row.trajectory.checksum
+    )
 
 
 def _seen(session: Session, row: TrialRow) -> Trial:
@@ -201,8 +222,10 @@ def _require_open(session: Session, campaign: CampaignRow) -> None:
     """Raises ConflictError unless the campaign can take another trial now."""
     check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
     if (waiting := history.unclassed(history.trials_of(session, campaign.id))) is not None:
-        raise ConflictError(f"Flight {waiting.number} waits for its class.",
-                            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.")
+        raise ConflictError(
+            f"Flight {waiting.number} waits for its class.",
+            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
+        )
 
 
 def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], Gate]:
@@ -213,8 +236,11 @@ def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> 
     flown = history.flown_gains(history.trials_of(session, campaign.id))
     gate = check_policy(definition, get_experiment(campaign.experiment), space, gains, flown)
     if not gate.passed:
-        raise GainsError("The gate refuses these gains.", hint="Choose gains nearer to what has flown.", problems=tuple(
-            Problem("gains", check.sentence) for check in gate.checks if not check.passed))
+        raise GainsError(
+            "The gate refuses these gains.",
+            hint="Choose gains nearer to what has flown.",
+            problems=tuple(Problem("gains", check.sentence) for check in gate.checks if not check.passed),
+        )
     return gains, gate
 
 
@@ -228,21 +254,36 @@ def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: Propo
 def _request_flight(session: Session, campaign: CampaignRow, row: TrialRow, order: FlightOrder) -> None:
     vehicle = campaign.vehicle
     if (busy := repository.flight_of_vehicle_under_way(session, vehicle.id)) is not None:
-        raise BusyError(f"{vehicle.title} has a flight already: trial {busy.trial.number} of campaign "
-                        f"{busy.campaign_id}.", hint="Wait until it has landed, or abort it; flights do not queue.")
+        raise BusyError(
+            f"{vehicle.title} has a flight already: trial {busy.trial.number} of campaign {busy.campaign_id}.",
+            hint="Wait until it has landed, or abort it; flights do not queue.",
+        )
     fleet.require_ready(vehicle)
-    session.add(FlightRow(
-        campaign_id=campaign.id, trial_id=row.id, vehicle_id=vehicle.id, state=FlightState.REQUESTED, gains=row.gains,
-        speed=order.speed))
+    session.add(
+        FlightRow(
+            campaign_id=campaign.id,
+            trial_id=row.id,
+            vehicle_id=vehicle.id,
+            state=FlightState.REQUESTED,
+            gains=row.gains,
+            speed=order.speed,
+        )
+    )
     session.flush()
 
 
 def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:
     """The error of a flight that a person counts in spite of its gaps."""
-    judged = None if row.trajectory_id is None else score(
-        get_experiment(campaign.experiment), history.record_of(session, row), accept_gaps=True)
+    judged = (
+        None
+        if row.trajectory_id is None
+        else score(get_experiment(campaign.experiment), history.record_of(session, row), accept_gaps=True)
+    )
     if judged is None or judged.error is None:
         reason = judged.refusal if judged is not None else "it left no record"
-        raise InputError(f"Trial {row.number} cannot count: it cannot be scored.",
-                         hint="Leave it invalid and fly the gains again.", problems=(Problem("outcome", reason),))
+        raise InputError(
+            f"Trial {row.number} cannot count: it cannot be scored.",
+            hint="Leave it invalid and fly the gains again.",
+            problems=(Problem("outcome", reason),),
+        )
     return judged.error

@@ -48,7 +48,8 @@ class Spool:
             path.unlink(missing_ok=True)
             raise StorageError(
                 f"There is no room for the flight's record in {self._folder}: {error.strerror}.",
-                hint=f"Free at least {2 * ROOM_BYTES // 2**20} MB there, then fly again; nothing has moved.") from error
+                hint=f"Free at least {2 * ROOM_BYTES // 2**20} MB there, then fly again; nothing has moved.",
+            ) from error
 
     def keep(self, flight_id: int, record: FlightRecord) -> None:
         """Write a record into its room, from where on it survives a crash. Raises StorageError when it does not fit."""
@@ -62,8 +63,10 @@ class Spool:
             path.replace(self._path(flight_id, _FINISHED))
             _sync_folder(self._folder)
         except OSError as error:
-            raise StorageError(f"The record of flight {flight_id} could not be written to {path}: {error.strerror}.",
-                               hint="Free some space there; the worker keeps trying while it runs.") from error
+            raise StorageError(
+                f"The record of flight {flight_id} could not be written to {path}: {error.strerror}.",
+                hint="Free some space there; the worker keeps trying while it runs.",
+            ) from error
 
     def kept(self) -> list[int]:
         """The flights whose records wait here."""
@@ -75,9 +78,10 @@ class Spool:
         try:
             return _unpack(path.read_bytes())
         except (OSError, ValueError, KeyError) as error:
-            raise StorageError(f"The record {path} cannot be read: {error}.",
-                               hint="Keep the file for inspection; the trial stays lost until somebody decides.",
-                               ) from error
+            raise StorageError(
+                f"The record {path} cannot be read: {error}.",
+                hint="Keep the file for inspection; the trial stays lost until somebody decides.",
+            ) from error
 
     def drop(self, flight_id: int) -> None:
         """Give the room back: the record is in the database, or the flight never began."""
@@ -101,9 +105,15 @@ class Spool:
 def _pack(spooled: Spooled) -> bytes:
     record = spooled.record
     trajectory = record.trajectory
-    header = {"flight_id": spooled.flight_id, "ending": record.ending, "reason": record.reason,
-              "settings": dict(record.settings), "source": trajectory.source, "clock": trajectory.clock,
-              "channels": list(trajectory.channels)}
+    header = {
+        "flight_id": spooled.flight_id,
+        "ending": record.ending,
+        "reason": record.reason,
+        "settings": dict(record.settings),
+        "source": trajectory.source,
+        "clock": trajectory.clock,
+        "channels": list(trajectory.channels),
+    }
     table = io.BytesIO()
     np.save(table, np.vstack([trajectory.time_s, *trajectory.channels.values()]), allow_pickle=False)
     body = json.dumps(header).encode() + b"\n" + table.getvalue()
@@ -120,9 +130,15 @@ def _unpack(content: bytes) -> Spooled:
     channels = dict(zip(header["channels"], values, strict=True))
     ending: Ending = header["ending"]
     settings: dict[str, OptionValue] = header["settings"]
-    return Spooled(header["flight_id"], FlightRecord(
-        trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
-        ending=ending, reason=header["reason"], settings=settings))
+    return Spooled(
+        header["flight_id"],
+        FlightRecord(
+            trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
+            ending=ending,
+            reason=header["reason"],
+            settings=settings,
+        ),
+    )
 
 
 def _sync_folder(folder: Path) -> None:

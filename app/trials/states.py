@@ -56,8 +56,9 @@ ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
     "cancel": frozenset({TrialState.PLANNED, TrialState.STAGED}),
     "abort": frozenset({TrialState.STAGED, TrialState.FLYING}),
     "upload": frozenset({TrialState.PLANNED, TrialState.LOST}),
-    "classify": frozenset({TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID,
-                           TrialState.LOST}),
+    "classify": frozenset(
+        {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
+    ),
     "note": frozenset(TrialState),
 }
 """What a person may do with a trial, and in which states."""
@@ -66,8 +67,8 @@ ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
 class FlightState(StrEnum):
     """One order to a vehicle: the worker's queue, and the ledger of what the vehicle was given.
 
-        requested ──→ running ──→ landed | aborted | failed | lost | cancelled
-            └──→ cancelled
+    requested ──→ running ──→ landed | aborted | failed | lost | cancelled
+        └──→ cancelled
     """
 
     REQUESTED = "requested"
@@ -84,8 +85,9 @@ UNDER_WAY: Final = frozenset({FlightState.REQUESTED, FlightState.RUNNING})
 
 FLIGHT_MOVES: Final[Mapping[FlightState, frozenset[FlightState]]] = {
     FlightState.REQUESTED: frozenset({FlightState.RUNNING, FlightState.CANCELLED}),
-    FlightState.RUNNING: frozenset({FlightState.LANDED, FlightState.ABORTED, FlightState.FAILED, FlightState.LOST,
-                                    FlightState.CANCELLED}),
+    FlightState.RUNNING: frozenset(
+        {FlightState.LANDED, FlightState.ABORTED, FlightState.FAILED, FlightState.LOST, FlightState.CANCELLED}
+    ),
     FlightState.LANDED: frozenset(),
     FlightState.ABORTED: frozenset(),
     FlightState.FAILED: frozenset(),

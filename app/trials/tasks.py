@@ -46,8 +46,16 @@ class Ended:
 class FlightDeck:
     """Claims flights and carries them out. `closing` ends the waiting for a database that takes nothing."""
 
-    def __init__(self, database: Database, data_dir: Path, airspace: Airspace, publish: Publish, *, worker: str,
-                 closing: threading.Event) -> None:
+    def __init__(
+        self,
+        database: Database,
+        data_dir: Path,
+        airspace: Airspace,
+        publish: Publish,
+        *,
+        worker: str,
+        closing: threading.Event,
+    ) -> None:
         self._database = database
         self._data_dir = data_dir
         self._spool = Spool(data_dir / "spool")
@@ -80,8 +88,9 @@ class FlightDeck:
 
     def carry_out(self, task: FlightTask) -> None:
         """The whole flight, from opening the vehicle to the stored outcome. Raises nothing."""
-        with structlog.contextvars.bound_contextvars(campaign_id=task.campaign_id, trial_id=task.trial_id,
-                                                     flight_id=task.flight_id):
+        with structlog.contextvars.bound_contextvars(
+            campaign_id=task.campaign_id, trial_id=task.trial_id, flight_id=task.flight_id
+        ):
             try:
                 self._report(task, self._fly(task, self._airspace.enter(task.trial_id)))
             except Exception:  # noqa: BLE001 - the edge of the thread
@@ -136,10 +145,16 @@ class FlightDeck:
 
     def _orders(self, task: FlightTask) -> Orders:
         return Orders(
-            campaign_id=task.campaign_id, trial_id=task.trial_id, experiment=task.experiment,
-            vehicle_kind=task.vehicle_kind, vehicle_options=task.vehicle_options, safe_gains=task.safe_gains,
-            gains=task.gains, flight=FlightOrder(seed=task.seed, speed=task.speed),
-            lock=self._data_dir / f"vehicle-{task.vehicle_kind}.lock")
+            campaign_id=task.campaign_id,
+            trial_id=task.trial_id,
+            experiment=task.experiment,
+            vehicle_kind=task.vehicle_kind,
+            vehicle_options=task.vehicle_options,
+            safe_gains=task.safe_gains,
+            gains=task.gains,
+            flight=FlightOrder(seed=task.seed, speed=task.speed),
+            lock=self._data_dir / f"vehicle-{task.vehicle_kind}.lock",
+        )
 
     def _phase(self, task: FlightTask, phase: Phase, note: str = "") -> None:
         self._publish(FlightPhase(campaign_id=task.campaign_id, trial_id=task.trial_id, phase=phase, note=note))
@@ -156,9 +171,14 @@ class FlightDeck:
                 raise
             kept_as = self._spool.set_aside(task.flight_id)
             _log.error("record refused", why=str(error), kept_as=kept_as)
-            stored = self._store_patiently(task, Ended(
-                lifted_off=True, concern=ended.concern,
-                problem=f"Its record cannot be stored ({error}); it is kept as {kept_as}."))
+            stored = self._store_patiently(
+                task,
+                Ended(
+                    lifted_off=True,
+                    concern=ended.concern,
+                    problem=f"Its record cannot be stored ({error}); it is kept as {kept_as}.",
+                ),
+            )
         if stored:
             self._spool.drop(task.flight_id)
             self._phase(task, "ended")
@@ -202,8 +222,11 @@ class FlightDeck:
 
 def mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None:
     """What differs between the gains sent and those read back, or None."""
-    wrong = [f"{name} is {read_back.get(name, 'missing')} instead of {value:g}"
-             for name, value in asked.items() if read_back.get(name) != value]
+    wrong = [
+        f"{name} is {read_back.get(name, 'missing')} instead of {value:g}"
+        for name, value in asked.items()
+        if read_back.get(name) != value
+    ]
     return f"The vehicle did not take the gains: {'; '.join(wrong)}. It was not flown." if wrong else None
 
 

@@ -38,22 +38,44 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
     leading = trajectory.channels.get(output, trajectory.time_s)
     kept = thinned(trajectory.time_s, leading, points)
     return TrajectoryOut(
-        trial_id=row.id, source=trajectory.source, clock=trajectory.clock, checksum=row.trajectory.checksum,
-        samples=len(trajectory), units={name: CHANNEL_UNITS.get(name, "") for name in trajectory.channels},
+        trial_id=row.id,
+        source=trajectory.source,
+        clock=trajectory.clock,
+        checksum=row.trajectory.checksum,
+        samples=len(trajectory),
+        units={name: CHANNEL_UNITS.get(name, "") for name in trajectory.channels},
         time_s=trajectory.time_s[kept].tolist(),
-        channels={name: values[kept].tolist() for name, values in trajectory.channels.items()})
+        channels={name: values[kept].tolist() for name, values in trajectory.channels.items()},
+    )
 
 
 def _view(campaign: CampaignRow, row: TrialRow, trials: Sequence[TrialRow], flights: Mapping[int, FlightRow]) -> Trial:
     flight = flights.get(row.id)
     return Trial(
-        id=row.id, version=row.version, campaign_id=row.campaign_id, number=row.number, state=row.state, kind=row.kind,
-        gains=row.gains, read_back=row.read_back, proposal_id=row.proposal_id, error=row.error,
-        predicted_error=row.predicted_error, overshoot_m=row.overshoot_m,
-        verdict=verdict(row, trials, get_experiment(campaign.experiment).error_unit), reason=row.reason, note=row.note,
-        gate=Gate.model_validate(row.gate), record=_record(row.trajectory), flight=_flight(flight), seed=row.seed,
-        speed=flight.speed if flight else None, created_at=row.created_at, flown_at=row.flown_at,
-        actions=_actions(campaign, row, flight))
+        id=row.id,
+        version=row.version,
+        campaign_id=row.campaign_id,
+        number=row.number,
+        state=row.state,
+        kind=row.kind,
+        gains=row.gains,
+        read_back=row.read_back,
+        proposal_id=row.proposal_id,
+        error=row.error,
+        predicted_error=row.predicted_error,
+        overshoot_m=row.overshoot_m,
+        verdict=verdict(row, trials, get_experiment(campaign.experiment).error_unit),
+        reason=row.reason,
+        note=row.note,
+        gate=Gate.model_validate(row.gate),
+        record=_record(row.trajectory),
+        flight=_flight(flight),
+        seed=row.seed,
+        speed=flight.speed if flight else None,
+        created_at=row.created_at,
+        flown_at=row.flown_at,
+        actions=_actions(campaign, row, flight),
+    )
 
 
 def verdict(row: TrialRow, trials: Sequence[TrialRow], unit: str) -> str:
@@ -91,8 +113,14 @@ def _against_prediction(row: TrialRow, unit: str) -> str:
 def _record(row: TrajectoryRow | None) -> RecordBrief | None:
     if row is None:
         return None
-    return RecordBrief(samples=row.samples, duration_s=row.duration_s, source=row.source, clock=row.clock,
-                       channels=row.columns[1:], checksum=row.checksum)
+    return RecordBrief(
+        samples=row.samples,
+        duration_s=row.duration_s,
+        source=row.source,
+        clock=row.clock,
+        channels=row.columns[1:],
+        checksum=row.checksum,
+    )
 
 
 def _flight(row: FlightRow | None) -> FlightBrief | None:

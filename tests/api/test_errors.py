@@ -5,6 +5,7 @@ import errno
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
+from httpx2 import Response
 from sqlalchemy import event, text
 
 from app import errors
@@ -16,28 +17,53 @@ from tests.builders import create_campaign, create_ready_campaign, get, problems
 CAMPAIGN = "/api/campaigns"
 
 
-def is_problem(answer: object) -> bool:
-    body = answer.json()  # type: ignore[attr-defined]
-    return (answer.headers["content-type"] == "application/problem+json"  # type: ignore[attr-defined]
-            and body["status"] == answer.status_code and bool(body["detail"]) and bool(body["hint"]))  # type: ignore[attr-defined]
+def is_problem(answer: Response) -> bool:
+    body = answer.json()
+    return (
+        answer.headers["content-type"] == "application/problem+json"
+        and body["status"] == answer.status_code
+        and bool(body["detail"])
+        and bool(body["hint"])
+    )
 
 
-@pytest.mark.parametrize("path", [
-    "/api/campaigns/999", "/api/campaigns/999/proposal", "/api/campaigns/999/trials", "/api/trials/999",
-    "/api/trials/999/trajectory", "/api/trials/999/trajectory.csv", "/api/jobs/999", "/api/vehicles/999",
-    "/api/vehicles/999/ledger", "/api/nothing", "/api/", "/api",
-])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/api/campaigns/999",
+        "/api/campaigns/999/proposal",
+        "/api/campaigns/999/trials",
+        "/api/trials/999",
+        "/api/trials/999/trajectory",
+        "/api/trials/999/trajectory.csv",
+        "/api/jobs/999",
+        "/api/vehicles/999",
+        "/api/vehicles/999/ledger",
+        "/api/nothing",
+        "/api/",
+        "/api",
+    ],
+)
 def test_what_does_not_exist_is_404_with_a_hint(client: TestClient, path: str) -> None:
     answer = client.get(path)
     assert answer.status_code == 404
     assert is_problem(answer)
 
 
-@pytest.mark.parametrize("path", [
-    "/api/campaigns/999/finish", "/api/campaigns/999/archive", "/api/campaigns/999/clone",
-    "/api/campaigns/999/proposal", "/api/trials/999/fly", "/api/trials/999/abort", "/api/trials/999/cancel",
-    "/api/jobs/999/cancel", "/api/jobs/999/retry",
-])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/api/campaigns/999/finish",
+        "/api/campaigns/999/archive",
+        "/api/campaigns/999/clone",
+        "/api/campaigns/999/proposal",
+        "/api/trials/999/fly",
+        "/api/trials/999/abort",
+        "/api/trials/999/cancel",
+        "/api/jobs/999/cancel",
+        "/api/jobs/999/retry",
+    ],
+)
 def test_acts_on_what_does_not_exist_are_404(client: TestClient, path: str) -> None:
     answer = client.post(path)
     assert answer.status_code == 404
@@ -58,19 +84,22 @@ def test_an_unknown_method_is_405(client: TestClient) -> None:
     assert "GET" in answer.headers["allow"]
 
 
-@pytest.mark.parametrize(("content", "kind", "status"), [
-    (b"name=a", "application/x-www-form-urlencoded", 415),
-    (b"{}", "text/plain", 415),
-    (b"{", "application/json", 422),
-    (b"", "application/json", 422),
-    (b"[1]", "application/json", 422),
-    (b"null", "application/json", 422),
-    (b'{"name": NaN}', "application/json", 422),
-    (b'{"name": "\\ud800"}', "application/json", 422),
-    (b"\xff\xfe", "application/json", 422),
-    (b'{"name": "' + b"x" * 2**20 + b'"}', "application/json", 413),
-    (b"[" * 100_000, "application/json", 400),
-])
+@pytest.mark.parametrize(
+    ("content", "kind", "status"),
+    [
+        (b"name=a", "application/x-www-form-urlencoded", 415),
+        (b"{}", "text/plain", 415),
+        (b"{", "application/json", 422),
+        (b"", "application/json", 422),
+        (b"[1]", "application/json", 422),
+        (b"null", "application/json", 422),
+        (b'{"name": NaN}', "application/json", 422),
+        (b'{"name": "\\ud800"}', "application/json", 422),
+        (b"\xff\xfe", "application/json", 422),
+        (b'{"name": "' + b"x" * 2**20 + b'"}', "application/json", 413),
+        (b"[" * 100_000, "application/json", 400),
+    ],
+)
 def test_a_body_that_is_no_request_is_refused(client: TestClient, content: bytes, kind: str, status: int) -> None:
     answer = client.post(CAMPAIGN, content=content, headers={"Content-Type": kind})
     assert answer.status_code == status, answer.text
@@ -78,17 +107,24 @@ def test_a_body_that_is_no_request_is_refused(client: TestClient, content: bytes
 
 
 GAINS = [
-    ({"kp": -1, "ki": 13, "kd": 82}, "gains.kp"), ({"kp": 283.5, "ki": 13, "kd": 82}, "gains.kp"),
-    ({"kp": 4001, "ki": 13, "kd": 82}, "gains.kp"), ({"kp": 283, "ki": 13}, "gains.kd"),
-    ({"kp": 283, "ki": 13, "kd": 82, "kx": 1}, "gains.kx"), ({"kp": "283", "ki": 13, "kd": 82}, "gains.kp"),
-    ({"kp": None, "ki": 13, "kd": 82}, "gains.kp"), ({"kp": True, "ki": 13, "kd": 82}, "gains.kp"),
-    ({"kp": 10**400, "ki": 13, "kd": 82}, "gains.kp"), ({"kp": 3000, "ki": 13, "kd": 82}, "gains"), ({}, "gains.kp"),
+    ({"kp": -1, "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": 283.5, "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": 4001, "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": 283, "ki": 13}, "gains.kd"),
+    ({"kp": 283, "ki": 13, "kd": 82, "kx": 1}, "gains.kx"),
+    ({"kp": "283", "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": None, "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": True, "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": 10**400, "ki": 13, "kd": 82}, "gains.kp"),
+    ({"kp": 3000, "ki": 13, "kd": 82}, "gains"),
+    ({}, "gains.kp"),
 ]
 
 
 @pytest.mark.parametrize(("gains", "field"), GAINS)
 def test_gains_that_may_not_fly_are_refused_by_field(
-        client: TestClient, database: Database, gains: object, field: str) -> None:
+    client: TestClient, database: Database, gains: object, field: str
+) -> None:
     campaign = create_ready_campaign(client, database)
     answer = client.post(f"{CAMPAIGN}/{campaign['id']}/trials", json={"gains": gains})
     assert answer.status_code == 422
@@ -99,8 +135,11 @@ def test_gains_that_may_not_fly_are_refused_by_field(
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
 def test_numbers_that_are_none_are_refused_by_field(client: TestClient, database: Database, number: str) -> None:
     campaign = create_ready_campaign(client, database)
-    answer = client.post(f"{CAMPAIGN}/{campaign['id']}/trials", headers={"Content-Type": "application/json"},
-                         content=f'{{"gains": {{"kp": {number}, "ki": 13, "kd": 82}}}}')
+    answer = client.post(
+        f"{CAMPAIGN}/{campaign['id']}/trials",
+        headers={"Content-Type": "application/json"},
+        content=f'{{"gains": {{"kp": {number}, "ki": 13, "kd": 82}}}}',
+    )
     assert answer.status_code == 422
     assert "gains.kp" in problems_of(answer)
 
@@ -111,7 +150,8 @@ def test_the_gate_says_how_far_the_gains_may_go(client: TestClient, database: Da
     assert answer.json()["title"] == "Gains refused"
     assert problems_of(answer)["gains"] == (
         "The largest change, of kp, is 67.9% of its range; only 25% is allowed from the start gains until a flight has "
-        "shown more.")
+        "shown more."
+    )
 
 
 @pytest.mark.parametrize("body", [{}, {"proposal_id": 1, "gains": {"kp": 283, "ki": 13, "kd": 82}}])
@@ -170,8 +210,9 @@ def test_a_mistake_of_ours_is_500_with_a_number(application: FastAPI) -> None:
 
 
 def test_every_error_is_drawn_in_the_trees_docstring() -> None:
-    kinds = {kind.__name__ for kind in vars(errors).values()
-             if isinstance(kind, type) and issubclass(kind, GainlineError)}
+    kinds = {
+        kind.__name__ for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, GainlineError)
+    }
     assert errors.__doc__ is not None
     assert {name for name in kinds if name not in errors.__doc__} == set()
     assert kinds <= set(errors.__all__)

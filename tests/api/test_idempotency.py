@@ -38,8 +38,7 @@ def test_without_a_key_every_request_is_an_act(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize("other", [("/api/campaigns", {"name": "Twice"}), ("/api/campaigns/1/finish", None)])
-def test_a_key_that_stands_for_another_request_is_refused(
-        client: TestClient, other: tuple[str, object]) -> None:
+def test_a_key_that_stands_for_another_request_is_refused(client: TestClient, other: tuple[str, object]) -> None:
     client.post("/api/campaigns", json={"name": "Once"}, headers=KEY)
     path, body = other
     answer = client.post(path, json=body, headers=KEY) if body else client.post(path, headers=KEY)
@@ -60,7 +59,8 @@ def test_a_refused_request_may_be_tried_again_with_its_key(client: TestClient, d
 
 
 def test_an_answer_is_given_again_as_it_was_though_the_world_has_moved_on(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     ask = {"gains": {"kp": 283, "ki": 13, "kd": 82}, "fly": {"speed": None}}
     path = f"/api/campaigns/{campaign['id']}/trials"
@@ -73,12 +73,17 @@ def test_an_answer_is_given_again_as_it_was_though_the_world_has_moved_on(
 def test_a_record_sent_twice_with_its_key_is_stored_once(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import")
     trial = create_trial(client, campaign["id"])
-    answers = [client.post(f"/api/trials/{trial['id']}/trajectory", content=create_csv(),
-                           headers={**KEY, "Content-Type": "text/csv"}) for _ in range(2)]
+    answers = [
+        client.post(
+            f"/api/trials/{trial['id']}/trajectory", content=create_csv(), headers={**KEY, "Content-Type": "text/csv"}
+        )
+        for _ in range(2)
+    ]
     assert [answer.status_code for answer in answers] == [201, 201]
     assert answers[0].json() == answers[1].json()
-    other = client.post(f"/api/trials/{trial['id']}/trajectory", content=create_csv(2.0),
-                        headers={**KEY, "Content-Type": "text/csv"})
+    other = client.post(
+        f"/api/trials/{trial['id']}/trajectory", content=create_csv(2.0), headers={**KEY, "Content-Type": "text/csv"}
+    )
     assert other.status_code == 422
 
 
@@ -100,8 +105,7 @@ def test_old_keys_are_forgotten(client: TestClient, database: Database) -> None:
 
 def test_the_same_key_from_many_threads_at_once_makes_one_campaign(client: TestClient, database: Database) -> None:
     with ThreadPoolExecutor(8) as pool:
-        answers = list(pool.map(
-            lambda _: client.post("/api/campaigns", json={"name": "Once"}, headers=KEY), range(24)))
+        answers = list(pool.map(lambda _: client.post("/api/campaigns", json={"name": "Once"}, headers=KEY), range(24)))
     assert {answer.status_code for answer in answers} == {201}
     assert len({answer.json()["id"] for answer in answers}) == 1
 

@@ -29,21 +29,25 @@ def long_enough(*last: str) -> bytes:
     return rows(*(f"{0.1 * index:.1f},0" for index in range(30)), *last)
 
 
-@pytest.mark.parametrize(("content", "field", "reason"), [
-    (b"", "", ""),
-    (b"\x00\x01\x02\x03" * 100, "", ""),
-    (b"zeit,hoehe\n0,0\n", "", "time_s"),
-    (b"time_s\n0\n", "", "altitude_m"),
-    (rows("0,0", "1,1"), "", ""),
-    (long_enough("3.0,nan"), "line 32", "finite"),
-    (long_enough("3.0,inf"), "line 32", "finite"),
-    (long_enough("3.0,high"), "line 32", ""),
-    (long_enough("3.0"), "line 32", ""),
-    (long_enough("2.0,0"), "line 32", ""),
-    (long_enough("2.9,0"), "line 32", ""),
-])
+@pytest.mark.parametrize(
+    ("content", "field", "reason"),
+    [
+        (b"", "", ""),
+        (b"\x00\x01\x02\x03" * 100, "", ""),
+        (b"zeit,hoehe\n0,0\n", "", "time_s"),
+        (b"time_s\n0\n", "", "altitude_m"),
+        (rows("0,0", "1,1"), "", ""),
+        (long_enough("3.0,nan"), "line 32", "finite"),
+        (long_enough("3.0,inf"), "line 32", "finite"),
+        (long_enough("3.0,high"), "line 32", ""),
+        (long_enough("3.0"), "line 32", ""),
+        (long_enough("2.0,0"), "line 32", ""),
+        (long_enough("2.9,0"), "line 32", ""),
+    ],
+)
 def test_a_malformed_record_is_refused_in_words_and_stores_nothing(
-        client: TestClient, database: Database, trial: Json, content: bytes, field: str, reason: str) -> None:
+    client: TestClient, database: Database, trial: Json, content: bytes, field: str, reason: str
+) -> None:
     answer = send(client, trial["id"], content)
     assert answer.status_code == 422
     found = problems_of(answer)
@@ -70,8 +74,9 @@ def ten_million_rows() -> Iterator[bytes]:
 
 def test_ten_million_rows_are_refused_without_filling_the_memory(client: TestClient, trial: Json) -> None:
     before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    answer = client.post(f"/api/trials/{trial['id']}/trajectory", content=ten_million_rows(),
-                         headers={"Content-Type": "text/csv"})
+    answer = client.post(
+        f"/api/trials/{trial['id']}/trajectory", content=ten_million_rows(), headers={"Content-Type": "text/csv"}
+    )
     assert answer.status_code == 413
     assert "200 000 rows" in answer.json()["hint"]
     # 98 MB of text arrive in the test's own memory as well; the server's share stays below the limit of an upload.
@@ -87,8 +92,11 @@ def test_more_rows_than_allowed_are_refused_even_when_they_are_short(client: Tes
 
 
 def test_a_stated_length_beyond_the_limit_is_refused_before_anything_arrives(client: TestClient, trial: Json) -> None:
-    answer = client.post(f"/api/trials/{trial['id']}/trajectory", content=b"x",
-                         headers={"Content-Type": "text/csv", "Content-Length": str(10**10)})
+    answer = client.post(
+        f"/api/trials/{trial['id']}/trajectory",
+        content=b"x",
+        headers={"Content-Type": "text/csv", "Content-Length": str(10**10)},
+    )
     assert answer.status_code == 413
 
 
@@ -97,14 +105,17 @@ def test_a_record_may_come_as_a_form(client: TestClient, trial: Json) -> None:
     assert (answer.status_code, answer.json()["state"]) == (201, "valid")
 
 
-@pytest.mark.parametrize(("arguments", "status"), [
-    ({"files": {"record": ("flight.csv", b"x")}}, 422),
-    ({"data": {"file": "text"}, "files": {"other": ("a", b"x")}}, 422),
-    ({"json": {"time_s": [0], "altitude_m": [0]}}, 415),
-    ({"content": b"x", "headers": {"Content-Type": "application/zip"}}, 415),
-    ({"content": b"broken", "headers": {"Content-Type": "multipart/form-data"}}, 400),
-    ({"content": b"broken", "headers": {"Content-Type": "multipart/form-data; boundary=b"}}, 400),
-])
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        ({"files": {"record": ("flight.csv", b"x")}}, 422),
+        ({"data": {"file": "text"}, "files": {"other": ("a", b"x")}}, 422),
+        ({"json": {"time_s": [0], "altitude_m": [0]}}, 415),
+        ({"content": b"x", "headers": {"Content-Type": "application/zip"}}, 415),
+        ({"content": b"broken", "headers": {"Content-Type": "multipart/form-data"}}, 400),
+        ({"content": b"broken", "headers": {"Content-Type": "multipart/form-data; boundary=b"}}, 400),
+    ],
+)
 def test_something_else_than_a_record_is_refused(client: TestClient, trial: Json, arguments: Json, status: int) -> None:
     answer = client.post(f"/api/trials/{trial['id']}/trajectory", **arguments)
     assert answer.status_code == status, answer.text
@@ -118,11 +129,15 @@ def test_a_trial_takes_one_record(client: TestClient, trial: Json) -> None:
 
 
 def test_an_export_can_be_imported_and_gives_the_same_record_and_error(client: TestClient, database: Database) -> None:
-    first, second = (create_trial(client, create_ready_campaign(client, database, vehicle="import")["id"])
-                     for _ in range(2))
+    first, second = (
+        create_trial(client, create_ready_campaign(client, database, vehicle="import")["id"]) for _ in range(2)
+    )
     climb = create_climb(0.8, rate_hz=512.0)
-    sent = send(client, first["id"], csv_of({"time_s": climb.time_s, "altitude_m": climb["altitude_m"],
-                                             "thrust": np.cos(climb.time_s)})).json()
+    sent = send(
+        client,
+        first["id"],
+        csv_of({"time_s": climb.time_s, "altitude_m": climb["altitude_m"], "thrust": np.cos(climb.time_s)}),
+    ).json()
     export = client.get(f"/api/trials/{first['id']}/trajectory.csv")
     assert export.headers["content-type"].startswith("text/csv")
     assert export.headers["x-checksum-sha256"] == sent["record"]["checksum"]

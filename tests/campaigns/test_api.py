@@ -39,38 +39,45 @@ def test_a_draft_becomes_ready_when_its_first_gains_are_known(client: TestClient
     run_jobs(database)
     found = get(client, f"{path}/proposal")
     assert (found["state"], found["proposal"]["kind"], found["proposal"]["recommended"]) == (
-        "ready", "start", "baseline")
+        "ready",
+        "start",
+        "baseline",
+    )
     assert found["proposal"]["gains"] == {"kp": 283, "ki": 13, "kd": 82}
     assert found["proposal"]["gate"]["passed"]
     assert get(client, path)["state"] == "ready"
 
 
-@pytest.mark.parametrize(("body", "field"), [
-    ({"name": ""}, "name"),
-    ({"name": "   "}, "name"),
-    ({"name": "x" * 121}, "name"),
-    ({}, "name"),
-    ({"name": "a", "nmae": "b"}, "nmae"),
-    ({"name": "a", "vehicle": {"kind": "zeppelin"}}, "vehicle.kind"),
-    ({"name": "a", "vehicle": {"kind": "twin", "options": {"scatter": -1}}}, "vehicle.options.scatter"),
-    ({"name": "a", "vehicle": {"kind": "twin", "options": {"colour": "red"}}}, "vehicle.options.colour"),
-    ({"name": "a", "definition": {"experiment": "landing"}}, "definition.experiment"),
-    ({"name": "a", "definition": {"strategy": "guessing"}}, "definition.strategy"),
-    ({"name": "a", "definition": {"options": {"speed": 3}}}, "definition.options.speed"),
-    ({"name": "a", "definition": {"start": {"kind": "given"}}}, "definition.start.gains"),
-    ({"name": "a", "definition": {"start": {"kind": "given", "gains": {"kp": 1}}}}, "definition.start.gains.ki"),
-    ({"name": "a", "definition": {"bounds": {"kp": [0, 9999]}}}, "definition.bounds.kp"),
-    ({"name": "a", "definition": {"bounds": {"kp": [9, 1]}}}, "definition.bounds.kp"),
-    ({"name": "a", "definition": {"stop": {"max_flights": 0}}}, "definition.stop.max_flights"),
-    ({"name": "a", "definition": {"stop": {"max_flights": 201}}}, "definition.stop.max_flights"),
-    ({"name": "a", "definition": {"stop": {"improvement": 0.6}}}, "definition.stop.improvement"),
-    ({"name": "a", "definition": {"first_step_fraction": 0}}, "definition.first_step_fraction"),
-    ({"name": "a", "definition": {"step_fraction": 1.5}}, "definition.step_fraction"),
-    ({"name": "a", "definition": {"seed": -1}}, "definition.seed"),
-    ({"name": "a", "definition": {"seed": "1"}}, "definition.seed"),
-])
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"name": ""}, "name"),
+        ({"name": "   "}, "name"),
+        ({"name": "x" * 121}, "name"),
+        ({}, "name"),
+        ({"name": "a", "nmae": "b"}, "nmae"),
+        ({"name": "a", "vehicle": {"kind": "zeppelin"}}, "vehicle.kind"),
+        ({"name": "a", "vehicle": {"kind": "twin", "options": {"scatter": -1}}}, "vehicle.options.scatter"),
+        ({"name": "a", "vehicle": {"kind": "twin", "options": {"colour": "red"}}}, "vehicle.options.colour"),
+        ({"name": "a", "definition": {"experiment": "landing"}}, "definition.experiment"),
+        ({"name": "a", "definition": {"strategy": "guessing"}}, "definition.strategy"),
+        ({"name": "a", "definition": {"options": {"speed": 3}}}, "definition.options.speed"),
+        ({"name": "a", "definition": {"start": {"kind": "given"}}}, "definition.start.gains"),
+        ({"name": "a", "definition": {"start": {"kind": "given", "gains": {"kp": 1}}}}, "definition.start.gains.ki"),
+        ({"name": "a", "definition": {"bounds": {"kp": [0, 9999]}}}, "definition.bounds.kp"),
+        ({"name": "a", "definition": {"bounds": {"kp": [9, 1]}}}, "definition.bounds.kp"),
+        ({"name": "a", "definition": {"stop": {"max_flights": 0}}}, "definition.stop.max_flights"),
+        ({"name": "a", "definition": {"stop": {"max_flights": 201}}}, "definition.stop.max_flights"),
+        ({"name": "a", "definition": {"stop": {"improvement": 0.6}}}, "definition.stop.improvement"),
+        ({"name": "a", "definition": {"first_step_fraction": 0}}, "definition.first_step_fraction"),
+        ({"name": "a", "definition": {"step_fraction": 1.5}}, "definition.step_fraction"),
+        ({"name": "a", "definition": {"seed": -1}}, "definition.seed"),
+        ({"name": "a", "definition": {"seed": "1"}}, "definition.seed"),
+    ],
+)
 def test_a_campaign_that_cannot_be_used_is_refused_by_field(
-        client: TestClient, database: Database, body: object, field: str) -> None:
+    client: TestClient, database: Database, body: object, field: str
+) -> None:
     answer = client.post("/api/campaigns", json=body)
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
@@ -81,20 +88,32 @@ def test_a_campaign_that_cannot_be_used_is_refused_by_field(
 
 
 def test_everything_wrong_is_named_at_once(client: TestClient) -> None:
-    answer = client.post("/api/campaigns", json={
-        "name": "a", "vehicle": {"kind": "twin", "options": {"colour": "red"}},
-        "definition": {"strategy": "guessing", "bounds": {"kq": [0, 1]}}})
+    answer = client.post(
+        "/api/campaigns",
+        json={
+            "name": "a",
+            "vehicle": {"kind": "twin", "options": {"colour": "red"}},
+            "definition": {"strategy": "guessing", "bounds": {"kq": [0, 1]}},
+        },
+    )
     assert set(problems_of(answer)) == {"definition.strategy", "definition.bounds.kq", "vehicle.options.colour"}
 
 
 def test_a_campaign_can_be_renamed_and_redefined_before_its_first_flight(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     path = f"/api/campaigns/{campaign['id']}"
     planned = create_trial(client, campaign["id"])
-    edited = client.patch(path, json={
-        "version": 1, "name": "Better", "vehicle": {"kind": "jsbsim"},
-        "definition": {"start": {"kind": "given", "gains": {"kp": 500, "ki": 20, "kd": 90}}}})
+    edited = client.patch(
+        path,
+        json={
+            "version": 1,
+            "name": "Better",
+            "vehicle": {"kind": "jsbsim"},
+            "definition": {"start": {"kind": "given", "gains": {"kp": 500, "ki": 20, "kd": 90}}},
+        },
+    )
     assert edited.status_code == 200
     after = edited.json()
     assert (after["version"], after["name"], after["vehicle"]["kind"]) == (2, "Better", "jsbsim")
@@ -181,8 +200,10 @@ def test_reclassing_a_flight_recomputes_what_came_after(client: TestClient, data
     good = create_flown_trial(client, database, campaign["id"], 1.0)
     before = get(client, f"{path}/proposal")["proposal"]
     assert get(client, path)["best"]["trial_id"] == good["id"]
-    said = client.post(f"/api/trials/{good['id']}/classify", json={
-        "version": good["version"], "outcome": "invalid", "reason": "the tether pulled it up"})
+    said = client.post(
+        f"/api/trials/{good['id']}/classify",
+        json={"version": good["version"], "outcome": "invalid", "reason": "the tether pulled it up"},
+    )
     assert (said.json()["state"], said.json()["verdict"]) == ("invalid", "Does not count: the tether pulled it up")
     assert get(client, path)["best"]["error"] == pytest.approx(climb_error(2.0), rel=1e-4)
     assert get(client, f"{path}/proposal")["state"] == "computing"
@@ -192,13 +213,18 @@ def test_reclassing_a_flight_recomputes_what_came_after(client: TestClient, data
     run_jobs(database)
     after = get(client, f"{path}/proposal")["proposal"]
     assert after["history_digest"] != before["history_digest"]
-    back = client.post(f"/api/trials/{good['id']}/classify", json={
-        "version": good["version"] + 1, "outcome": "valid", "reason": "it was slack after all"})
+    back = client.post(
+        f"/api/trials/{good['id']}/classify",
+        json={"version": good["version"] + 1, "outcome": "valid", "reason": "it was slack after all"},
+    )
     assert back.json()["error"] == good["error"]
     run_jobs(database)
     again = get(client, f"{path}/proposal")["proposal"]
     assert (again["history_digest"], again["gains"], again["predicted_error"]) == (
-        before["history_digest"], before["gains"], before["predicted_error"])
+        before["history_digest"],
+        before["gains"],
+        before["predicted_error"],
+    )
 
 
 def test_ask_and_tell_by_script(client: TestClient, database: Database) -> None:

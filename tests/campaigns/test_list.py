@@ -65,12 +65,21 @@ def test_a_card_shows_what_matters(client: TestClient, database: Database) -> No
     assert all(len(curve["time_s"]) == len(curve["values"]) <= 48 for curve in card["spark"])
 
 
-@pytest.mark.parametrize(("query", "field"), [
-    ("limit=0", "limit"), ("limit=201", "limit"), ("limit=many", "limit"), ("sort=colour", "sort"),
-    ("state=asleep", "state.0"), ("cursor=nonsense", "cursor"), ("cursor=bnVsbA", "cursor"),
-    ("cursor=WyItY3JlYXRlZCIsIHRydWUsIDFd", "cursor"), ("sort=name&cursor=WyItY3JlYXRlZCIsIDEsIDFd", "cursor"),
-    ("sort=-updated&cursor=WyItdXBkYXRlZCIsICJub3ciLCAxXQ", "cursor"),
-])
+@pytest.mark.parametrize(
+    ("query", "field"),
+    [
+        ("limit=0", "limit"),
+        ("limit=201", "limit"),
+        ("limit=many", "limit"),
+        ("sort=colour", "sort"),
+        ("state=asleep", "state.0"),
+        ("cursor=nonsense", "cursor"),
+        ("cursor=bnVsbA", "cursor"),
+        ("cursor=WyItY3JlYXRlZCIsIHRydWUsIDFd", "cursor"),
+        ("sort=name&cursor=WyItY3JlYXRlZCIsIDEsIDFd", "cursor"),
+        ("sort=-updated&cursor=WyItdXBkYXRlZCIsICJub3ciLCAxXQ", "cursor"),
+    ],
+)
 def test_a_query_that_makes_no_sense_is_refused_by_field(client: TestClient, query: str, field: str) -> None:
     answer = client.get(f"/api/campaigns?{query}")
     assert answer.status_code == 422

@@ -28,7 +28,7 @@ def test_every_check_of_the_models_is_in_the_database(migrated_file: Path) -> No
     for table in Base.metadata.sorted_tables:
         for constraint in table.constraints:
             if constraint.__visit_name__ == "check_constraint":
-                assert f'CONSTRAINT {constraint.name} CHECK ({constraint.sqltext})' in made[table.name]  # type: ignore[attr-defined]
+                assert f"CONSTRAINT {constraint.name} CHECK ({constraint.sqltext})" in made[table.name]  # type: ignore[attr-defined]
 
 
 def test_migrating_again_changes_nothing(tmp_path: Path) -> None:

@@ -13,8 +13,7 @@ from tests.builders import create_campaign, create_flown_trial, create_ready_cam
 
 def topics(database: Database, after: int = 0) -> list[tuple[str, int, int | None]]:
     with database.read() as session:
-        return [(row.topic, row.entity_id, row.campaign_id)
-                for row in outbox.events_after(session, after, limit=1000)]
+        return [(row.topic, row.entity_id, row.campaign_id) for row in outbox.events_after(session, after, limit=1000)]
 
 
 def test_a_new_campaign_is_told_with_its_vehicle_and_its_job(client: TestClient, database: Database) -> None:
@@ -54,7 +53,8 @@ def test_a_deleted_campaign_is_told(client: TestClient, database: Database) -> N
 
 
 def test_old_events_are_pruned_and_a_client_from_before_is_recognised(
-        database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(outbox, "KEPT_EVENTS", 20)
     monkeypatch.setattr(outbox, "_PRUNE_EVERY", 10)
     for _ in range(60):

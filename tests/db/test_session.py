@@ -23,8 +23,10 @@ WRITES = 25
 
 def test_the_file_is_in_wal_mode_with_foreign_keys(database: Database) -> None:
     with database.read() as session:
-        found = [session.execute(text(f"PRAGMA {name}")).scalar() for name in
-                 ("journal_mode", "foreign_keys", "busy_timeout")]
+        found = [
+            session.execute(text(f"PRAGMA {name}")).scalar()
+            for name in ("journal_mode", "foreign_keys", "busy_timeout")
+        ]
     assert found == ["wal", 1, 5000]
 
 
@@ -126,8 +128,15 @@ def test_the_database_itself_refuses_a_second_flight_of_a_vehicle(client: TestCl
     campaign = create_ready_campaign(client, database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     with pytest.raises(IntegrityError, match="UNIQUE"), database.write() as session:
-        session.add(FlightRow(campaign_id=campaign["id"], trial_id=trial["id"], vehicle_id=campaign["vehicle"]["id"],
-                              state=FlightState.REQUESTED, gains=trial["gains"]))
+        session.add(
+            FlightRow(
+                campaign_id=campaign["id"],
+                trial_id=trial["id"],
+                vehicle_id=campaign["vehicle"]["id"],
+                state=FlightState.REQUESTED,
+                gains=trial["gains"],
+            )
+        )
 
 
 @pytest.mark.parametrize("table", ["vehicle", "campaign", "trial", "flight", "job"])

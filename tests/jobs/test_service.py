@@ -95,8 +95,11 @@ def test_a_failed_job_says_why_and_can_be_retried(client: TestClient, database: 
     with database.write() as session:
         jobs.fail_job(session, job, InputError("No.", hint="Do it so.", problems=(Problem("x", "is bad"),)), worker="a")
     proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")
-    assert proposal == {"state": "failed", "proposal": None,
-                        "problem": {"title": "No.", "detail": "x: is bad", "hint": "Do it so."}}
+    assert proposal == {
+        "state": "failed",
+        "proposal": None,
+        "problem": {"title": "No.", "detail": "x: is bad", "hint": "Do it so."},
+    }
     assert get(client, f"/api/jobs/{job}")["actions"] == ["retry"]
     assert client.post(f"/api/jobs/{job}/retry").json()["state"] == "queued"
     assert run_jobs(database) == 1

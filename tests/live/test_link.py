@@ -18,8 +18,13 @@ from app.live.server import SLOW_CLIENT_BYTES, LiveServer
 
 
 def telemetry(time_s: float = 1.0, rows: int = 1) -> Telemetry:
-    return Telemetry(campaign_id=1, trial_id=2, time_s=time_s, error_so_far=0.25,
-                     samples=[(time_s, 1.5, 0.5, 3.0, 2.5, 0.6, 11.1)] * rows)
+    return Telemetry(
+        campaign_id=1,
+        trial_id=2,
+        time_s=time_s,
+        error_so_far=0.25,
+        samples=[(time_s, 1.5, 0.5, 3.0, 2.5, 0.6, 11.1)] * rows,
+    )
 
 
 def server(path: Path, abort: Callable[[int, str], bool] = lambda _trial, _why: False) -> LiveServer:
@@ -50,9 +55,15 @@ async def connected(path: Path) -> AsyncIterator[Web]:
         task.cancel()
 
 
-@pytest.mark.parametrize("message", [
-    telemetry(), FlightPhase(campaign_id=1, trial_id=2, phase="landed", note="on the ground"),
-    WorkerHello(pid=1, version="0", flying=[3])], ids=lambda message: message.type)
+@pytest.mark.parametrize(
+    "message",
+    [
+        telemetry(),
+        FlightPhase(campaign_id=1, trial_id=2, phase="landed", note="on the ground"),
+        WorkerHello(pid=1, version="0", flying=[3]),
+    ],
+    ids=lambda message: message.type,
+)
 def test_every_message_survives_the_line(message: FromWorker) -> None:
     assert decode(encode(message)) == message
 

@@ -21,8 +21,17 @@ GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 
 
 def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, trial_id: int = 1) -> Orders:
-    return Orders(campaign_id=1, trial_id=trial_id, experiment="takeoff", vehicle_kind=kind, vehicle_options={},
-                  safe_gains=GAINS, gains=GAINS, flight=FlightOrder(seed=3, speed=speed), lock=folder / "vehicle.lock")
+    return Orders(
+        campaign_id=1,
+        trial_id=trial_id,
+        experiment="takeoff",
+        vehicle_kind=kind,
+        vehicle_options={},
+        safe_gains=GAINS,
+        gains=GAINS,
+        flight=FlightOrder(seed=3, speed=speed),
+        lock=folder / "vehicle.lock",
+    )
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +81,8 @@ def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(cock
 
 
 def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
-        cockpit: Cockpit, tmp_path: Path) -> None:
+    cockpit: Cockpit, tmp_path: Path
+) -> None:
     def abort(said: Said) -> None:
         if isinstance(said, Telemetry):
             cockpit.stand_down(1, "too high")
@@ -120,8 +130,7 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
     (expected,) = only(fly(alone, orders(tmp_path, kind="jsbsim")), Landed)
     assert isinstance(expected, Landed)
     for landed in records.values():
-        np.testing.assert_array_equal(landed.record.trajectory["altitude_m"],
-                                      expected.record.trajectory["altitude_m"])
+        np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], expected.record.trajectory["altitude_m"])
     for each in (alone, *together):
         each.close()
 

@@ -19,8 +19,11 @@ from tests.builders import create_climb
 SINGLE = st.floats(width=32, allow_nan=False, allow_infinity=False)
 
 
-@given(columns=st.integers(1, 12).flatmap(lambda samples: st.lists(
-    arrays(np.float64, samples, elements=SINGLE), min_size=0, max_size=5)))
+@given(
+    columns=st.integers(1, 12).flatmap(
+        lambda samples: st.lists(arrays(np.float64, samples, elements=SINGLE), min_size=0, max_size=5)
+    )
+)
 def test_every_single_precision_number_comes_back_bit_for_bit(columns: list[NDArray[np.float64]]) -> None:
     samples = len(columns[0]) if columns else 3
     time_s = np.arange(samples) / 512.0 - 1.0
@@ -61,12 +64,15 @@ def test_damage_is_noticed() -> None:
         unpack(dataclasses.replace(packed, codec=2))
 
 
-@pytest.mark.parametrize(("time_s", "values", "field"), [
-    ([], [], "time_s"),
-    ([0.0, 1.0], [0.0, np.nan], "altitude_m"),
-    ([0.0, 1.0], [0.0, 1e39], "altitude_m"),
-    ([1e6, 1e6 + 0.001], [0.0, 0.0], "time_s"),  # single precision: 0.06 s apart at a million
-])
+@pytest.mark.parametrize(
+    ("time_s", "values", "field"),
+    [
+        ([], [], "time_s"),
+        ([0.0, 1.0], [0.0, np.nan], "altitude_m"),
+        ([0.0, 1.0], [0.0, 1e39], "altitude_m"),
+        ([1e6, 1e6 + 0.001], [0.0, 0.0], "time_s"),  # single precision: 0.06 s apart at a million
+    ],
+)
 def test_what_single_precision_cannot_hold_is_refused(time_s: list[float], values: list[float], field: str) -> None:
     trajectory = Trajectory(np.array(time_s), {"altitude_m": np.array(values)}, "test", "vehicle")
     with pytest.raises(TrajectoryError) as caught:

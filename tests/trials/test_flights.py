@@ -40,7 +40,8 @@ def test_a_claimed_flight_carries_everything_that_the_worker_needs(client: TestC
 
 
 def test_a_landed_flight_is_scored_as_it_is_stored_and_classed_by_the_program(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     create_trial(client, campaign["id"], fly={"speed": None})
     land(database, lift_off(database), create_record(1.0))
@@ -73,8 +74,18 @@ def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient
 
 def claim_task(database: Database) -> flights.FlightTask:
     """The task of the only flight, which runs."""
-    return flights.FlightTask(flight_id=1, trial_id=1, campaign_id=1, experiment="takeoff", vehicle_kind="twin",
-                              vehicle_options={}, safe_gains={}, gains={}, seed=0, speed=None)
+    return flights.FlightTask(
+        flight_id=1,
+        trial_id=1,
+        campaign_id=1,
+        experiment="takeoff",
+        vehicle_kind="twin",
+        vehicle_options={},
+        safe_gains={},
+        gains={},
+        seed=0,
+        speed=None,
+    )
 
 
 def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, database: Database) -> None:
@@ -96,7 +107,8 @@ def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, databa
 
 
 def test_an_aborted_flight_keeps_its_record_and_is_history_without_an_error(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     land(database, lift_off(database), create_record(ending="aborted", reason="too close to the wall", until_s=4.0))
@@ -119,7 +131,8 @@ def test_an_abort_before_the_first_sample_is_aborted_too(client: TestClient, dat
 
 
 def test_a_worker_that_died_leaves_a_lost_flight_that_is_not_flown_again(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     lift_off(database)
@@ -168,7 +181,8 @@ def test_a_landing_reported_twice_counts_once(client: TestClient, database: Data
 
 
 def test_a_flight_of_a_real_vehicle_waits_for_a_person_and_blocks_the_next(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     make_vehicle_real(database)
     trial = create_flown_trial(client, database, campaign["id"])
@@ -179,15 +193,17 @@ def test_a_flight_of_a_real_vehicle_waits_for_a_person_and_blocks_the_next(
     assert get(client, f"/api/campaigns/{campaign['id']}")["next_action"] == "Say whether flight 1 counts"
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": DEFAULT_GAINS})
     assert (answer.status_code, answer.json()["detail"]) == (409, "Flight 1 waits for its class.")
-    said = client.post(f"/api/trials/{trial['id']}/classify",
-                       json={"version": 1, "outcome": "valid", "reason": "a clean flight"})
+    said = client.post(
+        f"/api/trials/{trial['id']}/classify", json={"version": 1, "outcome": "valid", "reason": "a clean flight"}
+    )
     assert said.json()["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
     run_jobs(database)
     assert get(client, f"/api/campaigns/{campaign['id']}/proposal")["state"] == "ready"
 
 
 def test_a_real_vehicle_whose_flight_was_lost_is_quarantined_until_a_person_releases_it(
-        client: TestClient, database: Database) -> None:
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database)
     make_vehicle_real(database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
@@ -201,8 +217,10 @@ def test_a_real_vehicle_whose_flight_was_lost_is_quarantined_until_a_person_rele
     assert refused.status_code == 409
     assert "quarantined" in refused.json()["detail"]
     assert client.post(f"{vehicle}/release", json={"statement": "safe gains read back by hand"}).status_code == 200
-    assert client.post(f"/api/campaigns/{campaign['id']}/trials",
-                       json={"gains": DEFAULT_GAINS, "fly": {}}).status_code == 201
+    assert (
+        client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": DEFAULT_GAINS, "fly": {}}).status_code
+        == 201
+    )
 
 
 def test_unverified_safe_gains_quarantine_even_a_vehicle_that_landed(client: TestClient, database: Database) -> None:
@@ -262,12 +280,15 @@ def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClie
 def test_a_gap_makes_a_flight_invalid_until_somebody_says_otherwise(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import")
     trial = create_trial(client, campaign["id"])
-    uploaded = client.post(f"/api/trials/{trial['id']}/trajectory", content=csv_with_a_gap(),
-                           headers={"Content-Type": "text/csv"}).json()
+    uploaded = client.post(
+        f"/api/trials/{trial['id']}/trajectory", content=csv_with_a_gap(), headers={"Content-Type": "text/csv"}
+    ).json()
     assert (uploaded["state"], uploaded["error"]) == ("invalid", None)
     assert "gap of 1.02 s after 4.980 s" in uploaded["reason"]
-    counted = client.post(f"/api/trials/{trial['id']}/classify", json={
-        "version": uploaded["version"], "outcome": "valid", "reason": "the video shows nothing odd"}).json()
+    counted = client.post(
+        f"/api/trials/{trial['id']}/classify",
+        json={"version": uploaded["version"], "outcome": "valid", "reason": "the video shows nothing odd"},
+    ).json()
     assert counted["state"] == "valid"
     # The trapezoid over the gap lies above the convex curve: at most gap³/12 · |f''| / window more.
     assert counted["error"] == pytest.approx(climb_error(1.0), rel=1e-2)

@@ -14,9 +14,13 @@ from app.vehicles.base import FlightRecord
 def record() -> FlightRecord:
     time_s = np.arange(-512, 6144) / 512.0
     return FlightRecord(
-        trajectory=Trajectory(time_s, {"altitude_m": np.sqrt(np.abs(time_s)), "thrust": np.cos(time_s)}, "twin",
-                              "simulation"),
-        ending="aborted", reason="Ordered, with an ü.", settings={"scatter": 1.0, "quiet": True})
+        trajectory=Trajectory(
+            time_s, {"altitude_m": np.sqrt(np.abs(time_s)), "thrust": np.cos(time_s)}, "twin", "simulation"
+        ),
+        ending="aborted",
+        reason="Ordered, with an ü.",
+        settings={"scatter": 1.0, "quiet": True},
+    )
 
 
 def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
@@ -28,7 +32,10 @@ def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
     kept = spool.read(7)
     assert kept.flight_id == 7
     assert (kept.record.ending, kept.record.reason, kept.record.settings) == (
-        flown.ending, flown.reason, flown.settings)
+        flown.ending,
+        flown.reason,
+        flown.settings,
+    )
     np.testing.assert_array_equal(kept.record.trajectory.time_s, flown.trajectory.time_s)
     assert list(kept.record.trajectory.channels) == ["altitude_m", "thrust"]
     for name, values in flown.trajectory.channels.items():

@@ -18,8 +18,11 @@ Act = Callable[[TestClient, Json], int]
 
 def classify(outcome: str) -> Act:
     def act(client: TestClient, trial: Json) -> int:
-        return client.post(f"/api/trials/{trial['id']}/classify", json={
-            "version": trial["version"], "outcome": outcome, "reason": "looked at it"}).status_code
+        return client.post(
+            f"/api/trials/{trial['id']}/classify",
+            json={"version": trial["version"], "outcome": outcome, "reason": "looked at it"},
+        ).status_code
+
     return act
 
 
@@ -40,19 +43,24 @@ ACTS: dict[str, Act] = {
 # record ends too early to be scored, so it cannot be made valid (422).
 POSSIBLE: dict[tuple[str, str], str] = {
     ("fly", "planned"): "planned",
-    ("cancel", "planned"): "cancelled", ("cancel", "staged"): "cancelled",
+    ("cancel", "planned"): "cancelled",
+    ("cancel", "staged"): "cancelled",
     ("upload", "lost"): "valid",
     ("class valid", "captured"): "valid",
-    ("class aborted", "captured"): "aborted", ("class aborted", "invalid"): "aborted",
-    ("class invalid", "captured"): "invalid", ("class invalid", "valid"): "invalid",
-    ("class invalid", "aborted"): "invalid", ("class invalid", "lost"): "invalid",
+    ("class aborted", "captured"): "aborted",
+    ("class aborted", "invalid"): "aborted",
+    ("class invalid", "captured"): "invalid",
+    ("class invalid", "valid"): "invalid",
+    ("class invalid", "aborted"): "invalid",
+    ("class invalid", "lost"): "invalid",
 }
 
 
 @pytest.mark.parametrize("state", TrialState)
 @pytest.mark.parametrize("act", ACTS)
 def test_a_person_can_do_what_the_state_allows_and_nothing_else(
-        client: TestClient, database: Database, act: str, state: TrialState) -> None:
+    client: TestClient, database: Database, act: str, state: TrialState
+) -> None:
     trial = create_trial_in(state, client, database)
     status = ACTS[act](client, trial)
     after = get(client, f"/api/trials/{trial['id']}")["state"]
@@ -102,11 +110,13 @@ def reachable(start: TrialState) -> set[TrialState]:
     return {start} | one | (set(MOVES[TrialState.CAPTURED]) if TrialState.CAPTURED in one else set())
 
 
-@pytest.mark.parametrize("state", [state for state in TrialState
-                                   if state not in {TrialState.PLANNED, TrialState.CANCELLED}])
+@pytest.mark.parametrize(
+    "state", [state for state in TrialState if state not in {TrialState.PLANNED, TrialState.CANCELLED}]
+)
 @pytest.mark.parametrize("step", STEPS)
 def test_no_step_of_a_worker_moves_a_trial_past_the_table(
-        client: TestClient, database: Database, step: str, state: TrialState) -> None:
+    client: TestClient, database: Database, step: str, state: TrialState
+) -> None:
     trial = create_trial_in(state, client, database)
     try:
         with database.write() as session:
