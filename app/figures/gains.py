@@ -108,7 +108,7 @@ class GainsFigure:
                 domain=[max(0.0, top - height), top],
                 anchor=_axis("x", index),
                 range=[low, high],
-                nticks=3,
+                nticks=4,
             ),
         }
 

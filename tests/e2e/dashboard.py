@@ -100,9 +100,9 @@ class Dashboard:
         assert answer.ok, answer.text()
         return answer.json()
 
-    def create(self, vehicle: str = "twin", **definition: object) -> int:
+    def create(self, vehicle: str = "twin", *, name: str = "", **definition: object) -> int:
         """A campaign whose first gains are computed."""
-        made = self.post("/campaigns", {"name": f"On {vehicle}", "vehicle": {"kind": vehicle},
+        made = self.post("/campaigns", {"name": name or f"On {vehicle}", "vehicle": {"kind": vehicle},
                                         "definition": definition})  # fmt: skip
         return self.when_ready(int(made["id"]))
 

@@ -80,8 +80,10 @@ def test_every_page_can_be_read_by_everybody_and_fits_its_screen(
 @pytest.mark.skipif(
     not os.environ.get("GAINLINE_README_IMAGE"), reason="set GAINLINE_README_IMAGE=1 to renew the image"
 )
-def test_the_image_of_the_readme_is_taken(dashboard: Dashboard, states: dict[str, str]) -> None:
-    dashboard.open(states["under-way"])
+def test_the_image_of_the_readme_is_taken(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", name="AR.Drone takeoff to 3 m, twin of the real one", seed=4)
+    dashboard.fly_headless(campaign_id, 4)
+    dashboard.open_campaign(dashboard.when_ready(campaign_id))
     when_drawn(dashboard)
     README_IMAGE.parent.mkdir(parents=True, exist_ok=True)
     clip = FloatRect(x=0, y=0, width=1024, height=1120)

@@ -37,6 +37,16 @@ export function useFlying(): FlyingCampaign[] {
 
 const AGAIN_MS = 400;
 
+/** Why the worker has not taken the abort, or null when it has. */
+async function askToAbort(trialId: number): Promise<string | null> {
+  try {
+    const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
+    return accepted ? null : sentence;
+  } catch (error) {
+    return error instanceof Error ? error.message : String(error);
+  }
+}
+
 /**
  * Abort by trial id. A press counts until the flight is over: while the worker cannot be told, it is told again.
  * `trouble` says that it has not been told yet.
@@ -48,14 +58,10 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
   inTheAir.current = new Set(flying.map(({ trialId }) => trialId));
 
   const tell = useCallback(async (trialId: number): Promise<void> => {
-    try {
-      await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
-      setTrouble(null);
-    } catch (error) {
-      if (!inTheAir.current.has(trialId)) return;
-      setTrouble(error instanceof Error ? error.message : String(error));
-      setTimeout(() => void tell(trialId), AGAIN_MS);
-    }
+    const refusal = await askToAbort(trialId);
+    const over = !inTheAir.current.has(trialId);
+    setTrouble(over ? null : refusal);
+    if (refusal !== null && !over) setTimeout(() => void tell(trialId), AGAIN_MS);
   }, []);
 
   const press = useCallback(

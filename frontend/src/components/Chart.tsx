@@ -22,12 +22,9 @@ const NARROW_PX = 420;
 const coarse = window.matchMedia("(pointer: coarse)");
 
 /** Brushing zooms with a mouse; a finger has to be able to scroll the page. */
-function layoutFor(layout: Record<string, unknown>, width: number): Record<string, unknown> {
-  return {
-    ...(width < NARROW_PX ? narrowed(layout) : layout),
-    autosize: true,
-    ...(coarse.matches ? { dragmode: false } : {}),
-  };
+function layoutFor({ data, layout }: PlotlyFigure, width: number): Record<string, unknown> {
+  const fitting = width < NARROW_PX ? narrowed(layout, data) : layout;
+  return { ...fitting, autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
 }
 
 export function Chart({ figure, label, height, liveTrial = null, onChoose }: Props) {
@@ -47,7 +44,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
         await plotly.react(
           target,
           withLive(figure.data, liveNow(liveTrial)),
-          layoutFor(figure.layout, target.clientWidth),
+          layoutFor(figure, target.clientWidth),
           CONFIG,
         );
         target.removeAllListeners?.("plotly_click");

@@ -55,7 +55,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
         )}
         <div className={classes["clone"]}>
           <Select
-            label="The same settings again, on"
+            label="Same settings again, on"
             allowDeselect={false}
             data={kinds.map(({ name, title }) => ({ value: name, label: title }))}
             value={vehicle}

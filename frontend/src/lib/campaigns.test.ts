@@ -6,7 +6,7 @@ const summary = (best: number | null, first: number | null, flights: number): Ca
   ({ best: best === null ? null : { error: best }, first_error: first, flights }) as unknown as CampaignSummary;
 
 test("progress is told against the first flight", () => {
-  expect(progress(summary(0.0933, 0.3267, 5))).toBe("−71 % on flight 1");
+  expect(progress(summary(0.0933, 0.3267, 5))).toBe("−71 % on the first");
   expect(progress(summary(0.3267, 0.3267, 3))).toBe("no flight better than the first");
 });
 

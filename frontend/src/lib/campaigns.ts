@@ -28,5 +28,5 @@ export function progress({ best, first_error, flights }: CampaignSummary): strin
   const change = percentChange(best?.error, first_error);
   if (best === null || change === null || flights < 2) return null;
   if (change === 0) return "no flight better than the first";
-  return `${signed(change)} % on flight 1`;
+  return `${signed(change)} % on the first`;
 }

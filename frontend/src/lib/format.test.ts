@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { count, gainText, NOTHING, percentChange, signed, utcTime, withUnit } from "./format";
+import { count, gainText, localTime, NOTHING, percentChange, signed, utcTime, withUnit } from "./format";
 
 test("an error is printed to the millimetre, with its unit", () => {
   expect(withUnit(0.13189333802782058, "m")).toBe("0.132 m");
@@ -26,6 +26,13 @@ test("whole gains stay whole and others are short", () => {
 
 test("a time can be read in UTC", () => {
   expect(utcTime("2026-11-02T10:00:00.123+01:00")).toBe("2026-11-02 09:00:00 UTC");
+});
+
+test("a local time names the year only when it is another one", () => {
+  const at = "2026-07-02T12:00:00Z";
+  expect(localTime(at, new Date("2026-12-01T00:00:00Z"))).not.toContain("2026");
+  expect(localTime(at, new Date("2027-12-01T00:00:00Z"))).toContain("2026");
+  expect(localTime(null)).toBe(NOTHING);
 });
 
 test("one flight is singular", () => {

@@ -25,9 +25,12 @@ export function gainText(value: number): string {
   return Number.isInteger(value) ? String(value) : String(Number(value.toFixed(4)));
 }
 
-export function localTime(iso: string | null | undefined): string {
+/** Date and time here; the year only when it is not this one. */
+export function localTime(iso: string | null | undefined, now: Date = new Date()): string {
   if (!iso) return NOTHING;
-  return new Date(iso).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+  const at = new Date(iso);
+  const year = at.getFullYear() === now.getFullYear() ? {} : ({ year: "numeric" } as const);
+  return at.toLocaleString(undefined, { ...year, month: "short", day: "numeric", hour: "numeric", minute: "2-digit" });
 }
 
 export function utcTime(iso: string): string {

@@ -56,11 +56,17 @@ export function clickedTrial(traces: readonly Trace[], curveNumber: number): num
   return meta?.role === "flight" || meta?.role === "off scale" ? (meta.trial ?? null) : null;
 }
 
-/** The same layout for a narrow screen: a smaller legend in two columns. */
-export function narrowed(layout: Record<string, unknown>): Record<string, unknown> {
+const LETTER_PX = 5;
+
+/** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
+export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {
+  const longest = Math.max(0, ...traces.map(({ name }) => (typeof name === "string" ? name.length : 0)));
   const legend = typeof layout["legend"] === "object" && layout["legend"] !== null ? layout["legend"] : {};
   const font = "font" in legend && typeof legend.font === "object" ? legend.font : {};
-  return { ...layout, legend: { ...legend, font: { ...font, size: 11 }, entrywidth: 96, entrywidthmode: "pixels" } };
+  return {
+    ...layout,
+    legend: { ...legend, font: { ...font, size: 11 }, entrywidth: LETTER_PX * longest, entrywidthmode: "pixels" },
+  };
 }
 
 /** The top of an axis that a growing curve still fits under: `range` itself, or raised to the curve's peak. */

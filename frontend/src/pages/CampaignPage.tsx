@@ -60,6 +60,9 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
   const choose = useCallback((number: number) => setChosen((before) => (before === number ? null : number)), []);
   return (
     <>
+      <p className="visually-hidden" role="status">
+        {campaign.flying ? `Flight ${campaign.flying.trial_number} is under way.` : (trials.at(-1)?.verdict ?? "")}
+      </p>
       <CampaignHeader campaign={campaign} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
         <div className={classes["flown"]}>
