@@ -19,7 +19,7 @@ from app.core.policy import PolicySpace
 from app.core.proposing import next_proposal
 from app.core.stopping import Reason, StopVerdict, verdict
 from app.core.strategies.base import Proposal
-from app.db.models import CampaignRow, ProposalRow, TrialRow
+from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.errors import ConflictError, NotFoundError
 from app.jobs import service as jobs
 from app.moves import check_move
@@ -157,6 +157,6 @@ def space_of(definition: Definition) -> PolicySpace:
     return get_experiment(definition.experiment).space.narrowed(definition.bounds)
 
 
-def gate_json(gate: Gate) -> dict[str, object]:
+def gate_json(gate: Gate) -> JsonObject:
     """The gate's answer as it is stored."""
     return {"passed": gate.passed, "checks": [asdict(check) for check in gate.checks]}

@@ -13,10 +13,10 @@ from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.core.definition import flight_seed
 from app.core.errors import GainsError, InputError, Problem
 from app.core.experiments import get_experiment
-from app.core.gate import Gate, check_policy
+from app.core.gate import check_policy
 from app.core.policy import Gains
 from app.core.trajectory import Trajectory
-from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, JsonObject, ProposalRow, TrialRow
 from app.db.types import utc_now
 from app.errors import BusyError, ConflictError
 from app.fleet import service as fleet
@@ -50,19 +50,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
     """
     campaign = campaigns.get_row(session, campaign_id)
     _require_open(session, campaign)
-    proposal = None
-    if new.proposal_id is not None and new.gains is None:
-        proposal = proposing.fresh_proposal(session, campaign, new.proposal_id)
-        asked: Gains = proposal.gains
-    elif new.gains is not None and new.proposal_id is None:
-        asked = new.gains
-    else:
-        raise InputError(
-            "A trial flies a proposal or gains of one's own.",
-            hint="Send exactly one of the two.",
-            problems=(Problem("proposal_id", "or gains, exactly one of the two, must be given"),),
-        )
-    gains, gate = _through_the_gate(session, campaign, asked)
+    gains, gate, proposal = _chosen(session, campaign, new)
     number = repository.next_number(session, campaign_id)
     row = TrialRow(
         campaign_id=campaign_id,
@@ -72,7 +60,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
         kind=_kind(session, campaign, gains, proposal),
         proposal_id=None if proposal is None else proposal.id,
         predicted_error=None if proposal is None else proposal.predicted_error,
-        gate=proposing.gate_json(gate),
+        gate=gate,
         note=new.note,
         seed=flight_seed(definition_of(campaign).seed, number),
     )
@@ -89,8 +77,7 @@ def fly_trial(session: Session, trial_id: int, order: FlightOrder) -> Trial:
     check_action(ACTIONS, "fly", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     _require_open(session, campaign)
-    _, gate = _through_the_gate(session, campaign, row.gains)
-    row.gate = proposing.gate_json(gate)
+    _, row.gate = _through_the_gate(session, campaign, row.gains)
     _request_flight(session, campaign, row, order)
     return trial_view(session, campaign, row)
 
@@ -228,20 +215,40 @@ def _require_open(session: Session, campaign: CampaignRow) -> None:
         )
 
 
-def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], Gate]:
+def _chosen(
+    session: Session, campaign: CampaignRow, new: NewTrial
+) -> tuple[dict[str, float], JsonObject, ProposalRow | None]:
+    """Gains that have passed the gate, its answer, and the proposal that they are from, if they are from one."""
+    if new.gains is not None and new.proposal_id is None:
+        return *_through_the_gate(session, campaign, new.gains), None
+    if new.proposal_id is None or new.gains is not None:
+        raise InputError(
+            "A trial flies a proposal or gains of one's own.",
+            hint="Send exactly one of the two.",
+            problems=(Problem("proposal_id", "or gains, exactly one of the two, must be given"),),
+        )
+    proposal = proposing.fresh_proposal(session, campaign, new.proposal_id)
+    _require_passed(proposal.gate)  # it was judged on this very history
+    return proposal.gains, proposal.gate, proposal
+
+
+def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], JsonObject]:
     """The gains, complete and in order, with the gate's answer. Raises GainsError naming what was refused."""
     definition = definition_of(campaign)
     space = proposing.space_of(definition)
     gains = space.check(asked)
     flown = history.flown_gains(history.trials_of(session, campaign.id))
-    gate = check_policy(definition, get_experiment(campaign.experiment), space, gains, flown)
-    if not gate.passed:
-        raise GainsError(
-            "The gate refuses these gains.",
-            hint="Choose gains nearer to what has flown.",
-            problems=tuple(Problem("gains", check.sentence) for check in gate.checks if not check.passed),
-        )
+    gate = proposing.gate_json(check_policy(definition, get_experiment(campaign.experiment), space, gains, flown))
+    _require_passed(gate)
     return gains, gate
+
+
+def _require_passed(gate: JsonObject) -> None:
+    refusals = tuple(Problem("gains", check["sentence"]) for check in gate["checks"] if not check["passed"])
+    if refusals:
+        raise GainsError(
+            "The gate refuses these gains.", hint="Choose gains nearer to what has flown.", problems=refusals
+        )
 
 
 def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None) -> TrialKind:

@@ -1,0 +1,47 @@
+"""Vehicles: registered when first wanted, with their safe gains, and a ledger of every gain set that they were given."""
+
+from fastapi.testclient import TestClient
+
+from app.db.session import Database
+from tests.builders import create_campaign, create_flown_trial, create_ready_campaign, get
+
+DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def test_a_vehicle_is_registered_when_the_first_campaign_wants_it(client: TestClient) -> None:
+    assert get(client, "/api/vehicles") == []
+    first, second = create_campaign(client), create_campaign(client)
+    assert first["vehicle"]["id"] == second["vehicle"]["id"]
+    (vehicle,) = get(client, "/api/vehicles")
+    assert (vehicle["kind"], vehicle["state"], vehicle["is_real"]) == ("twin", "ready", False)
+    assert vehicle["safe_gains"] == DEFAULT_GAINS
+    assert vehicle["actions"] == ["fly"]
+
+
+def test_a_vehicle_that_flies_elsewhere_cannot_be_flown(client: TestClient) -> None:
+    vehicle = create_campaign(client, vehicle="import")["vehicle"]
+    assert (vehicle["can_fly"], vehicle["state"]) == (False, "disconnected")
+    assert get(client, f"/api/vehicles/{vehicle['id']}")["actions"] == []
+
+
+def test_the_options_of_a_vehicle_belong_to_the_campaign(client: TestClient) -> None:
+    def with_scatter(scatter: float) -> object:
+        return {"name": "Test", "vehicle": {"kind": "twin", "options": {"scatter": scatter}}}
+
+    calm, windy = (client.post("/api/campaigns", json=with_scatter(scatter)).json() for scatter in (0.0, 2.0))
+    assert calm["vehicle"]["options"]["scatter"] == 0.0
+    assert windy["vehicle"]["options"]["scatter"] == 2.0
+    assert set(calm["vehicle"]["options"]) == set(windy["vehicle"]["options"])
+
+
+def test_the_ledger_lists_what_was_asked_and_what_was_read_back(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 3}})
+    flown = [create_flown_trial(client, database, campaign["id"], settling_s) for settling_s in (3.0, 2.0, 1.0)]
+    path = f"/api/vehicles/{campaign['vehicle']['id']}/ledger"
+    first = get(client, f"{path}?limit=2")
+    rest = get(client, f"{path}?limit=2&cursor={first['next_cursor']}")
+    lines = first["items"] + rest["items"]
+    assert (first["total"], rest["next_cursor"]) == (3, None)
+    assert [line["trial_id"] for line in lines] == [trial["id"] for trial in flown[::-1]]
+    assert [line["asked"] for line in lines] == [trial["gains"] for trial in flown[::-1]]
+    assert all(line["asked"] == line["read_back"] and line["outcome"] == "landed" for line in lines)
