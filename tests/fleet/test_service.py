@@ -1,4 +1,4 @@
-"""Vehicles: registered when first wanted, with their safe gains, and a ledger of every gain set that they were given."""
+"""Vehicles: registered when first wanted, with safe gains, and a ledger of every gain set that they were given."""
 
 from fastapi.testclient import TestClient
 
