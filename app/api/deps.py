@@ -12,7 +12,6 @@ from app.db.idempotency import carry_out_once
 from app.db.session import Database
 from app.errors import MediaTypeError
 from app.live.link import Live as LiveLink
-from app.settings import Settings
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -30,23 +29,20 @@ IdempotencyKey = Annotated[
 ]
 
 
-def _database(request: Request) -> Database:
+# These are coroutines so that they need no thread: with every thread waiting for the database, an abort still passes.
+
+
+async def _database(request: Request) -> Database:
     database: Database = request.app.state.database
     return database
 
 
-def _settings(request: Request) -> Settings:
-    settings: Settings = request.app.state.settings
-    return settings
-
-
-def _live(request: Request) -> LiveLink:
+async def _live(request: Request) -> LiveLink:
     live: LiveLink = request.app.state.live
     return live
 
 
 CurrentDatabase = Annotated[Database, Depends(_database)]
-CurrentSettings = Annotated[Settings, Depends(_settings)]
 Live = Annotated[LiveLink, Depends(_live)]
 
 
@@ -93,7 +89,7 @@ async def _once(request: Request, database: CurrentDatabase, key: IdempotencyKey
 Act = Annotated[Once, Depends(_once)]
 
 
-def json_only(request: Request) -> None:
+async def json_only(request: Request) -> None:
     """Refuse a body that is not JSON with a sentence about it, rather than with a list of missing fields."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     has_body = request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers

@@ -1,0 +1,64 @@
+"""An abort goes straight to the worker, whatever the database is doing."""
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+from sqlalchemy.pool import QueuePool
+
+from app.db.session import Database
+from app.live.address import live_address
+from app.live.messages import WorkerHello
+from app.live.server import LiveServer
+from app.settings import Settings
+from tests.builders import get
+
+THREADS_OF_A_SERVER = 40
+
+
+def hello() -> WorkerHello:
+    return WorkerHello(pid=os.getpid(), version="test", flying=[7])
+
+
+def wait_until(seen: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 20.0
+    while not seen():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+
+
+def connections_in_use(database: Database) -> int:
+    pool = database.engine.pool
+    assert isinstance(pool, QueuePool)
+    return pool.checkedout()
+
+
+def test_an_abort_passes_while_every_thread_waits_for_the_database(
+    client: TestClient, database: Database, settings: Settings
+) -> None:
+    heard: list[tuple[int, str]] = []
+
+    def abort(trial_id: int, reason: str) -> bool:
+        heard.append((trial_id, reason))
+        return True
+
+    with (
+        LiveServer(live_address(settings.data_dir), abort=abort, hello=hello),
+        ThreadPoolExecutor(THREADS_OF_A_SERVER + 10) as people,
+    ):
+        wait_until(lambda: get(client, "/api/health")["worker"] == "running")
+        with database.write() as session:
+            session.execute(text("SELECT 1"))  # from here on the write lock is ours
+            waiting = [
+                people.submit(client.post, "/api/campaigns", json={"name": "Patience"})
+                for _ in range(THREADS_OF_A_SERVER + 10)
+            ]
+            wait_until(lambda: connections_in_use(database) > THREADS_OF_A_SERVER)
+            answer = client.post("/api/trials/7/abort", json={"reason": "too close"})
+            assert (answer.status_code, answer.json()["accepted"]) == (202, True)
+            assert not any(future.done() for future in waiting)
+    assert heard == [(7, "too close")]
+    assert {future.result().status_code for future in waiting} == {201}
