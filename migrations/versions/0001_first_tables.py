@@ -10,6 +10,18 @@ depends_on = None
 
 
 def upgrade() -> None:
+    create_event()
+    create_idempotency_key()
+    create_trajectory()
+    create_vehicle()
+    create_campaign()
+    create_job()
+    create_proposal()
+    create_trial()
+    create_flight()
+
+
+def create_event() -> None:
     op.create_table(
         "event",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -20,6 +32,9 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("id", name="pk_event"),
         sqlite_autoincrement=True,
     )
+
+
+def create_idempotency_key() -> None:
     op.create_table(
         "idempotency_key",
         sa.Column("key", sa.String(), nullable=False),
@@ -30,6 +45,8 @@ def upgrade() -> None:
     )
     op.create_index("ix_idempotency_key_created_at", "idempotency_key", ["created_at"], unique=False)
 
+
+def create_trajectory() -> None:
     op.create_table(
         "trajectory",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -45,6 +62,13 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("id", name="pk_trajectory"),
         sqlite_autoincrement=True,
     )
+    op.execute("""
+        CREATE TRIGGER trajectory_is_immutable BEFORE UPDATE ON trajectory
+        BEGIN SELECT RAISE(ABORT, 'a stored trajectory is never changed'); END
+    """)
+
+
+def create_vehicle() -> None:
     op.create_table(
         "vehicle",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -62,6 +86,9 @@ def upgrade() -> None:
         sa.UniqueConstraint("kind", name="uq_vehicle_kind"),
         sqlite_autoincrement=True,
     )
+
+
+def create_campaign() -> None:
     op.create_table(
         "campaign",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -95,6 +122,8 @@ def upgrade() -> None:
     op.create_index("ix_campaign_updated_at_id", "campaign", ["updated_at", "id"], unique=False)
     op.create_index("ix_campaign_vehicle_id", "campaign", ["vehicle_id"], unique=False)
 
+
+def create_job() -> None:
     op.create_table(
         "job",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -121,6 +150,8 @@ def upgrade() -> None:
     op.create_index("ix_job_campaign_id", "job", ["campaign_id"], unique=False)
     op.create_index("ix_job_state_id", "job", ["state", "id"], unique=False)
 
+
+def create_proposal() -> None:
     op.create_table(
         "proposal",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -144,6 +175,8 @@ def upgrade() -> None:
     )
     op.create_index("ix_proposal_campaign_id", "proposal", ["campaign_id"], unique=False)
 
+
+def create_trial() -> None:
     op.create_table(
         "trial",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -187,6 +220,8 @@ def upgrade() -> None:
     op.create_index("ix_trial_campaign_id_state_error", "trial", ["campaign_id", "state", "error"], unique=False)
     op.create_index("ix_trial_proposal_id", "trial", ["proposal_id"], unique=False)
 
+
+def create_flight() -> None:
     op.create_table(
         "flight",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -225,10 +260,6 @@ def upgrade() -> None:
         sqlite_where=sa.text("state IN ('requested', 'running')"),
         postgresql_where=sa.text("state IN ('requested', 'running')"),
     )
-    op.execute("""
-        CREATE TRIGGER trajectory_is_immutable BEFORE UPDATE ON trajectory
-        BEGIN SELECT RAISE(ABORT, 'a stored trajectory is never changed'); END
-    """)
 
 
 def downgrade() -> None:
