@@ -69,7 +69,7 @@ class FlightFigure:
             )
         }
         if inputs:
-            axes["yaxis2"] = theme.titled(palette, "Share of full thrust", domain=[0.0, 0.28], nticks=4)
+            axes["yaxis2"] = theme.titled(palette, "Thrust (of full)", domain=[0.0, 0.28], nticks=4)
         layout = theme.layout(
             palette,
             uirevision="flight",

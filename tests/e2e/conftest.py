@@ -142,6 +142,11 @@ def _watch(page: Page, url: str, wrong: list[str]) -> None:
         if parts.scheme in {"http", "https", "ws", "wss"} and parts.netloc != own:
             wrong.append(f"request to another host: {address}")
 
+    def heed(text: str) -> None:
+        if "Content Security Policy" in text or "Warning:" in text:
+            wrong.append(f"console: {text}")
+
+    page.on("console", lambda message: heed(message.text))
     page.on("request", lambda request: look(request.url))
     page.on("websocket", lambda socket: look(socket.url))
 

@@ -38,7 +38,12 @@ export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
   return (
     <Panel
       title={`Flight ${trial.number}${isBest ? " · best so far" : ""}`}
-      tools={<StateBadge words={trialWords(trial.state)} />}
+      tools={
+        <span className={classes["when"]}>
+          <Time at={trial.flown_at} />
+          <StateBadge words={trialWords(trial.state)} />
+        </span>
+      }
     >
       <p className={classes["sentence"]}>{trial.verdict || trial.reason}</p>
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
@@ -65,18 +70,12 @@ export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
           <dt>Overshoot</dt>
           <dd>{withUnit(trial.overshoot_m, "m", 2)}</dd>
         </div>
-        <div>
+        <div className={classes["wide"]}>
           <dt>Gains</dt>
           <dd className={classes["gains"]}>
             {Object.entries(trial.gains)
               .map(([name, value]) => `${name} ${gainText(value)}`)
-              .join("  ")}
-          </dd>
-        </div>
-        <div>
-          <dt>Flown</dt>
-          <dd className={classes["gains"]}>
-            <Time at={trial.flown_at} />
+              .join(" · ")}
           </dd>
         </div>
       </dl>

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { begun, extended, telemetryFrom } from "./live";
+import { begun, extended, type LiveFlight, telemetryFrom, withFlight } from "./live";
 
 const line = JSON.stringify({
   type: "telemetry",
@@ -26,6 +26,14 @@ test("samples that come twice after a reconnect are drawn once", () => {
   const news = telemetryFrom(line);
   if (news === null) throw new Error("the line above is telemetry");
   expect(extended(extended(begun(1, 5), news), news).timeS).toEqual([0.02, 0.04]);
+});
+
+test("flights of long ago are forgotten, those under way are not", () => {
+  let flights: ReadonlyMap<number, LiveFlight> = new Map();
+  for (let trial = 1; trial <= 20; trial += 1) {
+    flights = withFlight(withFlight(flights, begun(1, trial)), begun(1, 99));
+  }
+  expect([...flights.keys()]).toEqual([14, 15, 16, 17, 18, 19, 20, 99]);
 });
 
 test("a line that is no telemetry is left alone", () => {

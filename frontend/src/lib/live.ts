@@ -1,7 +1,5 @@
 /** Telemetry of flights under way, as it came over the stream. */
 
-export const CHANNELS = ["time", "altitude", "climb rate", "set point", "reference", "thrust", "battery"] as const;
-
 export interface LiveFlight {
   campaignId: number;
   trialId: number;
@@ -17,6 +15,7 @@ export interface Telemetry {
   campaign_id: number;
   trial_id: number;
   time_s: number;
+  /** Rows of seconds, altitude, climb rate, set point, reference, share of full thrust, battery volts. */
   samples: number[][];
   error_so_far: number | null;
 }
@@ -52,6 +51,14 @@ export function extended(flight: LiveFlight, news: Telemetry): LiveFlight {
     batteryV: last?.[6] ?? flight.batteryV,
     errorSoFar: news.error_so_far ?? flight.errorSoFar,
   };
+}
+
+const KEPT = 8;
+
+/** The flights with this one put in; of many, only those that were heard of last are kept. */
+export function withFlight(flights: ReadonlyMap<number, LiveFlight>, flight: LiveFlight): Map<number, LiveFlight> {
+  const others = [...flights].filter(([trialId]) => trialId !== flight.trialId);
+  return new Map([...others.slice(1 - KEPT), [flight.trialId, flight]]);
 }
 
 function isRow(value: unknown): value is number[] {

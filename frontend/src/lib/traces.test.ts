@@ -54,7 +54,7 @@ test("an axis grows with a live curve that leaves it, and only then", () => {
 test("a narrow screen gets a smaller legend of the same colours", () => {
   const named = [{ name: "Predicted" }, { name: "To beat: 0.155" }, {}];
   expect(narrowed({ legend: { font: { color: "red", size: 12 } }, xaxis: {} }, named)).toEqual({
-    legend: { font: { color: "red", size: 11 }, entrywidth: 70, entrywidthmode: "pixels" },
+    legend: { font: { color: "red", size: 11 }, entrywidth: 5.8 * 14, entrywidthmode: "pixels" },
     xaxis: {},
   });
 });

@@ -56,7 +56,8 @@ export function clickedTrial(traces: readonly Trace[], curveNumber: number): num
   return meta?.role === "flight" || meta?.role === "off scale" ? (meta.trial ?? null) : null;
 }
 
-const LETTER_PX = 5;
+const LETTER_PX = 5.8;
+const WIDEST_PX = 92;
 
 /** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
 export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {
@@ -65,7 +66,12 @@ export function narrowed(layout: Record<string, unknown>, traces: readonly Trace
   const font = "font" in legend && typeof legend.font === "object" ? legend.font : {};
   return {
     ...layout,
-    legend: { ...legend, font: { ...font, size: 11 }, entrywidth: LETTER_PX * longest, entrywidthmode: "pixels" },
+    legend: {
+      ...legend,
+      font: { ...font, size: 11 },
+      entrywidth: Math.min(WIDEST_PX, LETTER_PX * longest),
+      entrywidthmode: "pixels",
+    },
   };
 }
 

@@ -1,7 +1,7 @@
 /** What the event stream says, kept outside of React: the state of the connection and the flights under way. */
 
 import { useSyncExternalStore } from "react";
-import { begun, extended, type LiveFlight, type Telemetry } from "../lib/live";
+import { begun, extended, type LiveFlight, type Telemetry, withFlight } from "../lib/live";
 
 export interface Connection {
   state: "connecting" | "live" | "away";
@@ -41,20 +41,12 @@ export function setConnection(change: Partial<Connection>): void {
 
 export function takeTelemetry(news: Telemetry): void {
   const known = flights.get().get(news.trial_id) ?? begun(news.campaign_id, news.trial_id);
-  flights.set(new Map(flights.get()).set(news.trial_id, extended(known, news)));
+  flights.set(withFlight(flights.get(), extended(known, news)));
 }
 
 export function takePhase(campaignId: number, trialId: number, phase: string): void {
   const known = flights.get().get(trialId) ?? begun(campaignId, trialId);
-  flights.set(new Map(flights.get()).set(trialId, { ...known, phase }));
-}
-
-/** Forget a flight once its record has been drawn. */
-export function forget(trialId: number): void {
-  if (!flights.get().has(trialId)) return;
-  const rest = new Map(flights.get());
-  rest.delete(trialId);
-  flights.set(rest);
+  flights.set(withFlight(flights.get(), { ...known, phase }));
 }
 
 export function useConnection(): Connection {

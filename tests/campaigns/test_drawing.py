@@ -1,0 +1,93 @@
+"""The figures over HTTP: what is stored is what is drawn."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.session import Database
+from tests.builders import (
+    create_climb,
+    create_flown_trial,
+    create_ready_campaign,
+    get,
+    run_jobs,
+)
+
+Json = dict[str, Any]
+
+
+def traces(client: TestClient, path: str) -> list[Json]:
+    card = get(client, path)
+    assert card["state"] == "ready", card["reason"]
+    drawn: list[Json] = card["figure"]["data"]
+    return drawn
+
+
+def trace(drawn: list[Json], role: str, **meta: object) -> Json:
+    [found] = [one for one in drawn if one["meta"].items() >= {"role": role, **meta}.items()]
+    return found
+
+
+@pytest.fixture
+def campaign_id(client: TestClient, database: Database) -> int:
+    """A campaign with two flights, the second one better."""
+    campaign = create_ready_campaign(client, database)
+    for settling_s in (2.0, 1.0):
+        create_flown_trial(client, database, campaign["id"], settling_s)
+        run_jobs(database)
+    return int(campaign["id"])
+
+
+def test_the_takeoff_curves_are_the_stored_records(client: TestClient, campaign_id: int) -> None:
+    drawn = traces(client, f"/api/campaigns/{campaign_id}/figures/takeoffs")
+    for number, settling_s in ((1, 2.0), (2, 1.0)):
+        curve = trace(drawn, "flight", trial=number)
+        flown = create_climb(settling_s)
+        np.testing.assert_allclose(curve["y"], np.interp(curve["x"], flown.time_s, flown["altitude_m"]), atol=2e-3)
+    assert trace(drawn, "flight", trial=2)["meta"]["standing"] == "best"
+    assert set(trace(drawn, "set point")["y"]) == {3.0}
+    assert trace(drawn, "reference")["y"][-1] == pytest.approx(3.0, abs=0.01)
+
+
+def test_the_prediction_of_the_next_flight_is_drawn_until_it_has_flown(client: TestClient, database: Database) -> None:
+    path = f"/api/campaigns/{create_ready_campaign(client, database)['id']}"
+    predicted = trace(traces(client, f"{path}/figures/takeoffs"), "prediction")
+    assert (predicted["name"], predicted["line"]["dash"]) == ("Flight 1, predicted", "dash")
+    assert 3.0 < max(predicted["y"]) < 4.0
+
+
+def test_errors_and_gains_are_those_of_the_trials(client: TestClient, campaign_id: int) -> None:
+    trials = get(client, f"/api/campaigns/{campaign_id}/trials")
+    measured = trace(traces(client, f"/api/campaigns/{campaign_id}/figures/errors"), "measured")
+    assert measured["y"] == pytest.approx([trial["error"] for trial in trials], abs=1e-6)
+    gains = traces(client, f"/api/campaigns/{campaign_id}/figures/gains")
+    assert trace(gains, "flown", gain="ki")["y"] == [trial["gains"]["ki"] for trial in trials]
+
+
+def test_a_flight_by_itself_is_drawn_over_the_best(client: TestClient, campaign_id: int) -> None:
+    first = get(client, f"/api/campaigns/{campaign_id}/trials")[0]
+    drawn = traces(client, f"/api/trials/{first['id']}/figure?theme=dark")
+    assert trace(drawn, "best")["name"] == "Flight 2 · best"
+    assert max(trace(drawn, "flight")["y"]) == pytest.approx(create_climb(2.0)["altitude_m"].max(), abs=1e-3)
+
+
+def test_a_campaign_that_has_not_flown_says_what_is_missing(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    card = get(client, f"/api/campaigns/{campaign['id']}/figures/errors")
+    assert (card["state"], card["figure"]) == ("waiting", None)
+    assert "first landing" in card["reason"]
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/api/campaigns/999/figures/takeoffs", 404),
+        ("/api/trials/999/figure", 404),
+        ("/api/campaigns/1/figures/pie", 422),
+        ("/api/campaigns/1/figures/takeoffs?theme=pink", 422),
+    ],
+)
+def test_a_figure_that_does_not_exist_is_refused(client: TestClient, path: str, status: int) -> None:
+    assert client.get(path).status_code == status
