@@ -14,8 +14,8 @@ FAILURES_ALLOWED: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopVerdict:
-    """Whether to stop and why. `why` is a sentence in both cases; `failures` counts the flights in a row, up to the
-    last, without enough improvement; `threshold` is the error the next flight must stay below to count as one."""
+    """Whether to stop and why. `why` is a sentence in both cases; `failures` counts the scored flights in a row, up to
+    the last, without enough improvement; `threshold` is the error the next flight must stay below to count as one."""
 
     stop: bool
     reason: Reason | None
@@ -25,7 +25,8 @@ class StopVerdict:
 
 
 def verdict(rule: StopRule, errors: Sequence[float | None], proposal_kind: Kind | None = None) -> StopVerdict:
-    """Judge the flights so far, in their order; None stands for a flight without an error (aborted).
+    """Judge the flights so far, in their order; None stands for a flight without an error (aborted): it uses up
+    budget, and says nothing about improvement.
 
     The paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the best so
     far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error improves on
@@ -34,9 +35,11 @@ def verdict(rule: StopRule, errors: Sequence[float | None], proposal_kind: Kind 
     best: float | None = None
     failures = 0
     for error in errors:
-        improves = error is not None and (best is None or error < (1.0 - rule.improvement) * best)
+        if error is None:
+            continue
+        improves = best is None or error < (1.0 - rule.improvement) * best
         failures = 0 if improves else failures + 1
-        best = error if best is None or (error is not None and error < best) else best
+        best = error if best is None else min(error, best)
     threshold = None if best is None else (1.0 - rule.improvement) * best
     reason = _reason(rule, len(errors), failures, proposal_kind)
     return StopVerdict(

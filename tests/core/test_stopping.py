@@ -43,10 +43,12 @@ def test_one_success_between_failures_resets_the_count() -> None:
     assert "one more such flight" in judged.why
 
 
-def test_an_aborted_flight_counts_as_one_that_did_not_improve() -> None:
-    assert verdict(PAPER, [0.5, None, None]).reason == "not improving"
+def test_an_aborted_flight_neither_improves_nor_fails_but_uses_up_budget() -> None:
+    assert verdict(PAPER, [0.5, None, None]).reason is None
+    assert verdict(PAPER, [0.5, 0.49, None, 0.48]).reason == "not improving"
     assert verdict(PAPER, [None, 0.5]).failures == 0
     assert verdict(PAPER, [None]).threshold is None
+    assert verdict(PAPER, [None] * 7).reason == "flight budget"
 
 
 def test_a_line_without_anything_better_ends_the_paper_rule_only() -> None:
