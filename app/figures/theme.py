@@ -101,4 +101,4 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
 
 
 def line(colour: str, width: float, dash: str = "solid") -> dict[str, object]:
-    return {"color": colour, "width": width, "dash": dash}
+    return {"color": colour, "width": width, "dash": dash, "simplify": False}
