@@ -137,6 +137,7 @@ class Worker:
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
             desk = ProposalDesk(database, pool, worker=self._name, lease_s=self._settings.lease_s)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
+            stack.callback(self._ending.ask, "the worker failed; its log says why")
             self._until_stored(deck.recover)
             self._until_stored(desk.recover)
             computing.submit(pool.run, os.getpid)

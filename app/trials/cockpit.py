@@ -48,7 +48,7 @@ class Orders:
 
 @dataclass(frozen=True, slots=True)
 class Staged:
-    """Said by the process, which then waits for TakeOff or StandDown."""
+    """Said by the process, which then waits for TakeOff or Decline."""
 
     read_back: dict[str, float]
 
@@ -59,8 +59,13 @@ class TakeOff:
 
 
 @dataclass(frozen=True, slots=True)
+class Decline:
+    """Said to the process: this flight does not take place."""
+
+
+@dataclass(frozen=True, slots=True)
 class StandDown:
-    """Said to the process: end this flight now, or do not begin it."""
+    """Said to the process at any moment: end this flight now. One that was to take off ends on the ground."""
 
     trial_id: int
     reason: str
@@ -101,7 +106,7 @@ class Cockpit:
         theirs.close()
 
     def fly(self, orders: Orders) -> Iterator[Said]:
-        """What the process says, until it is free again; the caller answers Staged by `take_off` or `stand_down`.
+        """What the process says, until it is free again; the caller answers Staged by `take_off` or `decline`.
 
         Raises VehicleError when the process dies.
         """
@@ -119,6 +124,9 @@ class Cockpit:
     def take_off(self) -> None:
         self._send(TakeOff())
 
+    def decline(self) -> None:
+        self._send(Decline())
+
     def stand_down(self, trial_id: int, reason: str) -> None:
         try:
             self._send(StandDown(trial_id, reason))
@@ -133,7 +141,7 @@ class Cockpit:
             self._process.kill()
             self._process.join()
 
-    def _send(self, message: Orders | TakeOff | StandDown) -> None:
+    def _send(self, message: Orders | TakeOff | Decline | StandDown) -> None:
         with self._sending:
             self._pipe.send(message)
 
@@ -185,8 +193,12 @@ def _fly(pipe: Connection, orders: Orders) -> None:
             open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
         ):
             pipe.send(Staged(vehicle.stage(orders.gains)))
-            if isinstance(pipe.recv(), TakeOff):
-                pipe.send(Landed(_take_off(pipe, orders, vehicle)))
+            standing_down: str | None = None
+            while not isinstance(answer := pipe.recv(), TakeOff | Decline):
+                if isinstance(answer, StandDown) and answer.trial_id == orders.trial_id:
+                    standing_down = answer.reason
+            if isinstance(answer, TakeOff):
+                pipe.send(Landed(_take_off(pipe, orders, vehicle, standing_down)))
     except GainlineError as error:
         pipe.send(Trouble(str(error), unsafe=isinstance(error, SafeGainsError)))
     except (EOFError, OSError):
@@ -195,19 +207,22 @@ def _fly(pipe: Connection, orders: Orders) -> None:
         pipe.send(Trouble(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False))
 
 
-def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle) -> FlightRecord:
+def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle, standing_down: str | None) -> FlightRecord:
     monitor = Monitor(orders.campaign_id, orders.trial_id, get_experiment(orders.experiment), pipe.send)
     monitor.phase("flying")
-    record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_abort=_listener(pipe, orders.trial_id))
+    listener = _listener(pipe, orders.trial_id, standing_down)
+    record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_abort=listener)
     monitor.flush()
     monitor.phase("landed")
     return record
 
 
-def _listener(pipe: Connection, trial_id: int) -> Callable[[], str | None]:
-    """Looks into the pipe, which takes microseconds."""
+def _listener(pipe: Connection, trial_id: int, standing_down: str | None) -> Callable[[], str | None]:
+    """Looks into the pipe, which takes microseconds, unless the flight is standing down already."""
 
     def should_abort() -> str | None:
+        if standing_down is not None:
+            return standing_down
         try:
             while pipe.poll():
                 message = pipe.recv()

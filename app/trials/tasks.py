@@ -118,6 +118,12 @@ class FlightDeck:
         except GainlineError as error:
             ended = replace(ended, problem=str(error))
             cockpit.close()
+        except Exception as error:  # noqa: BLE001 - whatever happens, the process is let go and the trial has its end
+            _log.exception("flight broken off by a mistake of the program")
+            ended = replace(
+                ended, problem=f"The program made a mistake ({type(error).__name__}); see the worker's log."
+            )
+            cockpit.close()
         else:
             self._hangar.give_back(cockpit)
         finally:
@@ -140,7 +146,7 @@ class FlightDeck:
         if ended.lifted_off:
             cockpit.take_off()
         else:
-            cockpit.stand_down(task.trial_id, ended.problem)
+            cockpit.decline()
         return ended
 
     def _orders(self, task: FlightTask) -> Orders:
@@ -207,17 +213,25 @@ class FlightDeck:
             work(session)
 
     def _recover_record(self, flight_id: int) -> None:
+        """Into the database with it; one that is damaged or refused is put aside. Raises StorageError."""
         try:
-            spooled = self._spool.read(flight_id)
-            self._store(lambda session: flights.recover_record(session, flight_id, spooled.record))
+            record = self._spool.read(flight_id).record
+        except StorageError as error:
+            self._put_aside(flight_id, error)
+            return
+        try:
+            self._store(lambda session: flights.recover_record(session, flight_id, record))
         except StorageError:
             raise
         except GainlineError as error:
-            kept_as = self._spool.set_aside(flight_id)
-            _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
+            self._put_aside(flight_id, error)
             return
         self._spool.drop(flight_id)
         _log.info("record of a lost flight recovered", flight_id=flight_id)
+
+    def _put_aside(self, flight_id: int, error: GainlineError) -> None:
+        kept_as = self._spool.set_aside(flight_id)
+        _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
 
 
 def mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None:

@@ -103,12 +103,25 @@ def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(cockpi
     assert len(only(fly(cockpit, orders(tmp_path)), Landed)) == 1
 
 
-def test_standing_down_before_lift_off_leaves_no_record(cockpit: Cockpit, tmp_path: Path) -> None:
+def test_a_declined_flight_leaves_no_record(cockpit: Cockpit, tmp_path: Path) -> None:
     heard = []
     for said in cockpit.fly(orders(tmp_path)):
         heard.append(said)
-        cockpit.stand_down(1, "not today")
+        cockpit.decline()
     assert heard == [Staged(GAINS)]
+
+
+def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(cockpit: Cockpit, tmp_path: Path) -> None:
+    heard = []
+    for said in cockpit.fly(orders(tmp_path, speed=1.0)):
+        heard.append(said)
+        if isinstance(said, Staged):
+            cockpit.stand_down(1, "not today")
+            cockpit.take_off()
+    (landed,) = only(heard, Landed)
+    assert isinstance(landed, Landed)
+    assert (landed.record.ending, landed.record.reason) == ("aborted", "not today")
+    assert landed.record.trajectory["altitude_m"].max() < 0.05
 
 
 def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
