@@ -69,8 +69,12 @@ def fly_campaign(
         number = len(trials) + 1
         proposal = next_proposal(definition, history)
         judged = _judge(definition, history, proposal)
-        if judged.stop or len(trials) >= definition.stop.max_flights:
+        if judged.stop:
             return HeadlessCampaign(trials=tuple(trials), stopped_because=judged.why)
+        if len(trials) >= definition.stop.max_flights:
+            unscored = len(trials) - len(history)
+            why = f"All {len(trials)} flights are flown; {unscored} of them could not be scored."
+            return HeadlessCampaign(trials=tuple(trials), stopped_because=why)
         _require_flyable(definition, experiment, proposal, history)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
