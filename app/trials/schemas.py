@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 from app.schemas import Gains, Gate, Number, Reason, Request, Text, Version
 from app.trials.states import FlightState, TrialKind, TrialState
 
-Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1000)]
+Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 
 
 class FlightOrder(Request):

@@ -2,8 +2,13 @@
 
 import math
 import time
+from collections.abc import Callable
+from typing import Final
 
 from app.core.errors import InputError, Problem
+
+LISTEN_EVERY_S: Final = 0.02
+"""The longest that a flight held back is deaf to an abort."""
 
 
 class Pacer:
@@ -23,10 +28,21 @@ class Pacer:
         self._speed = speed
         self._start_s = time.monotonic()
 
-    def wait_until(self, vehicle_time_s: float) -> None:
-        """Return once `vehicle_time_s` seconds of the flight may have passed."""
+    def wait_until(self, vehicle_time_s: float, should_abort: Callable[[], str | None]) -> str | None:
+        """Return None once `vehicle_time_s` seconds of the flight may have passed, or the reason of an abort at once.
+
+        `should_abort` is asked at least once, every 20 ms of wall time, and last when the time has come.
+        """
+        while True:
+            early_s = self._early_s(vehicle_time_s)
+            if early_s > 0.0:
+                time.sleep(min(early_s, LISTEN_EVERY_S))
+            if (reason := should_abort()) is not None:
+                return reason
+            if early_s <= LISTEN_EVERY_S:
+                return None
+
+    def _early_s(self, vehicle_time_s: float) -> float:
         if self._speed is None:
-            return
-        early_s = self._start_s + vehicle_time_s / self._speed - time.monotonic()
-        if early_s > 0.0:
-            time.sleep(early_s)
+            return 0.0
+        return self._start_s + vehicle_time_s / self._speed - time.monotonic()

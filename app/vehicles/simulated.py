@@ -80,10 +80,10 @@ class SimulatedVehicle:
     ) -> FlightRecord:
         """Take off to 3 m with the staged gains, holding simulated time back to the order's speed.
 
-        `should_abort` is asked every 20 ms of vehicle time. An abort ends the flight there: the safe gains are set and
-        the vehicle descends at 0.5 m/s; the record keeps both, the set point of the descent being the ground.
-        Afterwards the vehicle holds its safe gains. Raises VehicleError when nothing was staged or the simulation
-        broke down.
+        `should_abort` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. An abort ends the
+        flight there: the safe gains are set and the vehicle descends at 0.5 m/s; the record keeps both, the set point
+        of the descent being the ground. Afterwards the vehicle holds its safe gains. Raises VehicleError when nothing
+        was staged or the simulation broke down.
         """
         if not self._staged:
             raise VehicleError(
@@ -124,8 +124,7 @@ class SimulatedVehicle:
         """Fill `rows` until the manoeuvre is over; the reason of an abort, or None."""
         command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
         for first, last in _slices():
-            pacer.wait_until(first * STEP_S)
-            if (reason := should_abort()) is not None:
+            if (reason := pacer.wait_until(first * STEP_S, should_abort)) is not None:
                 return reason
             rows.append(_flown(simulation, last - first, command, TAKEOFF_ALTITUDE_M))
             on_sample(_sample(first, rows[-1][0]))
