@@ -11,6 +11,8 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 
 FEW: Final = 8
 """Up to so many flights each carries its error in print."""
+FOOT: Final = 0.05
+"""Height of the marks without an error, as a share of the axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +40,6 @@ class ErrorsFigure:
             *self._threshold(palette),
             *self._predicted(palette),
             *self._measured(palette),
-            *self._not_counted(palette),
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
         must = [flight.error for flight in history.valid[:1] if flight.error is not None]
@@ -47,6 +48,7 @@ class ErrorsFigure:
             low=0.0,
             high=max(must, default=min(flight.error or 0.0 for flight in scored)),
         )
+        traces += self._not_counted(palette, FOOT * span.high)
         traces += [_off_scale(palette, scored[index], span.high, history.error_unit) for index in span.outside]
         last = max(
             [flight.number for flight in history.flights]
@@ -83,11 +85,11 @@ class ErrorsFigure:
                 "x": [flight.number for flight in flights],
                 "y": [_rounded(flight.error) for flight in flights],
                 "cliponaxis": False,
-                "marker": {
-                    "size": [13 if flight is best else 9 for flight in flights],
-                    "color": colours,
-                    "symbol": ["star" if flight is best else "circle" for flight in flights],
-                },
+                "marker": theme.solid(
+                    colours,
+                    size=[13 if flight is best else 8 for flight in flights],
+                    symbol=["star" if flight is best else "circle" for flight in flights],
+                ),
                 "meta": {"role": "measured"},
                 "hovertemplate": f"<b>Flight %{{x}}</b><br>error {self._reading}<extra></extra>",
             }
@@ -103,16 +105,16 @@ class ErrorsFigure:
                 "text": f"{flight.error:.3f}",
                 "showarrow": False,
                 "xanchor": "left",
-                "xshift": 5,
-                "yshift": 10,
+                "xshift": 6,
+                "yshift": 13,
                 "font": {"size": 12, "color": palette.best if flight is best else palette.ink},
             }
             for flight in flights
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _not_counted(self, palette: Palette) -> list[dict[str, object]]:
-        """A cross on the axis: these flights have no error that would mean anything."""
+    def _not_counted(self, palette: Palette, height: float) -> list[dict[str, object]]:
+        """A cross at the foot, clear of the axis' numbers: these flights have no error that would mean anything."""
         flights = [flight for flight in self.history.flights if flight.outcome != "valid"]
         if not flights:
             return []
@@ -122,7 +124,7 @@ class ErrorsFigure:
                 "mode": "markers",
                 "name": "Not counted",
                 "x": [flight.number for flight in flights],
-                "y": [0.0 for _ in flights],
+                "y": [round(height, 6)] * len(flights),
                 "text": [flight.outcome for flight in flights],
                 "marker": {"size": 10, "symbol": "x-thin", "line": {"width": 2, "color": palette.bad}},
                 "meta": {"role": "not counted"},
@@ -157,7 +159,7 @@ class ErrorsFigure:
                 "type": "scatter",
                 "mode": "lines",
                 "name": f"To beat: {value:.3f}",
-                "x": [0.5, last + 1.5],
+                "x": [0.5, last + 1.95],
                 "y": [value, value],
                 "line": theme.line(palette.dim, 1.25, "dot"),
                 "meta": {"role": "threshold"},
@@ -179,7 +181,7 @@ class ErrorsFigure:
                 "name": "Predicted",
                 "x": [number for number, _ in known],
                 "y": [value for _, value in known],
-                "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+                "marker": {"size": 17, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
                 "meta": {"role": "predicted"},
                 "cliponaxis": False,
                 "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>{self._reading}<extra></extra>",

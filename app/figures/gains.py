@@ -59,11 +59,11 @@ class GainsFigure:
             "x": [flight.number for flight in flights],
             "y": [flight.gains[gain.name] for flight in flights],
             "line": {**theme.line(colour, 2), "shape": "hv"},
-            "marker": {
-                "size": [12 if flight is best else 7 for flight in flights],
-                "color": colour,
-                "symbol": ["star" if flight is best else "circle" for flight in flights],
-            },
+            "marker": theme.solid(
+                colour,
+                size=[13 if flight is best else 7 for flight in flights],
+                symbol=["star" if flight is best else "circle" for flight in flights],
+            ),
             "meta": {"role": "flown", "gain": gain.name},
             "hovertemplate": f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
         }

@@ -13,6 +13,8 @@ CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
 """Room above the set point, as a multiple of it, for the flight that is still to come."""
+ALIKE: Final = {"earlier": "Earlier flights", "invalid": "Not counted"}
+"""Standings whose flights look alike and share an entry of the legend."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
 
@@ -21,8 +23,9 @@ class TakeoffsFigure:
     """Table columns: `time_s`, `set_point`, `reference` (where known), `flight_N` for each flight with a record, and
     `prediction` (where there is one), at the seconds of `TABLE_TIMES_S`.
 
-    Every trace carries `meta`: `role` (set point, reference, flight, prediction, live, off scale) and, for flights,
-    `trial` and `standing` (best, latest, earlier, invalid). The `live` trace is empty: a page fills it while it flies.
+    Every trace carries `meta`: `role` (set point, reference, flight, legend, prediction, live, off scale) and, for
+    flights, `trial` and `standing` (best, latest, earlier, invalid). The `live` trace is empty: a page fills it while
+    it flies.
     """
 
     history: History
@@ -39,7 +42,7 @@ class TakeoffsFigure:
         points = max(60, min(CURVE_POINTS, ALL_POINTS // max(1, len(drawn))))
         traces = [self._set_point(palette), *self._reference(palette)]
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
-        traces += [*self._prediction(palette), self._live(palette)]
+        traces += [*self._legend(palette, drawn), *self._prediction(palette), self._live(palette)]
         peaks = [float(flight.curve.values.max()) for flight in drawn if flight.curve is not None]
         predicted = [] if history.proposal is None or history.proposal.curve is None else [history.proposal.curve]
         span = robust_range(
@@ -81,12 +84,6 @@ class TakeoffsFigure:
     def _flight(self, palette: Palette, flight: FlightData, points: int) -> dict[str, object]:
         assert flight.curve is not None
         standing = self._standing(flight)
-        style = {
-            "best": theme.line(palette.best, 3),
-            "latest": theme.line(palette.ink, 2),
-            "earlier": theme.line(palette.earlier, 1.25),
-            "invalid": theme.line(palette.bad, 1.25, "dot"),
-        }[standing]
         label = {
             "best": f"{flight.number} · best",
             "latest": f"{flight.number} · latest",
@@ -98,13 +95,34 @@ class TakeoffsFigure:
             f"Flight {label}",
             flight.curve,
             points,
-            line=style,
+            line=_style(palette, standing),
             legendrank=500 + flight.number,
-            showlegend=standing in {"best", "latest"} or len(self.history.flights) <= 8,
+            legendgroup=standing,
+            showlegend=standing in {"best", "latest"},
             meta={"role": "flight", "trial": flight.number, "standing": standing},
             hovertemplate=f"<b>Flight {label}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
             f"{self.history.output_unit}{error}<extra></extra>",
         )
+
+    def _legend(self, palette: Palette, drawn: list[FlightData]) -> list[dict[str, object]]:
+        """One entry for all flights that look alike, so that the legend does not grow with every flight."""
+        standings = {self._standing(flight) for flight in drawn}
+        return [
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": name,
+                "x": [None],
+                "y": [None],
+                "line": _style(palette, standing),
+                "meta": {"role": "legend", "standing": standing},
+                "legendgroup": standing,
+                "legendrank": 800,
+                "hoverinfo": "skip",
+            }
+            for standing, name in ALIKE.items()
+            if standing in standings
+        ]
 
     def _set_point(self, palette: Palette) -> dict[str, object]:
         return _trace(
@@ -199,6 +217,15 @@ class TakeoffsFigure:
 def _rounded(time_s: float, curves: list[Curve]) -> list[Cell]:
     values = [curve.at(time_s) for curve in curves]
     return [None if value is None else round(value, 4) for value in values]
+
+
+def _style(palette: Palette, standing: str) -> dict[str, object]:
+    return {
+        "best": theme.line(palette.best, 3),
+        "latest": theme.line(palette.ink, 2),
+        "earlier": theme.line(palette.earlier, 1.25),
+        "invalid": theme.line(palette.bad, 1.25, "dot"),
+    }[standing]
 
 
 def _trace(name: str, curve: Curve, points: int, **style: object) -> dict[str, object]:

@@ -96,8 +96,14 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
             "itemdoubleclick": "toggle",
         },
         "dragmode": "zoom",
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": palette.dim, "activecolor": palette.ink},
         **more,
     }
+
+
+def solid(colour: str | list[str], **more: object) -> dict[str, object]:
+    """A filled mark in full colour; Plotly makes marks of several sizes pale and rimmed unless told otherwise."""
+    return {"color": colour, "opacity": 1, "line": {"width": 0}, **more}
 
 
 def line(colour: str, width: float, dash: str = "solid") -> dict[str, object]:
