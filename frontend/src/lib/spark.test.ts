@@ -11,7 +11,16 @@ test("a curve is drawn from the lower left, its set point below the upper edge",
   ] as const;
   const scale = scaleFor([curve], 3);
   expect(scale).toEqual({ x: [0, 10], y: [0, 4.050000000000001] });
-  expect(path(curve, scale, box)).toBe("M0.0 50.0L50.0 13.0L100.0 13.0");
+  expect(path(curve, scale, box)).toBe("M0.0 50.0C16.7 37.7 33.3 13.0 50.0 13.0C66.7 13.0 83.3 13.0 100.0 13.0");
+});
+
+test("between its points a curve never goes beyond them", () => {
+  const curve = [0, 2, 3.6, 3.6, 2.9, 3].map((value, second) => [second, value] as const);
+  const drawn = path(curve, scaleFor([curve], 3), box).match(/[\d.]+ [\d.]+/g) ?? [];
+  const heights = drawn.map((pair) => Number(pair.split(" ")[1]));
+  const highest = 50 - (3.6 / 4.05) * 50;
+  expect(drawn).toHaveLength(1 + 3 * 5);
+  expect(Math.min(...heights)).toBeCloseTo(highest, 1);
 });
 
 test("a wild curve is cut at the edge instead of flattening the others", () => {

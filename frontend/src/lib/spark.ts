@@ -18,14 +18,37 @@ export function scaleFor(curves: readonly (readonly Point[])[], setPoint: number
   return { x: [Math.min(0, ...times), Math.max(1, ...times)], y: [0, 1.35 * setPoint] };
 }
 
+/** Slopes that keep a curve through `points` from overshooting them (Steffen, Astron. Astrophys. 239, 443, 1990). */
+function slopes(points: readonly Point[]): number[] {
+  const secants = points.slice(1).map(([x, y], index) => {
+    const [before, value] = points[index] ?? [x, y];
+    return { width: x - before, slope: x === before ? 0 : (y - value) / (x - before) };
+  });
+  return points.map((_, index) => {
+    const [left, right] = [secants[index - 1], secants[index]];
+    if (left === undefined || right === undefined) return (left ?? right)?.slope ?? 0;
+    if (left.slope * right.slope <= 0) return 0;
+    const mean = (left.slope * right.width + right.slope * left.width) / (left.width + right.width);
+    return Math.sign(mean) * Math.min(2 * Math.abs(left.slope), 2 * Math.abs(right.slope), Math.abs(mean));
+  });
+}
+
+/** A smooth curve through every point, as cubic Bézier pieces. */
 export function path(curve: readonly Point[], scale: Scale, box: Box): string {
   const place = (value: number, [low, high]: readonly [number, number], length: number): number =>
     (Math.min(Math.max(value, low), high) - low) * (length / (high - low));
-  return curve
-    .map(([time, value], index) => {
-      const x = place(time, scale.x, box.width).toFixed(1);
-      const y = (box.height - place(value, scale.y, box.height)).toFixed(1);
-      return `${index === 0 ? "M" : "L"}${x} ${y}`;
+  const points = curve.map(
+    ([time, value]): Point => [place(time, scale.x, box.width), box.height - place(value, scale.y, box.height)],
+  );
+  const slope = slopes(points);
+  const at = (x: number, y: number): string => `${x.toFixed(1)} ${y.toFixed(1)}`;
+  return points
+    .map(([x, y], index) => {
+      const before = points[index - 1];
+      if (before === undefined) return `M${at(x, y)}`;
+      const third = (x - before[0]) / 3;
+      const [leaving, arriving] = [slope[index - 1] ?? 0, slope[index] ?? 0];
+      return `C${at(before[0] + third, before[1] + leaving * third)} ${at(x - third, y - arriving * third)} ${at(x, y)}`;
     })
     .join("");
 }
