@@ -1,8 +1,9 @@
 import { ActionIcon, Anchor, Button, TextInput } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
-import { useState } from "react";
+import { useCallback, useState } from "react";
 import { Link } from "react-router";
 import { useRename } from "../api/mutations";
+import { useCatalogue } from "../api/queries";
 import type { Campaign } from "../api/types";
 import { count } from "../lib/format";
 import { problemOf } from "../lib/problems";
@@ -14,6 +15,7 @@ import { StateBadge } from "./StateBadge";
 /** Name, state, and the settings that proposals depend on. */
 export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const [renaming, setRenaming] = useState(false);
+  const catalogue = useCatalogue().data;
   return (
     <header className={classes["header"]}>
       <Anchor component={Link} to="/" className={classes["back"]}>
@@ -35,7 +37,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         <details className={classes["settings"]}>
           <summary>Settings</summary>
           <dl>
-            {settingsOf(campaign).map(([title, value]) => (
+            {settingsOf(campaign, catalogue).map(([title, value]) => (
               <div key={title}>
                 <dt>{title}</dt>
                 <dd>{value}</dd>
@@ -51,9 +53,11 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
 function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void }) {
   const [name, setName] = useState(campaign.name);
   const rename = useRename(campaign);
+  const focused = useCallback((input: HTMLInputElement | null) => input?.select(), []);
   return (
     <form
       className={classes["rename"]}
+      onKeyDown={(event) => event.key === "Escape" && onClose()}
       onSubmit={(event) => {
         event.preventDefault();
         rename.mutate(name, { onSuccess: onClose });
@@ -63,7 +67,7 @@ function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void
         aria-label="Name of the campaign"
         value={name}
         maxLength={120}
-        data-autofocus
+        ref={focused}
         error={problemOf(rename.error)?.detail ?? problemOf(rename.error)?.title}
         onChange={(event) => setName(event.currentTarget.value)}
       />

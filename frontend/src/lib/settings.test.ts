@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { Campaign } from "../api/types";
+import type { Campaign, Catalogue } from "../api/types";
 import { settingsOf } from "./settings";
 
 const campaign = {
@@ -14,22 +14,38 @@ const campaign = {
     step_fraction: 1,
     seed: 3,
   },
-  vehicle: { title: "JSBSim", options: { mass_kg: 0.42 } },
+  vehicle: { kind: "jsbsim", title: "JSBSim", options: { mass_kg: 0.42 } },
   definition_digest: "0123456789abcdef",
 } as unknown as Campaign;
 
+const catalogue = {
+  experiments: [{ name: "takeoff", title: "Takeoff to 3 m", gains: [{ name: "kp", unit: "counts" }] }],
+  strategies: [{ name: "gradient", title: "Gradient", options: [{ name: "scaled", title: "Scaled gains" }] }],
+  vehicle_kinds: [{ name: "jsbsim", options: [{ name: "mass_kg", title: "Mass", unit: "kg" }] }],
+} as unknown as Catalogue;
+
 test("every setting that a proposal depends on is said in words", () => {
-  const rows = Object.fromEntries(settingsOf(campaign));
+  const rows = Object.fromEntries(settingsOf(campaign, catalogue));
   expect(rows).toMatchObject({
-    "Vehicle: mass_kg": "0.42",
-    "Strategy: scaled": "false",
+    Mass: "0.42 kg",
+    Experiment: "Takeoff to 3 m",
+    Strategy: "Gradient",
+    "Scaled gains": "no",
     Start: "[400 20 100]",
-    "Bounds of kp": "0 … 2000",
+    "Bounds of kp": "0 … 2000 counts",
     "Largest step": "25 % of each range until a flight is valid, then 100 %",
     Seed: "3",
     "Frozen as": "0123456789ab",
   });
   expect(rows["Stop"]).toBe("Two flights in a row less than 5 % better than the best, or 7 flights");
+});
+
+test("until the catalogue is there, options stand under their names", () => {
+  expect(Object.fromEntries(settingsOf(campaign))).toMatchObject({
+    mass_kg: "0.42",
+    scaled: "no",
+    Experiment: "takeoff",
+  });
 });
 
 test("a draft is not frozen yet", () => {

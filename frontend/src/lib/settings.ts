@@ -1,6 +1,6 @@
 /** A campaign's settings as title and value, for people. */
 
-import type { Campaign } from "../api/types";
+import type { Campaign, Catalogue } from "../api/types";
 import { gainsInBrackets } from "./gains";
 
 const STARTS = {
@@ -9,21 +9,47 @@ const STARTS = {
   given: "Given gains",
 } as const;
 
+type Row = [title: string, value: string];
+
+interface Described {
+  name: string;
+  title: string;
+  unit?: string;
+}
+
 function percent(share: number): string {
   return `${Number((100 * share).toFixed(1))} %`;
 }
 
-export function settingsOf({ definition, vehicle, definition_digest }: Campaign): [string, string][] {
+function said(value: unknown, unit = ""): string {
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  return unit === "" ? String(value) : `${value} ${unit}`;
+}
+
+/** Options under the titles and in the units that the catalogue gives them; under their names until it is there. */
+function optionRows(options: Record<string, unknown>, known: readonly Described[] = []): Row[] {
+  return Object.entries(options).map(([name, value]) => {
+    const found = known.find((one) => one.name === name);
+    return [found?.title ?? name, said(value, found?.unit)];
+  });
+}
+
+function named(things: readonly Described[] | undefined, name: string): string {
+  return things?.find((thing) => thing.name === name)?.title ?? name;
+}
+
+export function settingsOf({ definition, vehicle, definition_digest }: Campaign, catalogue?: Catalogue): Row[] {
   const { stop, start } = definition;
-  const rows: [string, string][] = [
+  const kind = catalogue?.vehicle_kinds.find(({ name }) => name === vehicle.kind);
+  const strategy = catalogue?.strategies.find(({ name }) => name === definition.strategy);
+  const gains = catalogue?.experiments.find(({ name }) => name === definition.experiment)?.gains;
+  const unitOf = (name: string): string => gains?.find((gain) => gain.name === name)?.unit ?? "";
+  const rows: Row[] = [
     ["Vehicle", vehicle.title],
-    ...Object.entries(vehicle.options).map(([name, value]): [string, string] => [`Vehicle: ${name}`, String(value)]),
-    ["Experiment", definition.experiment],
-    ["Strategy", definition.strategy],
-    ...Object.entries(definition.options ?? {}).map(([name, value]): [string, string] => [
-      `Strategy: ${name}`,
-      String(value),
-    ]),
+    ...optionRows(vehicle.options, kind?.options),
+    ["Experiment", named(catalogue?.experiments, definition.experiment)],
+    ["Strategy", named(catalogue?.strategies, definition.strategy)],
+    ...optionRows(definition.options ?? {}, strategy?.options),
     ["Start", start?.gains ? gainsInBrackets(start.gains) : STARTS[start?.kind ?? "default"]],
     [
       "Stop",
@@ -31,10 +57,9 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign)
         ? `After ${stop.max_flights} flights`
         : `Two flights in a row less than ${percent(stop?.improvement ?? 0)} better than the best, or ${stop?.max_flights} flights`,
     ],
-    ...Object.entries(definition.bounds ?? {}).map(([name, [low, high]]): [string, string] => [
-      `Bounds of ${name}`,
-      `${low} … ${high}`,
-    ]),
+    ...Object.entries(definition.bounds ?? {}).map(
+      ([name, [low, high]]): Row => [`Bounds of ${name}`, said(`${low} … ${high}`, unitOf(name))],
+    ),
     [
       "Largest step",
       `${percent(definition.first_step_fraction ?? 0)} of each range until a flight is valid, then ${percent(definition.step_fraction ?? 0)}`,
