@@ -29,7 +29,12 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
         </div>
         <div>
           <dt>{count(flights, "flight")}</dt>
-          <dd className={classes["progress"]}>{progress(campaign) ?? " "}</dd>
+          <dd
+            className={classes["progress"]}
+            data-better={(best?.error ?? 0) < (campaign.first_error ?? 0) || undefined}
+          >
+            {progress(campaign) ?? " "}
+          </dd>
         </div>
       </dl>
       <p className={classes["next"]}>{next_action}</p>

@@ -5,7 +5,7 @@ import { useNavigate } from "react-router";
 import { useArchive, useClone } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
-import { percentChange, signed, withUnit } from "../lib/format";
+import { against, percentChange, withUnit } from "../lib/format";
 import { bestOf } from "../lib/nextStep";
 import { campaignWords } from "../lib/states";
 import classes from "./NextFlight.module.css";
@@ -43,7 +43,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             </p>
             {first && change !== null && best.id !== first.id && (
               <p>
-                {signed(change)} % on flight {first.number} ({withUnit(first.error, "m")})
+                {against(change, `flight ${first.number}`)} ({withUnit(first.error, "m")})
               </p>
             )}
           </div>

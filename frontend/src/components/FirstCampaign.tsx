@@ -36,6 +36,7 @@ export function FirstCampaign() {
       </ol>
       <Button
         size="lg"
+        classNames={{ root: classes["create"] ?? "", label: classes["createLabel"] ?? "" }}
         loading={create.isPending}
         disabled={preset === undefined}
         leftSection={<IconPlus size={22} aria-hidden />}

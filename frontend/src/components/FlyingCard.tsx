@@ -37,7 +37,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             <dd>{withUnit(live?.errorSoFar, "m")}</dd>
           </div>
           <div className={classes["reading"]}>
-            <dt>Predicted, whole flight</dt>
+            <dt>Predicted error</dt>
             <dd>{withUnit(trial?.predicted_error, "m")}</dd>
           </div>
           <div className={classes["reading"]}>

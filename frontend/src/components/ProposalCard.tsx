@@ -3,7 +3,7 @@ import { IconPencil, IconPlaneDeparture, IconRepeat } from "@tabler/icons-react"
 import { useState } from "react";
 import { type RecordUpload, useCreateTrial } from "../api/mutations";
 import type { Campaign, Proposal, Trial } from "../api/types";
-import { percentChange, signed, withUnit } from "../lib/format";
+import { against, percentChange, withUnit } from "../lib/format";
 import { bestOf, speedOf } from "../lib/nextStep";
 import { GainTable } from "./GainTable";
 import { ImportRecord } from "./ImportRecord";
@@ -104,7 +104,7 @@ function Predicted({ proposal, best }: { proposal: Proposal; best: number | null
       <span>Predicted error</span>
       <span>
         <strong>{withUnit(proposal.predicted_error, "m")}</strong>
-        {change !== null && <small>{signed(change)} % on the best</small>}
+        {change !== null && <small>{against(change, "the best")}</small>}
       </span>
     </div>
   );

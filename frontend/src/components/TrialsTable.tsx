@@ -2,6 +2,7 @@ import { IconStarFilled } from "@tabler/icons-react";
 import type { Campaign, Trial } from "../api/types";
 import { gainText, NOTHING, withUnit } from "../lib/format";
 import { trialWords, wasFlown } from "../lib/states";
+import { sentenceOf } from "../lib/verdict";
 import { StateBadge } from "./StateBadge";
 import classes from "./TrialsTable.module.css";
 
@@ -65,9 +66,7 @@ export function TrialsTable({ campaign, trials, shown, onChoose }: Props) {
                 <td className={classes["text"]}>
                   <StateBadge words={trialWords(trial.state)} />
                 </td>
-                <td className={`${classes["text"]} ${classes["verdict"]}`}>
-                  {trial.verdict || trial.reason || NOTHING}
-                </td>
+                <td className={`${classes["text"]} ${classes["verdict"]}`}>{sentenceOf(trial) || NOTHING}</td>
               </tr>
             );
           })}

@@ -3,9 +3,9 @@ import { IconDownload } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { recordCsv } from "../api/queries";
 import type { Trial } from "../api/types";
-import { gainText, withUnit } from "../lib/format";
+import { gainText, percentChange, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
-import { compared } from "../lib/verdict";
+import { bestBeforeOf, sentenceOf } from "../lib/verdict";
 import { Classify } from "./Classify";
 import { Panel } from "./Panel";
 import { StateBadge } from "./StateBadge";
@@ -20,10 +20,12 @@ interface Props {
   own?: boolean;
 }
 
-function Change({ percent }: { percent: number | null }) {
+/** `error` against `other`; two that print alike are the same. */
+function Change({ error, other }: { error: number | null; other: number | null | undefined }) {
+  const percent = percentChange(error, other);
   if (percent === null) return null;
+  if (withUnit(error, "m") === withUnit(other, "m")) return <small>the same</small>;
   const size = Math.abs(percent).toFixed(0);
-  if (size === "0") return <small>the same</small>;
   const lower = percent < 0;
   return (
     <small data-better={lower || undefined}>
@@ -34,10 +36,10 @@ function Change({ percent }: { percent: number | null }) {
 
 /** What happened in a flight: against the best before it, against its prediction, and what it counts for. */
 export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
-  const { bestBefore, againstBest, againstPrediction } = compared(trial, trials);
+  const bestBefore = bestBeforeOf(trial, trials);
   return (
     <Panel
-      title={`Flight ${trial.number}${isBest ? " · best so far" : ""}`}
+      title={`Flight ${trial.number}${isBest && trial.state === "valid" ? " · best so far" : ""}`}
       tools={
         <span className={classes["when"]}>
           <Time at={trial.flown_at} />
@@ -45,7 +47,7 @@ export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
         </span>
       }
     >
-      <p className={classes["sentence"]}>{trial.verdict || trial.reason}</p>
+      <p className={classes["sentence"]}>{sentenceOf(trial)}</p>
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
       )}
@@ -57,13 +59,13 @@ export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
         <div>
           <dt>Predicted</dt>
           <dd>
-            {withUnit(trial.predicted_error, "m")} <Change percent={againstPrediction} />
+            {withUnit(trial.predicted_error, "m")} <Change error={trial.error} other={trial.predicted_error} />
           </dd>
         </div>
         <div>
           <dt>{bestBefore ? `Best before, flight ${bestBefore.number}` : "Best before"}</dt>
           <dd>
-            {withUnit(bestBefore?.error, "m")} <Change percent={againstBest} />
+            {withUnit(bestBefore?.error, "m")} <Change error={trial.error} other={bestBefore?.error} />
           </dd>
         </div>
         <div>

@@ -1,6 +1,6 @@
 import { IconCircleCheck, IconCircleX } from "@tabler/icons-react";
 import type { Explanation, Gate } from "../api/types";
-import { gainText, withUnit } from "../lib/format";
+import { count, gainText, withUnit } from "../lib/format";
 import { gainsInBrackets } from "../lib/gains";
 import classes from "./NextFlight.module.css";
 
@@ -55,7 +55,9 @@ export function Why({ explanation, unit }: { explanation: Explanation; unit: str
 export function GateChecks({ gate }: { gate: Gate }) {
   const refused = gate.checks.filter((check) => !check.passed).length;
   const said =
-    refused === 0 ? `All ${gate.checks.length} checks passed` : `${refused} of ${gate.checks.length} checks refused`;
+    refused === 0
+      ? `${count(gate.checks.length, "check")} passed`
+      : `${refused} of ${gate.checks.length} checks refused`;
   return (
     <details className={classes["more"]} open={refused > 0}>
       <summary>{said}</summary>

@@ -6,8 +6,8 @@ const summary = (best: number | null, first: number | null, flights: number): Ca
   ({ best: best === null ? null : { error: best }, first_error: first, flights }) as unknown as CampaignSummary;
 
 test("progress is told against the first flight", () => {
-  expect(progress(summary(0.0933, 0.3267, 5))).toBe("−71 % on the first");
-  expect(progress(summary(0.3267, 0.3267, 3))).toBe("no flight better than the first");
+  expect(progress(summary(0.0933, 0.3267, 5))).toBe("71 % below the first");
+  expect(progress(summary(0.3267, 0.3267, 3))).toBe("none better yet");
 });
 
 test("one flight is no progress yet", () => {

@@ -1,7 +1,7 @@
 /** The list of campaigns: its filters, and what a card says about progress. */
 
 import type { CampaignState, CampaignSummary } from "../api/types";
-import { percentChange, signed } from "./format";
+import { against, percentChange } from "./format";
 
 export type StateFilter = "all" | "open" | "finished" | "archived";
 
@@ -27,6 +27,5 @@ export function statesFor(filter: StateFilter): CampaignState[] {
 export function progress({ best, first_error, flights }: CampaignSummary): string | null {
   const change = percentChange(best?.error, first_error);
   if (best === null || change === null || flights < 2) return null;
-  if (change === 0) return "no flight better than the first";
-  return `${signed(change)} % on the first`;
+  return change === 0 ? "none better yet" : against(change, "the first");
 }

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { count, gainText, localTime, NOTHING, percentChange, signed, utcTime, withUnit } from "./format";
+import { against, count, gainText, localTime, NOTHING, percentChange, signed, utcTime, withUnit } from "./format";
 
 test("an error is printed to the millimetre, with its unit", () => {
   expect(withUnit(0.13189333802782058, "m")).toBe("0.132 m");
@@ -11,6 +11,12 @@ test("a change has a sign, and a change too small to print has both", () => {
   expect(signed(12.4)).toBe("+12");
   expect(signed(-12.4, 1)).toBe("−12.4");
   expect(signed(0.2)).toBe("±0");
+});
+
+test("a change is told in words, and one too small to print is none", () => {
+  expect(against(-58.6, "the best")).toBe("59 % below the best");
+  expect(against(12.4, "flight 1")).toBe("12 % above flight 1");
+  expect(against(-0.3, "the best")).toBe("the same as the best");
 });
 
 test("percent against nothing is nothing", () => {

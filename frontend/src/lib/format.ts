@@ -14,6 +14,13 @@ export function percentChange(value: number | null | undefined, base: number | n
   return (100 * (value - base)) / base;
 }
 
+/** A change in percent as people say it: "59 % below the best". */
+export function against(percent: number, base: string): string {
+  const size = Math.abs(percent).toFixed(0);
+  if (size === "0") return `the same as ${base}`;
+  return `${size} % ${percent < 0 ? "below" : "above"} ${base}`;
+}
+
 export function signed(value: number, digits = 0): string {
   const text = Math.abs(value).toFixed(digits);
   if (Number(text) === 0) return `±${text}`;

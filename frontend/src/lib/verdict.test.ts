@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Trial } from "../api/types";
-import { compared, otherClasses, shownTrial } from "./verdict";
+import { bestBeforeOf, otherClasses, sentenceOf, shownTrial } from "./verdict";
 
 const trial = (number: number, state: Trial["state"], error: number | null, predicted_error: number | null = null) =>
   ({ number, state, error, predicted_error, actions: ["classify"] }) as unknown as Trial;
@@ -10,15 +10,19 @@ const glitch = trial(2, "invalid", 0.05);
 const third = trial(3, "valid", 0.1873, 0.2);
 const all = [first, glitch, third, trial(4, "planned", null)];
 
-test("a flight is compared with the best valid one before it, and with its prediction", () => {
-  const found = compared(third, all);
-  expect(found.bestBefore?.number).toBe(1);
-  expect(found.againstBest).toBeCloseTo(-42.67, 2);
-  expect(found.againstPrediction).toBeCloseTo(-6.35, 2);
+test("a flight is compared with the best valid one before it", () => {
+  expect(bestBeforeOf(third, all)?.number).toBe(1);
 });
 
 test("the first flight has nothing before it", () => {
-  expect(compared(first, all)).toEqual({ bestBefore: null, againstBest: null, againstPrediction: null });
+  expect(bestBeforeOf(first, all)).toBeNull();
+});
+
+test("an aborted flight says why, and not twice that it was aborted", () => {
+  const aborted = { ...trial(5, "aborted", null), reason: "aborted by the operator", verdict: "Aborted: …" } as Trial;
+  expect(sentenceOf(aborted)).toBe("Aborted by the operator");
+  expect(sentenceOf({ ...third, verdict: "0.187 m: …", reason: "" } as Trial)).toBe("0.187 m: …");
+  expect(sentenceOf({ ...glitch, verdict: "", reason: "Wind gust" } as Trial)).toBe("Wind gust");
 });
 
 test("the latest flight is shown until another is chosen; a plan is no flight", () => {

@@ -1,27 +1,21 @@
-/** A finished flight against the best before it and against its prediction. */
+/** What a finished flight is worth, and against what. */
 
 import type { Trial } from "../api/types";
-import { percentChange } from "./format";
 import { wasFlown } from "./states";
 
-export interface Comparison {
-  /** Lowest error of the valid flights before this one. */
-  bestBefore: Trial | null;
-  againstBest: number | null;
-  againstPrediction: number | null;
-}
-
-export function compared(trial: Trial, trials: readonly Trial[]): Comparison {
+/** The valid flight with the lowest error before this one. */
+export function bestBeforeOf(trial: Trial, trials: readonly Trial[]): Trial | null {
   const before = trials.filter((one) => one.state === "valid" && one.number < trial.number && one.error !== null);
-  const bestBefore = before.reduce<Trial | null>(
+  return before.reduce<Trial | null>(
     (best, one) => (best === null || (one.error ?? 0) < (best.error ?? 0) ? one : best),
     null,
   );
-  return {
-    bestBefore,
-    againstBest: percentChange(trial.error, bestBefore?.error),
-    againstPrediction: percentChange(trial.error, trial.predicted_error),
-  };
+}
+
+/** The verdict in a sentence, or the reason where there is none; "Aborted" stands beside it already. */
+export function sentenceOf(trial: Trial): string {
+  if (trial.state !== "aborted" || trial.reason === "") return trial.verdict || trial.reason;
+  return trial.reason.charAt(0).toUpperCase() + trial.reason.slice(1);
 }
 
 /** The flight that the page shows: the chosen one, else the latest. */

@@ -5,6 +5,7 @@ import { useCampaign, useCampaignFigure, useProposal, useTrials } from "../api/q
 import type { Campaign, Trial } from "../api/types";
 import { CampaignHeader } from "../components/CampaignHeader";
 import { FigurePanel } from "../components/FigurePanel";
+import { Missing } from "../components/Missing";
 import { NextFlightCard } from "../components/NextFlightCard";
 import { Panel } from "../components/Panel";
 import { TrialsTable } from "../components/TrialsTable";
@@ -27,7 +28,7 @@ function CampaignById({ campaignId }: { campaignId: number }) {
   useTitle(campaign.data?.name ?? "Campaign");
   const error = campaign.error ?? trials.error;
   if (campaign.data && trials.data) return <CampaignView campaign={campaign.data} trials={trials.data} />;
-  if (error) return <Trouble error={error} />;
+  if (error) return <Missing error={error} />;
   return (
     <div aria-busy="true" className={classes["columns"]}>
       <Skeleton height={480} radius="md" />

@@ -2,7 +2,7 @@ import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
 import { Link, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../api/queries";
 import { FigurePanel } from "../components/FigurePanel";
-import { Trouble } from "../components/Trouble";
+import { Missing } from "../components/Missing";
 import { useTitle } from "../components/useTitle";
 import { VerdictPanel } from "../components/VerdictPanel";
 import { GateChecks } from "../components/Why";
@@ -24,7 +24,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const trials = useTrials(campaignId).data ?? [];
   const figure = useFlightFigure(trialId, theme);
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
-  if (trial.error) return <Trouble error={trial.error} />;
+  if (trial.error) return <Missing error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
   const { number, record, gate } = trial.data;
   return (
@@ -40,8 +40,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
       <div className={classes["facts"]}>
         {record !== null && (
           <p className="numbers">
-            {record.samples} samples over {record.duration_s.toFixed(1)} s from {record.source}, on the clock of{" "}
-            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
+            {record.samples.toLocaleString()} samples over {record.duration_s.toFixed(1)} s, source {record.source},
+            clock {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
           </p>
         )}
         <GateChecks gate={gate} />
