@@ -26,7 +26,7 @@ from types import TracebackType
 from typing import Final, Self, TypeVar
 
 import httpx2
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal
 from app.core.errors import GainlineError, Problem
@@ -115,13 +115,7 @@ class Client:
 
     def campaigns(self, *, search: str = "") -> Iterator[CampaignSummary]:
         """All campaigns whose names contain `search`, the newest first, page by page as they are needed."""
-        query = {"search": search, "limit": "200"}
-        while True:
-            page = self._get("/api/campaigns", Page[CampaignSummary], query)
-            yield from page.items
-            if page.next_cursor is None:
-                return
-            query["cursor"] = page.next_cursor
+        return self._pages("/api/campaigns", Page[CampaignSummary], {"search": search})
 
     def campaign(self, campaign_id: int) -> Campaign:
         return self._get(f"/api/campaigns/{campaign_id}", Campaign)
@@ -213,8 +207,9 @@ class Client:
         """End a flight now."""
         return self._post(f"/api/trials/{trial_id}/abort", AbortAnswer)
 
-    def trials(self, campaign_id: int) -> list[Trial]:
-        return self._request("GET", f"/api/campaigns/{campaign_id}/trials", TypeAdapter(list[Trial]).validate_json)
+    def trials(self, campaign_id: int) -> Iterator[Trial]:
+        """All trials in the order of their numbers, page by page as they are needed."""
+        return self._pages(f"/api/campaigns/{campaign_id}/trials", Page[Trial], {})
 
     def trial(self, trial_id: int) -> Trial:
         return self._get(f"/api/trials/{trial_id}", Trial)
@@ -240,6 +235,15 @@ class Client:
             else NewTrial(gains=dict(gains), note=note, fly=fly)
         )
         return self._post(f"/api/campaigns/{campaign_id}/trials", Trial, asked)
+
+    def _pages(self, path: str, kind: type[Page[T]], query: Mapping[str, str]) -> Iterator[T]:
+        asked = {**query, "limit": "200"}
+        while True:
+            page = self._get(path, kind, asked)
+            yield from page.items
+            if page.next_cursor is None:
+                return
+            asked["cursor"] = page.next_cursor
 
     def _get(self, path: str, kind: type[M], query: Mapping[str, str] | None = None) -> M:
         return self._request("GET", path, kind.model_validate_json, query=query)

@@ -1,5 +1,7 @@
 """A campaign's definition on its way from a request to the core, into its row, and back."""
 
+import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Final
@@ -26,6 +28,18 @@ def core_definition(asked: DefinitionIn) -> Definition:
 def definition_of(row: CampaignRow) -> Definition:
     """The definition of a stored campaign."""
     return _ADAPTER.validate_python(row.definition)
+
+
+def frozen_digest(row: CampaignRow) -> str:
+    """SHA-256 over all that is frozen at the first flight: the definition, the vehicle with all its settings, and its
+    safe gains. Proposals carry the narrower digest of the definition alone, because they depend on nothing else."""
+    frozen = {
+        "definition": definition_of(row).digest(),
+        "vehicle": row.vehicle.kind,
+        "options": row.vehicle_options,
+        "safe_gains": row.vehicle.safe_gains,
+    }
+    return hashlib.sha256(json.dumps(frozen, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def stored(definition: Definition) -> JsonObject:

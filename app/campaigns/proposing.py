@@ -15,7 +15,7 @@ from app.campaigns.states import MOVES, CampaignState, Outcome
 from app.core.definition import Definition, Flight
 from app.core.experiments import get_experiment
 from app.core.gate import Gate, check_policy
-from app.core.policy import PolicySpace
+from app.core.policy import Gains, PolicySpace
 from app.core.proposing import next_proposal
 from app.core.stopping import Reason, StopVerdict, verdict
 from app.core.strategies.base import Proposal
@@ -24,7 +24,8 @@ from app.errors import ConflictError, NotFoundError
 from app.jobs import service as jobs
 from app.moves import check_move
 from app.trials import history
-from app.trials.lifecycle import cancel_planned
+from app.trials.lifecycle import cancel_unflown
+from app.trials.states import UNFLOWN
 
 PROPOSAL_JOB: Final = "proposal"
 _COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
@@ -33,6 +34,7 @@ _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "not improving": Outcome.CONVERGED,
     "nothing better on the line": Outcome.CONVERGED,
 }
+_UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no longer say so:"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,15 +107,19 @@ def store_proposal(session: Session, campaign_id: int, computed: Computed) -> Pr
     session.flush()
     trials = history.trials_of(session, campaign_id)
     if not is_stale(campaign, row, trials) and history.unclassed(trials) is None:
-        _let_count(campaign, trials, computed.stop_verdict)
+        _let_count(session, campaign, computed.stop_verdict)
     return row
 
 
-def _let_count(campaign: CampaignRow, trials: Sequence[TrialRow], said: StopVerdict) -> None:
+def _let_count(session: Session, campaign: CampaignRow, said: StopVerdict) -> None:
     if campaign.state == CampaignState.DRAFT:
         move_campaign(campaign, CampaignState.READY)
     elif campaign.state == CampaignState.DECIDING and said.reason is not None:
-        end_campaign(campaign, trials, _OUTCOMES[said.reason], said.why)
+        end_campaign(session, campaign, _OUTCOMES[said.reason], said.why)
+    elif campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
+        # A flight was classed anew: the end is judged again, and told as it now is.
+        campaign.outcome = None if said.reason is None else _OUTCOMES[said.reason]
+        campaign.stop_reason = said.why if said.reason is not None else f"{_UNSUPPORTED} {said.why}"
 
 
 def request_proposal(session: Session, campaign: CampaignRow) -> None:
@@ -140,11 +146,36 @@ def is_stale(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]
     return row.history_digest != history.history_digest(definition_of(campaign).digest(), trials)
 
 
-def end_campaign(campaign: CampaignRow, trials: Sequence[TrialRow], outcome: Outcome, reason: str) -> None:
-    """Finish a campaign; what was only planned is cancelled."""
+def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
+    """Give up the unflown trials of proposals that the campaign's history has overtaken."""
+    trials = history.trials_of(session, campaign.id)
+    waiting = [row for row in trials if row.state in UNFLOWN and row.proposal_id is not None]
+    proposals = repository.proposals_by_id(session, {row.proposal_id for row in waiting if row.proposal_id})
+    outdated = [row for row in waiting if row.proposal_id and is_stale(campaign, proposals[row.proposal_id], trials)]
+    reason = "its proposal is outdated: the campaign's flights have changed since"
+    cancel_unflown(outdated, history.flight_under_way(session, campaign.id), reason)
+
+
+def stored_start(session: Session, campaign: CampaignRow) -> Gains:
+    """The start gains, from the first proposal; searching them takes too long for a transaction.
+
+    Raises ConflictError while they are not known.
+    """
+    latest = repository.latest_proposal(session, campaign.id)
+    if latest is None or latest.kind != "start" or is_stale(campaign, latest, history.trials_of(session, campaign.id)):
+        raise ConflictError(
+            f"The start gains of campaign {campaign.id} are not computed yet, and gains of your own are held to them.",
+            hint="Try again in a moment; ask for the campaign's proposal to see when they are there.",
+        )
+    return latest.gains
+
+
+def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reason: str) -> None:
+    """Finish a campaign; what has not flown is cancelled."""
     move_campaign(campaign, CampaignState.FINISHED)
     campaign.outcome, campaign.stop_reason = outcome, reason
-    cancel_planned(trials, "the campaign was finished")
+    flight = history.flight_under_way(session, campaign.id)
+    cancel_unflown(history.trials_of(session, campaign.id), flight, "the campaign was finished")
 
 
 def move_campaign(row: CampaignRow, to: CampaignState) -> None:

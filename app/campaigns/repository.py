@@ -10,22 +10,14 @@ from sqlalchemy.orm import Session
 
 from app.campaigns.schemas import Sort
 from app.campaigns.states import CampaignState
-from app.db.models import CampaignRow, ProposalRow, TrialRow, VehicleRow
+from app.db.models import CampaignRow, ProposalRow, VehicleRow
 from app.db.paging import Position, instant
 from app.db.types import UtcDateTime
 from app.errors import NotFoundError
-from app.trials.states import TrialState
+from app.trials import history
 
 _NO_ERROR: Final = 1e300
 """Where campaigns without an error stand among the errors: last."""
-
-_BEST_ERROR: Final = func.coalesce(
-    select(func.min(TrialRow.error))
-    .where(TrialRow.campaign_id == CampaignRow.id, TrialRow.state == TrialState.VALID)
-    .correlate(CampaignRow)
-    .scalar_subquery(),
-    _NO_ERROR,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +35,7 @@ _ORDERS: Final[Mapping[Sort, _Order]] = {
     Sort.OLDEST: _Order(CampaignRow.id.expression, False, float),
     Sort.LATELY_CHANGED: _Order(CampaignRow.updated_at.expression, True, str, is_time=True),
     Sort.NAME: _Order(func.lower(CampaignRow.name), False, str),
-    Sort.BEST_ERROR: _Order(_BEST_ERROR, False, float),
+    Sort.BEST_ERROR: _Order(func.coalesce(history.BEST_ERROR, _NO_ERROR), False, float),
 }
 
 
@@ -99,6 +91,11 @@ def _filters(search: str, states: Collection[CampaignState], vehicles: Collectio
 
 def get_proposal_or_none(session: Session, proposal_id: int) -> ProposalRow | None:
     return session.get(ProposalRow, proposal_id)
+
+
+def proposals_by_id(session: Session, proposal_ids: Collection[int]) -> Mapping[int, ProposalRow]:
+    found = session.scalars(select(ProposalRow).where(ProposalRow.id.in_(proposal_ids)))
+    return {row.id: row for row in found}
 
 
 def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:

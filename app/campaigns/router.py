@@ -47,9 +47,11 @@ def edit_campaign(session: Writer, campaign_id: Id, body: CampaignEdit) -> Campa
 
 
 @router.delete("/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT)
-def delete_campaign(session: Writer, campaign_id: Id) -> None:
-    """Delete a campaign in which nothing has flown."""
-    service.delete_campaign(session, campaign_id)
+def delete_campaign(
+    session: Writer, campaign_id: Id, version: Annotated[int, Query(ge=1, description="the version, as last read")]
+) -> None:
+    """Delete a campaign in which no flight was begun."""
+    service.delete_campaign(session, campaign_id, version)
 
 
 @router.post("/{campaign_id}/finish")

@@ -126,7 +126,9 @@ class Campaign(BaseModel):
     outcome: Outcome | None
     stop_reason: str
     definition: Definition
-    definition_digest: Annotated[str | None, Field(description="SHA-256 of the definition, once it is frozen")]
+    definition_digest: Annotated[
+        str | None, Field(description="SHA-256 of definition and vehicle, once they are frozen")
+    ]
     vehicle: CampaignVehicle
     parent_id: int | None
     best: BestTrial | None

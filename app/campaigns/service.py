@@ -5,8 +5,8 @@ from collections.abc import Collection
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
-from app.campaigns.definitions import check_campaign, definition_of, stored
-from app.campaigns.proposing import end_campaign, move_campaign, request_proposal
+from app.campaigns.definitions import check_campaign, frozen_digest, stored
+from app.campaigns.proposing import cancel_outdated, end_campaign, move_campaign, request_proposal
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -23,13 +23,13 @@ from app.core.experiments import get_experiment
 from app.db.models import CampaignRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import BusyError
+from app.errors import BusyError, ConflictError
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 from app.moves import check_action, check_version
 from app.schemas import Page
 from app.trials import history
-from app.trials.lifecycle import cancel_planned
+from app.trials.lifecycle import cancel_unflown
 
 
 def list_campaigns(
@@ -98,15 +98,23 @@ def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Cam
         _define(session, row, edit)
     if edit.name is not None:
         row.name = edit.name
-    row.version += 1
+    if edit.model_fields_set > {"version"}:
+        row.version += 1
     return campaign_view(session, row)
 
 
-def delete_campaign(session: Session, campaign_id: int) -> None:
-    """Raises ConflictError when something has flown in it."""
+def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
+    """Raises ConflictError when a vehicle was given gains in it, or somebody has changed it meanwhile."""
     row = repository.get_one(session, campaign_id)
+    check_version(version, row.version, f"Campaign {row.id}", {})
     check_action(ACTIONS, "delete", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
+    if history.has_begun_flight(session, row.id):
+        raise ConflictError(
+            f"Campaign {row.id} stands in the ledger of {row.vehicle.title}: a flight was begun in it.",
+            hint="Keep it; the ledger lists every gain set that a vehicle was given, for ever.",
+        )
+    history.drop_unbegun_flights(session, row.id)
     predicted = [proposal.predicted for proposal in repository.proposals(session, row.id) if proposal.predicted]
     session.delete(row)
     session.flush()
@@ -119,7 +127,7 @@ def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign
     row = repository.get_one(session, campaign_id)
     check_action(ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
-    end_campaign(row, history.trials_of(session, row.id), Outcome.STOPPED, reason)
+    end_campaign(session, row, Outcome.STOPPED, reason)
     return campaign_view(session, row)
 
 
@@ -147,7 +155,7 @@ def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
 def begin_flying(row: CampaignRow) -> None:
     """A trial lifts off, or a record of one arrives: from the first one on the definition is frozen."""
     if row.definition_digest is None:
-        row.definition_digest = definition_of(row).digest()
+        row.definition_digest = frozen_digest(row)
     move_campaign(row, CampaignState.FLYING)
 
 
@@ -161,6 +169,7 @@ def end_flying(session: Session, row: CampaignRow) -> None:
 def history_changed(session: Session, row: CampaignRow) -> None:
     """A flight counts now that did not, or the other way round: everything computed from the flights is outdated."""
     row.updated_at = utc_now()
+    cancel_outdated(session, row)
     request_proposal(session, row)
 
 
@@ -196,7 +205,7 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     row.vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
     row.experiment, row.strategy = definition.experiment, definition.strategy
     row.definition, row.vehicle_options = stored(definition), options
-    cancel_planned(history.trials_of(session, row.id), "the campaign's definition was changed")
+    cancel_unflown(history.trials_of(session, row.id), None, "the campaign's definition was changed")
     request_proposal(session, row)
 
 

@@ -52,6 +52,7 @@ ACTIONS: Final[Mapping[str, frozenset[CampaignState]]] = {
     "finish": frozenset({CampaignState.DECIDING}),
     "archive": frozenset({CampaignState.FINISHED}),
     "clone": _ALL,
+    "judge": _ALL - {CampaignState.ARCHIVED},
 }
 """What a person may do with a campaign, and in which states. `define` changes definition or vehicle, `plan` adds a
-trial."""
+trial, `judge` says what a flight is worth or hands in the record of a lost one."""

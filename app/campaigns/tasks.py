@@ -54,7 +54,10 @@ class ProposalDesk:
         """The job that has waited longest, now this worker's. Raises StorageError."""
         with self._database.write() as session:
             row = jobs.claim_job(session, worker=self._worker, kinds=(proposing.PROPOSAL_JOB,), lease_s=self._lease_s)
-            if row is None or row.campaign_id is None:
+            if row is None:
+                return None
+            if row.campaign_id is None:
+                jobs.fail_job(session, row.id, GainlineError("It names no campaign.", hint=""), worker=self._worker)
                 return None
             job = Job(row.id, row.campaign_id)
         self._at_work.add(job.id)

@@ -63,7 +63,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         trials=_counts(trials),
         flying=_flying(flight, trials),
         next_action=_next_action(row, trials),
-        actions=_actions(row, flight),
+        actions=_actions(session, row, flight),
         created_at=row.created_at,
         updated_at=row.updated_at,
     )
@@ -119,13 +119,14 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
         return NextFlight(state="ready", proposal=shown, problem=None)
     if job is not None and job.state == JobState.FAILED:
         return NextFlight(state="failed", proposal=shown, problem=jobs.trouble(job))
+    cancelled = job is not None and job.state == JobState.CANCELLED
     return NextFlight(
         state="none",
         proposal=shown,
         problem=Trouble(
             title="There is no proposal for the present flights.",
-            detail="Its computation was cancelled.",
-            hint="Compute it again.",
+            detail="Its computation was cancelled." if cancelled else f"The campaign is {row.state}.",
+            hint="Compute it again." if row.state in ACTIONS["propose"] else "Clone the campaign to fly on.",
         ),
     )
 
@@ -209,9 +210,11 @@ def _next_action(row: CampaignRow, trials: Sequence[TrialRow]) -> str:
     return f"Fly the {which} trial" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"
 
 
-def _actions(row: CampaignRow, flight: FlightRow | None) -> list[str]:
-    """The states' table, without what a flight under way forbids."""
+def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> list[str]:
+    """The states' table, without what a flight under way forbids, and a begun one for ever."""
     impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
+    if history.has_begun_flight(session, row.id):
+        impossible.add("delete")
     return [action for action in allowed(ACTIONS, row.state) if action not in impossible]
 
 

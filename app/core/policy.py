@@ -17,6 +17,20 @@ _ROUNDING: Final = 1e-9  # a step of exactly the allowed fraction is allowed
 _HINT: Final = "Correct the named gains and send the set again; nothing was changed."
 
 
+def is_finite(value: float) -> bool:
+    """Also for whole numbers that no float can hold."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def shortened(value: object) -> str:
+    """What was given, in at most 40 characters."""
+    text = str(value)
+    return text if len(text) <= 40 else f"{text[:37]}…"
+
+
 @dataclass(frozen=True, slots=True)
 class Gain:
     """One tunable gain, in the controller's own counts or units; `scale` is the step that matters for it."""
@@ -30,12 +44,17 @@ class Gain:
     default: float
     integer: bool
 
+    @property
+    def span(self) -> float:
+        """Width of the range; zero for a gain that its bounds pin."""
+        return self.upper - self.lower
+
     def refusal(self, value: object) -> str | None:
         """Why `value` cannot be flown as this gain, or None when it can."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             return "must be a number"
-        if not math.isfinite(value):
-            return "must be a finite number"
+        if not is_finite(value):
+            return f"must be a finite number, got {shortened(value)}"
         if self.integer and value != int(value):
             return f"must be a whole number of counts, got {value:g}"
         if not self.lower <= value <= self.upper:
@@ -114,8 +133,11 @@ class PolicySpace:
         return np.maximum(low, self.lower), np.minimum(high, self.upper)
 
     def change(self, one: Gains, other: Gains) -> dict[str, float]:
-        """How far apart two sets are, each gain as a share of its range."""
-        return {gain.name: abs(one[gain.name] - other[gain.name]) / (gain.upper - gain.lower) for gain in self.gains}
+        """How far apart two sets are, each gain as a share of its range (of its value, where its bounds pin it)."""
+        return {
+            gain.name: abs(one[gain.name] - other[gain.name]) / (gain.span or max(abs(gain.upper), 1.0))
+            for gain in self.gains
+        }
 
     def narrowed(self, bounds: Mapping[str, tuple[float, float]]) -> "PolicySpace":
         """The same space inside tighter bounds. Raises InputError when they are reversed or reach outside."""
@@ -128,11 +150,12 @@ class PolicySpace:
             low, high = bounds.get(gain.name, (gain.lower, gain.upper))
             if gain.integer and not (float(low).is_integer() and float(high).is_integer()):
                 problems.append(Problem(f"bounds.{gain.name}", f"must be whole numbers, got {low:g} … {high:g}"))
-            elif not (gain.lower <= low < high <= gain.upper):
+            elif not (gain.lower <= low <= high <= gain.upper):
                 problems.append(
                     Problem(
                         f"bounds.{gain.name}",
-                        f"must be two rising numbers inside {gain.lower:g} … {gain.upper:g}, got {low:g} … {high:g}",
+                        f"must be two numbers, the lower first, inside {gain.lower:g} … {gain.upper:g}, "
+                        f"got {low:g} … {high:g}",
                     )
                 )
         if problems:

@@ -24,7 +24,7 @@ from app.core.strategies.base import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
 from app.fleet.states import VehicleState
 from app.jobs.states import JobState
-from app.trials.states import UNDER_WAY, FlightState, TrialKind, TrialState
+from app.trials.states import UNDER_WAY, Ending, FlightState, TrialKind, TrialState
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
 JsonObject = dict[str, Any]
@@ -149,7 +149,8 @@ class TrajectoryRow(Base):
 
 
 class TrialRow(Base, Reported):
-    """One flight of one policy. `curve` is the scored output in a few [time_s, value] pairs, for small plots."""
+    """One flight of one policy. `curve` is the scored output in a few [time_s, value] pairs, for small plots; `ending`
+    says how the record ends, whatever the trial is classed as."""
 
     __tablename__ = "trial"
     __table_args__ = (
@@ -175,6 +176,7 @@ class TrialRow(Base, Reported):
     error: Mapped[float | None]
     overshoot_m: Mapped[float | None]
     curve: Mapped[list[list[float]] | None]
+    ending: Mapped[Ending | None] = mapped_column(String)
     settings: Mapped[OptionsJson] = mapped_column(default=dict)
     reason: Mapped[str] = mapped_column(default="")
     note: Mapped[str] = mapped_column(default="")
@@ -192,7 +194,10 @@ _UNDER_WAY_SQL: Final = _is_one_of("state", sorted(UNDER_WAY))
 
 
 class FlightRow(Base, Reported):
-    """One order to a vehicle: what it was asked, written before it is sent, and what it answered."""
+    """One order to a vehicle: what it was asked, written before it is sent, and what it answered.
+
+    A line of the vehicle's ledger: while it is there, neither its trial nor its campaign can be deleted.
+    """
 
     __tablename__ = "flight"
     __table_args__ = (
@@ -208,8 +213,8 @@ class FlightRow(Base, Reported):
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
-    trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="CASCADE"), index=True)
+    campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="RESTRICT"), index=True)
+    trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="RESTRICT"), index=True)
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
     state: Mapped[FlightState] = mapped_column(_state_type(FlightState))
     gains: Mapped[GainsJson]
@@ -262,9 +267,6 @@ class JobRow(Base, Reported):
     kind: Mapped[str]
     state: Mapped[JobState] = mapped_column(_state_type(JobState))
     campaign_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
-    payload: Mapped[JsonObject] = mapped_column(default=dict)
-    progress: Mapped[float] = mapped_column(default=0.0)
-    progress_note: Mapped[str] = mapped_column(default="")
     problem: Mapped[JsonObject | None]
     attempts: Mapped[int] = mapped_column(default=0)
     worker: Mapped[str | None]

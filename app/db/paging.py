@@ -24,7 +24,7 @@ def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Posit
         found = json.loads(base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True))
         said, value, identity = found
         value = kind(value) if isinstance(value, int | float | str) and not isinstance(value, bool) else None
-    except (ValueError, TypeError, binascii.Error, RecursionError):
+    except (ValueError, TypeError, OverflowError, binascii.Error, RecursionError):
         raise _refused("is not a cursor of this list") from None
     if said != order:
         raise _refused("belongs to another order of the list")

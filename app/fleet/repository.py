@@ -20,8 +20,11 @@ def of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
     return session.scalar(select(VehicleRow).where(VehicleRow.kind == kind))
 
 
-def every(session: Session) -> Sequence[VehicleRow]:
-    return session.scalars(select(VehicleRow).order_by(VehicleRow.id)).all()
+def page(session: Session, *, after_id: int, limit: int) -> tuple[Sequence[VehicleRow], int]:
+    """The vehicles after that id, one more than `limit`, and the number of all."""
+    total = session.scalar(select(func.count(VehicleRow.id))) or 0
+    wanted = select(VehicleRow).where(VehicleRow.id > after_id).order_by(VehicleRow.id).limit(limit + 1)
+    return session.scalars(wanted).all(), total
 
 
 def flights(session: Session, vehicle_id: int, *, before_id: int | None, limit: int) -> tuple[Sequence[FlightRow], int]:

@@ -11,9 +11,9 @@ router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depe
 
 
 @router.get("")
-def list_vehicles(session: Reader) -> list[Vehicle]:
+def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None) -> Page[Vehicle]:
     """Every vehicle that a campaign has used."""
-    return service.list_vehicles(session)
+    return service.list_vehicles(session, limit=limit, cursor=cursor)
 
 
 @router.get("/{vehicle_id}")

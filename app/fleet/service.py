@@ -87,8 +87,12 @@ def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
     )
 
 
-def list_vehicles(session: Session) -> list[Vehicle]:
-    return [_view(row) for row in repository.every(session)]
+def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[Vehicle]:
+    """In the order in which they were first wanted."""
+    after = 0 if cursor is None else decode_cursor("id", cursor, float)[1]
+    rows, total = repository.page(session, after_id=after, limit=limit)
+    following = encode_cursor("id", (0, rows[limit - 1].id)) if len(rows) > limit else None
+    return Page(items=[_view(row) for row in rows[:limit]], total=total, next_cursor=following)
 
 
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:

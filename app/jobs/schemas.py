@@ -16,8 +16,6 @@ class Job(BaseModel):
     kind: str
     state: JobState
     campaign_id: int | None
-    progress: Annotated[float, Field(ge=0, le=1)]
-    progress_note: str
     problem: Trouble | None
     attempts: int
     created_at: datetime

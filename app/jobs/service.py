@@ -3,7 +3,7 @@
 For a worker: `claim_job`, then `heartbeat_job` while it computes, then `finish_job` or `fail_job`.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from datetime import timedelta
 from typing import Final
 
@@ -24,13 +24,11 @@ MAX_ATTEMPTS: Final = 3
 """A job that lost its worker so many times probably killed it, and is failed."""
 
 
-def enqueue_job(
-    session: Session, kind: str, *, campaign_id: int | None = None, payload: Mapping[str, object] | None = None
-) -> JobRow:
+def enqueue_job(session: Session, kind: str, *, campaign_id: int | None = None) -> JobRow:
     """A job that waits. One of the same kind for the same campaign that still waits serves for both."""
     if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
         return waiting
-    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, payload=dict(payload or {}))
+    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id)
     session.add(row)
     session.flush()
     return row
@@ -42,23 +40,14 @@ def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s:
         return None
     _move(row, JobState.RUNNING)
     row.worker, row.attempts = worker, row.attempts + 1
-    row.started_at, row.finished_at, row.problem, row.progress = utc_now(), None, None, 0.0
+    row.started_at, row.finished_at, row.problem = utc_now(), None, None
     row.lease_until = utc_now() + timedelta(seconds=lease_s)
     return row
 
 
-def heartbeat_job(
-    session: Session,
-    job_id: int,
-    *,
-    worker: str,
-    lease_s: float,
-    progress: float | None = None,
-    note: str | None = None,
-) -> bool:
-    """Extend the lease and tell the progress (0 … 1). False when the job is no longer this worker's: stop it."""
-    row = repository.held_by_or_none(session, job_id, worker)
-    if row is None:
+def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float) -> bool:
+    """Extend the lease. False when the job is no longer this worker's: stop it."""
+    if repository.held_by_or_none(session, job_id, worker) is None:
         return False
     # Not through the row: a heartbeat alone is no change that a browser has to hear of.
     session.execute(
@@ -67,10 +56,6 @@ def heartbeat_job(
         .values(lease_until=utc_now() + timedelta(seconds=lease_s))
         .execution_options(synchronize_session=False)
     )
-    if progress is not None:
-        row.progress = progress
-    if note is not None:
-        row.progress_note = note
     return True
 
 
@@ -80,7 +65,7 @@ def finish_job(session: Session, job_id: int, *, worker: str) -> bool:
     if row is None:
         return False
     _move(row, JobState.DONE)
-    row.progress, row.finished_at, row.lease_until = 1.0, utc_now(), None
+    row.finished_at, row.lease_until = utc_now(), None
     return True
 
 
@@ -137,7 +122,7 @@ def retry_job(session: Session, job_id: int) -> Job:
     row = repository.get_one(session, job_id)
     check_action(ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
-    row.attempts, row.problem, row.progress, row.finished_at = 0, None, 0.0, None
+    row.attempts, row.problem, row.finished_at = 0, None, None
     session.flush()
     return job_view(row)
 
@@ -148,8 +133,6 @@ def job_view(row: JobRow) -> Job:
         kind=row.kind,
         state=row.state,
         campaign_id=row.campaign_id,
-        progress=row.progress,
-        progress_note=row.progress_note,
         problem=trouble(row),
         attempts=row.attempts,
         created_at=row.created_at,
@@ -174,7 +157,7 @@ def _requeue(row: JobRow) -> int:
         )
     else:
         _move(row, JobState.QUEUED)
-        row.worker, row.lease_until, row.progress = None, None, 0.0
+        row.worker, row.lease_until = None, None
     return row.id
 
 

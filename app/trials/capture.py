@@ -24,6 +24,7 @@ def capture(
     row.trajectory = stored
     judged = score(get_experiment(campaign.experiment), history.trajectory_of(session, stored.id))
     row.overshoot_m, row.curve = judged.overshoot, judged.curve
+    row.ending = "completed" if aborted is None else "aborted"
     if aborted is not None and row.state == TrialState.FLYING:
         move_trial(row, TrialState.ABORTED, reason=aborted)
         return

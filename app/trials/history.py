@@ -24,6 +24,10 @@ FLOWN: Final = frozenset(
 """States of trials that have left the ground."""
 
 
+BEST_ERROR: Final = repository.BEST_ERROR
+"""For the list of campaigns: the lowest error of a campaign's valid trials, as an expression on its row."""
+
+
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
     """The trials of one or more campaigns, by campaign and number, without their samples."""
     return repository.of_campaigns(session, campaign_ids)
@@ -62,6 +66,16 @@ def history_digest(definition_digest: str, trials: Sequence[TrialRow]) -> str:
 def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:
     """The campaign's flight that is asked for or running."""
     return repository.flight_of_campaign_under_way(session, campaign_id)
+
+
+def has_begun_flight(session: Session, campaign_id: int) -> bool:
+    """Whether a worker has begun any flight of the campaign, so that its vehicle's ledger needs it."""
+    return repository.has_claimed_flight(session, campaign_id)
+
+
+def drop_unbegun_flights(session: Session, campaign_id: int) -> None:
+    """Flights that were asked for and withdrawn; no vehicle ever heard of them."""
+    repository.delete_unclaimed_flights(session, campaign_id)
 
 
 def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:

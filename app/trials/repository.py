@@ -1,13 +1,22 @@
 """Queries on trials, flights and trajectories."""
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import Final
 
-from sqlalchemy import func, select
+from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, joinedload, undefer
 
-from app.db.models import FlightRow, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.errors import NotFoundError
-from app.trials.states import UNDER_WAY, FlightState
+from app.trials.states import UNDER_WAY, FlightState, TrialState
+
+BEST_ERROR: Final = (
+    select(func.min(TrialRow.error))
+    .where(TrialRow.campaign_id == CampaignRow.id, TrialRow.state == TrialState.VALID)
+    .correlate(CampaignRow)
+    .scalar_subquery()
+)
+"""The lowest error of a campaign's valid trials, as an expression on the campaign's row."""
 
 
 def get_one(session: Session, trial_id: int) -> TrialRow:
@@ -25,6 +34,36 @@ def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[Tr
         .options(joinedload(TrialRow.trajectory))
         .order_by(TrialRow.campaign_id, TrialRow.number)
     ).all()
+
+
+def page(session: Session, campaign_id: int, *, after_number: int, limit: int) -> tuple[Sequence[TrialRow], int]:
+    """The trials after that number, one more than `limit`, and the number of all."""
+    total = session.scalar(select(func.count()).where(TrialRow.campaign_id == campaign_id)) or 0
+    rows = session.scalars(
+        select(TrialRow)
+        .where(TrialRow.campaign_id == campaign_id, TrialRow.number > after_number)
+        .options(joinedload(TrialRow.trajectory))
+        .order_by(TrialRow.number)
+        .limit(limit + 1)
+    ).all()
+    return rows, total
+
+
+def scored(session: Session, campaign_id: int) -> Sequence[tuple[int, float]]:
+    """Number and error of every valid trial, in their order."""
+    wanted = select(TrialRow.number, TrialRow.error).where(
+        TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
+    )
+    return [(number, error) for number, error in session.execute(wanted.order_by(TrialRow.number)) if error is not None]
+
+
+def has_claimed_flight(session: Session, campaign_id: int) -> bool:
+    wanted = select(FlightRow.id).where(FlightRow.campaign_id == campaign_id, FlightRow.claimed_at.is_not(None))
+    return session.scalar(wanted.limit(1)) is not None
+
+
+def delete_unclaimed_flights(session: Session, campaign_id: int) -> None:
+    session.execute(delete(FlightRow).where(FlightRow.campaign_id == campaign_id, FlightRow.claimed_at.is_(None)))
 
 
 def next_number(session: Session, campaign_id: int) -> int:

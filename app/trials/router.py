@@ -5,8 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from starlette.concurrency import run_in_threadpool
 
-from app.api.deps import Act, CurrentDatabase, Id, Live, Reader, Writer, json_only
+from app.api.deps import Act, CurrentDatabase, CursorText, Id, Limit, Live, Reader, Writer, json_only
 from app.api.uploads import REQUEST_BODY, Record
+from app.schemas import Page
 from app.trials import service
 from app.trials.schemas import Abort, AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial, TrialEdit
 
@@ -14,9 +15,9 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 
 
 @router.get("/campaigns/{campaign_id}/trials")
-def list_trials(session: Reader, campaign_id: Id) -> list[Trial]:
-    """All trials of a campaign, in the order of their numbers."""
-    return service.list_trials(session, campaign_id)
+def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[Trial]:
+    """The trials of a campaign, in the order of their numbers."""
+    return service.list_trials(session, campaign_id, limit=limit, cursor=cursor)
 
 
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)

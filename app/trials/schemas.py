@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.schemas import Gains, Gate, Number, Reason, Request, Text, Version
-from app.trials.states import FlightState, TrialKind, TrialState
+from app.schemas import Gains, Gate, Number, OptionValue, Reason, Request, Text, Version
+from app.trials.states import Ending, FlightState, TrialKind, TrialState
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 
@@ -48,7 +48,8 @@ class Abort(Request):
 
 
 class AbortAnswer(BaseModel):
-    """`accepted` is true when the worker has taken the abort; the flight's end is reported by its events."""
+    """`accepted` is true when the worker has taken the abort, or the flight is over without it; the flight's end is
+    reported by its events."""
 
     trial_id: int
     accepted: bool
@@ -56,14 +57,16 @@ class AbortAnswer(BaseModel):
 
 
 class RecordBrief(BaseModel):
-    """The stored record of a flight, without its samples."""
+    """The stored record of a flight, without its samples. `ending`: whether the flight was broken off."""
 
     samples: int
+    ending: Ending
     duration_s: float
     source: str
     clock: str
     channels: list[str]
-    checksum: str
+    units: dict[str, str]
+    checksum: Annotated[str, Field(description="SHA-256 of the stored samples; docs/api.md says how to verify it")]
 
 
 class FlightBrief(BaseModel):
@@ -97,6 +100,7 @@ class Trial(BaseModel):
     flight: FlightBrief | None
     seed: int
     speed: float | None
+    settings: Annotated[dict[str, OptionValue], Field(description="what the vehicle said of itself after the flight")]
     created_at: datetime
     flown_at: datetime | None
     actions: Annotated[list[str], Field(description="what may be done with it now: fly, cancel, abort, upload, …")]

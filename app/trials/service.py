@@ -1,5 +1,6 @@
 """What people and scripts do with trials. The worker's side of a flight is in `flights`."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -17,24 +18,30 @@ from app.core.gate import check_policy
 from app.core.policy import Gains
 from app.core.trajectory import Trajectory
 from app.db.models import CampaignRow, FlightRow, JsonObject, ProposalRow, TrialRow
+from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import BusyError, ConflictError
 from app.fleet import service as fleet
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.moves import check_action, check_move, check_version
+from app.schemas import Page
 from app.trials import history, repository
 from app.trials.capture import capture
 from app.trials.lifecycle import move_flight, move_trial
 from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
-from app.trials.states import ACTIONS, MOVES, FlightState, TrialKind, TrialState
+from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, FlightState, TrialKind, TrialState
 from app.trials.views import trajectory_view, trial_view, trial_views
 
 
-def list_trials(session: Session, campaign_id: int) -> list[Trial]:
-    """In the order of their numbers. Raises NotFoundError."""
-    return trial_views(session, campaigns.get_row(session, campaign_id))
+def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
+    """In the order of their numbers. Raises NotFoundError, or InputError for a cursor that is none of this list's."""
+    campaign = campaigns.get_row(session, campaign_id)
+    after = 0 if cursor is None else decode_cursor("number", cursor, float)[1]
+    rows, total = repository.page(session, campaign_id, after_number=after, limit=limit)
+    following = encode_cursor("number", (0, rows[limit - 1].number)) if len(rows) > limit else None
+    return Page(items=trial_views(session, campaign, rows[:limit]), total=total, next_cursor=following)
 
 
 def get_trial(session: Session, trial_id: int) -> Trial:
@@ -45,11 +52,11 @@ def get_trial(session: Session, trial_id: int) -> Trial:
 def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
     """Plan a trial and, with `fly`, ask for its flight.
 
-    Raises ConflictError for a stale proposal, an unclassed flight, a campaign that is over or not ready; GainsError
-    naming what the gate refuses; BusyError when the vehicle has a flight already.
+    Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
+    ready; GainsError naming what the gate refuses; BusyError when the vehicle has a flight already.
     """
     campaign = campaigns.get_row(session, campaign_id)
-    _require_open(session, campaign)
+    _require_open(session, campaign, IN_BUDGET)
     gains, gate, proposal = _chosen(session, campaign, new)
     number = repository.next_number(session, campaign_id)
     row = TrialRow(
@@ -76,14 +83,15 @@ def fly_trial(session: Session, trial_id: int, order: FlightOrder) -> Trial:
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "fly", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
-    _require_open(session, campaign)
+    _require_open(session, campaign, HISTORY)
     _, row.gate = _through_the_gate(session, campaign, row.gains)
     _request_flight(session, campaign, row, order)
     return trial_view(session, campaign, row)
 
 
 def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer:
-    """Abort a flight that no worker has begun. Raises ConflictError when there is none to abort."""
+    """Abort a flight that no worker has begun; one that is over needs none. Raises ConflictError when none was asked
+    for, or its worker does not answer."""
     row = repository.get_one(session, trial_id)
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
@@ -94,9 +102,11 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
             f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
             hint="Abort again. If a vehicle is in the air, use its own remote control now.",
         )
+    if flight is not None:
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight is over already.")
     raise ConflictError(
         f"Trial {row.number} is {row.state}: there is no flight to abort.",
-        hint="Load it again; the flight is over, or was never asked for.",
+        hint="None was asked for; load the trial again.",
     )
 
 
@@ -137,6 +147,7 @@ def classify_trial(session: Session, trial_id: int, said: Classification) -> Tri
     check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
     check_move(MOVES, row.state, outcome, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
+    check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     move_trial(row, outcome, reason=said.reason)
     row.version += 1
@@ -158,6 +169,7 @@ def import_trajectory(session: Session, trial_id: int, trajectory: Trajectory) -
     check_action(ACTIONS, "upload", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     if row.state == TrialState.LOST:
+        check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         capture(session, campaign, row, trajectory)
         campaigns.history_changed(session, campaign)
         return trial_view(session, campaign, row)
@@ -166,7 +178,7 @@ def import_trajectory(session: Session, trial_id: int, trajectory: Trajectory) -
             f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
             hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
         )
-    _require_open(session, campaign)
+    _require_open(session, campaign, HISTORY)
     campaigns.begin_flying(campaign)
     row.flown_at = utc_now()
     capture(session, campaign, row, trajectory)
@@ -205,10 +217,17 @@ def _seen(session: Session, row: TrialRow) -> Trial:
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
 
-def _require_open(session: Session, campaign: CampaignRow) -> None:
-    """Raises ConflictError unless the campaign can take another trial now."""
+def _require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
+    """Raises ConflictError unless the campaign can take another trial now; those in `spent_by` use up its budget."""
     check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
-    if (waiting := history.unclassed(history.trials_of(session, campaign.id))) is not None:
+    trials = history.trials_of(session, campaign.id)
+    budget = definition_of(campaign).stop.max_flights
+    if sum(row.state in spent_by for row in trials) >= budget:
+        raise ConflictError(
+            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
+            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
+        )
+    if (waiting := history.unclassed(trials)) is not None:
         raise ConflictError(
             f"Flight {waiting.number} waits for its class.",
             hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
@@ -238,16 +257,23 @@ def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> 
     space = proposing.space_of(definition)
     gains = space.check(asked)
     flown = history.flown_gains(history.trials_of(session, campaign.id))
-    gate = proposing.gate_json(check_policy(definition, get_experiment(campaign.experiment), space, gains, flown))
+    searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
+    start = proposing.stored_start(session, campaign) if searched else None
+    experiment = get_experiment(campaign.experiment)
+    gate = proposing.gate_json(check_policy(definition, experiment, space, gains, flown, start=start))
     _require_passed(gate)
     return gains, gate
 
 
 def _require_passed(gate: JsonObject) -> None:
-    refusals = tuple(Problem("gains", check["sentence"]) for check in gate["checks"] if not check["passed"])
-    if refusals:
+    refused = [check for check in gate["checks"] if not check["passed"]]
+    if refused:
         raise GainsError(
-            "The gate refuses these gains.", hint="Choose gains nearer to what has flown.", problems=refusals
+            "The gate refuses these gains.",
+            hint="Choose gains nearer to the set that the refusal names, or clone the campaign with wider limits.",
+            problems=tuple(
+                Problem(f"gains.{check['gain']}" if check["gain"] else "gains", check["sentence"]) for check in refused
+            ),
         )
 
 
@@ -280,7 +306,13 @@ def _request_flight(session: Session, campaign: CampaignRow, row: TrialRow, orde
 
 
 def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:
-    """The error of a flight that a person counts in spite of its gaps."""
+    """The error of a flight that a person counts in spite of its gaps. One that was broken off never counts."""
+    if row.ending == "aborted":
+        raise InputError(
+            f"Trial {row.number} cannot count: its record ends where the flight was broken off.",
+            hint="Class it as aborted or leave it invalid, and fly the gains again.",
+            problems=(Problem("outcome", "cannot be valid: the flight was broken off"),),
+        )
     judged = (
         None
         if row.trajectory_id is None

@@ -7,6 +7,9 @@ from typing import Final, Literal
 TrialKind = Literal["start", "step", "shorter step", "repeat", "manual"]
 """Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, a person."""
 
+Ending = Literal["completed", "aborted"]
+"""How a flight's record ends: where it should, or where the flight was broken off."""
+
 
 class TrialState(StrEnum):
     """One policy, flown once.
@@ -45,15 +48,18 @@ MOVES: Final[Mapping[TrialState, frozenset[TrialState]]] = {
     TrialState.LOST: frozenset({TrialState.CAPTURED, TrialState.INVALID}),
 }
 
-CLASSES: Final = frozenset({TrialState.VALID, TrialState.ABORTED, TrialState.INVALID})
-"""What a finished flight may be classed as."""
-
 HISTORY: Final = frozenset({TrialState.VALID, TrialState.ABORTED})
-"""The flights that a proposal is computed from."""
+"""The flights that a proposal is computed from, and that use up the budget."""
+
+UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED})
+"""Trials that may still fly, or be given up."""
+
+IN_BUDGET: Final = HISTORY | UNFLOWN | {TrialState.FLYING, TrialState.CAPTURED}
+"""Trials that have used up, or may yet use up, a flight of the budget."""
 
 ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
     "fly": frozenset({TrialState.PLANNED}),
-    "cancel": frozenset({TrialState.PLANNED, TrialState.STAGED}),
+    "cancel": UNFLOWN,
     "abort": frozenset({TrialState.STAGED, TrialState.FLYING}),
     "upload": frozenset({TrialState.PLANNED, TrialState.LOST}),
     "classify": frozenset(

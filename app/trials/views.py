@@ -1,34 +1,37 @@
 """How trials look from outside, and what they say of themselves."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from sqlalchemy.orm import Session
 
+from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.core.experiments import get_experiment
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
-from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.moves import allowed
 from app.schemas import Gate
-from app.trials import history, repository
+from app.trials import repository
 from app.trials.schemas import FlightBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import thinned
 from app.trials.states import ACTIONS, UNDER_WAY, TrialState
 
+Scored = tuple[int, float]
+"""Number and error of a valid trial."""
+
 
 def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
-    """One trial; the trials before it are needed for its verdict."""
+    """One trial; the errors of those before it are needed for its verdict."""
+    return trial_views(session, campaign, [row])[0]
+
+
+def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
+    """Some trials of a campaign."""
     session.flush()
-    flights = repository.latest_flights(session, [row.id])
-    return _view(campaign, row, history.trials_of(session, campaign.id), flights)
-
-
-def trial_views(session: Session, campaign: CampaignRow) -> list[Trial]:
-    """All trials of a campaign in the order of their numbers."""
-    rows = history.trials_of(session, campaign.id)
     flights = repository.latest_flights(session, [row.id for row in rows])
-    return [_view(campaign, row, rows, flights) for row in rows]
+    scored = repository.scored(session, campaign.id)
+    return [_view(campaign, row, scored, flights.get(row.id)) for row in rows]
 
 
 def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
@@ -43,14 +46,13 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
         clock=trajectory.clock,
         checksum=row.trajectory.checksum,
         samples=len(trajectory),
-        units={name: CHANNEL_UNITS.get(name, "") for name in trajectory.channels},
+        units=_units(trajectory.channels),
         time_s=trajectory.time_s[kept].tolist(),
         channels={name: values[kept].tolist() for name, values in trajectory.channels.items()},
     )
 
 
-def _view(campaign: CampaignRow, row: TrialRow, trials: Sequence[TrialRow], flights: Mapping[int, FlightRow]) -> Trial:
-    flight = flights.get(row.id)
+def _view(campaign: CampaignRow, row: TrialRow, scored: Sequence[Scored], flight: FlightRow | None) -> Trial:
     return Trial(
         id=row.id,
         version=row.version,
@@ -64,25 +66,26 @@ def _view(campaign: CampaignRow, row: TrialRow, trials: Sequence[TrialRow], flig
         error=row.error,
         predicted_error=row.predicted_error,
         overshoot_m=row.overshoot_m,
-        verdict=verdict(row, trials, get_experiment(campaign.experiment).error_unit),
+        verdict=verdict(row, scored, get_experiment(campaign.experiment).error_unit),
         reason=row.reason,
         note=row.note,
         gate=Gate.model_validate(row.gate),
-        record=_record(row.trajectory),
+        record=_record(row),
         flight=_flight(flight),
         seed=row.seed,
         speed=flight.speed if flight else None,
+        settings=row.settings or {},
         created_at=row.created_at,
         flown_at=row.flown_at,
         actions=_actions(campaign, row, flight),
     )
 
 
-def verdict(row: TrialRow, trials: Sequence[TrialRow], unit: str) -> str:
+def verdict(row: TrialRow, scored: Sequence[Scored], unit: str) -> str:
     """The flight against the best before it and against its prediction, in a sentence."""
     match row.state:
         case TrialState.VALID if row.error is not None:
-            before = history.best_of([other for other in trials if other.number < row.number])
+            before = min(((error, number) for number, error in scored if number < row.number), default=None)
             return f"{row.error:.3f} {unit}: {_compared(row.error, before, unit)}{_against_prediction(row, unit)}."
         case TrialState.ABORTED:
             return f"Aborted: {row.reason}"
@@ -96,31 +99,41 @@ def verdict(row: TrialRow, trials: Sequence[TrialRow], unit: str) -> str:
             return ""
 
 
-def _compared(error: float, before: TrialRow | None, unit: str) -> str:
-    if before is None or before.error is None:
+def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
+    if before is None:
         return "the first valid flight"
-    gain = before.error - error
+    best, number = before
+    than = f"the best before it (flight {number}, {best:.3f} {unit})"
+    if f"{error:.3f}" == f"{best:.3f}":
+        return f"as good as {than}"
+    gain = best - error
     word = "better than" if gain > 0 else "worse than"
-    share = abs(gain) / before.error if before.error else 0.0
-    than = f"the best before it (flight {before.number}, {before.error:.3f} {unit})"
-    return f"as good as {than}" if gain == 0 else f"{abs(gain):.3f} {unit} ({share:.0%}) {word} {than}"
+    share = f" ({100 * abs(gain) / best:.0f} %)" if best else ""
+    return f"{abs(gain):.3f} {unit}{share} {word} {than}"
 
 
 def _against_prediction(row: TrialRow, unit: str) -> str:
     return "" if row.predicted_error is None else f"; {row.predicted_error:.3f} {unit} was predicted"
 
 
-def _record(row: TrajectoryRow | None) -> RecordBrief | None:
+def _record(trial: TrialRow) -> RecordBrief | None:
+    row = trial.trajectory
     if row is None:
         return None
     return RecordBrief(
+        ending=trial.ending or "completed",
         samples=row.samples,
         duration_s=row.duration_s,
         source=row.source,
         clock=row.clock,
         channels=row.columns[1:],
+        units=_units(row.columns[1:]),
         checksum=row.checksum,
     )
+
+
+def _units(channels: Iterable[str]) -> dict[str, str]:
+    return {name: CHANNEL_UNITS.get(name, "") for name in channels}
 
 
 def _flight(row: FlightRow | None) -> FlightBrief | None:
@@ -136,5 +149,7 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None) -> 
         impossible.add("fly")
     if can_fly and row.state == TrialState.PLANNED:
         impossible.add("upload")
+    if campaign.state not in CAMPAIGN_ACTIONS["judge"]:
+        impossible |= {"classify", "upload"}
     possible = [action for action in allowed(ACTIONS, row.state) if action not in impossible]
     return [*possible, "abort"] if under_way and "abort" not in possible else possible

@@ -1,11 +1,10 @@
 """What a kind of vehicle is: its description, its settings, and how one is opened."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from app.core.errors import InputError, Problem
-from app.core.policy import Gains
+from app.core.policy import Gains, is_finite, shortened
 from app.vehicles.base import OptionValue, Vehicle, VehicleOption
 
 Options = Mapping[str, OptionValue]
@@ -66,8 +65,8 @@ def _accept(option: VehicleOption, value: object) -> tuple[OptionValue, str | No
         return (value, None) if isinstance(value, bool | str) and fits else (default, _expected(default))
     if isinstance(value, bool) or not isinstance(value, int | float):
         return default, f"must be a number, got {value!r}"
-    if not math.isfinite(value):
-        return default, "must be a finite number"
+    if not is_finite(value):
+        return default, f"must be a finite number, got {shortened(value)}"
     low, high = option.lower, option.upper
     if (low is not None and value < low) or (high is not None and value > high):
         return default, f"must lie in {_edge(low)} … {_edge(high)} {option.unit}, got {value:g}"

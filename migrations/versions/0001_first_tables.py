@@ -130,9 +130,6 @@ def create_job() -> None:
         sa.Column("kind", sa.String(), nullable=False),
         sa.Column("state", sa.String(20), nullable=False),
         sa.Column("campaign_id", sa.Integer(), nullable=True),
-        sa.Column("payload", sa.JSON(none_as_null=True), nullable=False),
-        sa.Column("progress", sa.Double(), nullable=False),
-        sa.Column("progress_note", sa.String(), nullable=False),
         sa.Column("problem", sa.JSON(none_as_null=True), nullable=True),
         sa.Column("attempts", sa.Integer(), nullable=False),
         sa.Column("worker", sa.String(), nullable=True),
@@ -194,6 +191,7 @@ def create_trial() -> None:
         sa.Column("error", sa.Double(), nullable=True),
         sa.Column("overshoot_m", sa.Double(), nullable=True),
         sa.Column("curve", sa.JSON(none_as_null=True), nullable=True),
+        sa.Column("ending", sa.String(), nullable=True),
         sa.Column("settings", sa.JSON(none_as_null=True), nullable=False),
         sa.Column("reason", sa.String(), nullable=False),
         sa.Column("note", sa.String(), nullable=False),
@@ -242,9 +240,9 @@ def create_flight() -> None:
             name="ck_flight_state",
         ),
         sa.ForeignKeyConstraint(
-            ["campaign_id"], ["campaign.id"], name="fk_flight_campaign_id_campaign", ondelete="CASCADE"
+            ["campaign_id"], ["campaign.id"], name="fk_flight_campaign_id_campaign", ondelete="RESTRICT"
         ),
-        sa.ForeignKeyConstraint(["trial_id"], ["trial.id"], name="fk_flight_trial_id_trial", ondelete="CASCADE"),
+        sa.ForeignKeyConstraint(["trial_id"], ["trial.id"], name="fk_flight_trial_id_trial", ondelete="RESTRICT"),
         sa.ForeignKeyConstraint(["vehicle_id"], ["vehicle.id"], name="fk_flight_vehicle_id_vehicle"),
         sa.PrimaryKeyConstraint("id", name="pk_flight"),
         sqlite_autoincrement=True,

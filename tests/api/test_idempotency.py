@@ -67,7 +67,7 @@ def test_an_answer_is_given_again_as_it_was_though_the_world_has_moved_on(
     first = client.post(path, json=ask, headers=KEY)
     land(database, lift_off(database), create_record())
     assert client.post(path, json=ask, headers=KEY).json() == first.json()
-    assert len(get(client, path)) == 1
+    assert get(client, path)["total"] == 1
 
 
 def test_a_record_sent_twice_with_its_key_is_stored_once(client: TestClient, database: Database) -> None:
@@ -111,7 +111,7 @@ def test_the_same_key_from_many_threads_at_once_makes_one_campaign(client: TestC
 
 
 def test_many_threads_writing_at_once_lose_nothing(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database)
+    campaign = create_ready_campaign(client, database, definition={"stop": {"max_flights": 40}})
     path = f"/api/campaigns/{campaign['id']}/trials"
 
     def plan(index: int) -> int:
@@ -133,4 +133,4 @@ def test_many_threads_that_want_one_vehicle_get_one_flight(client: TestClient, d
     with ThreadPoolExecutor(8) as pool:
         statuses = list(pool.map(lambda _: client.post(path, json=ask).status_code, range(16)))
     assert sorted(statuses) == [201] + [409] * 15
-    assert len(get(client, path)) == 1
+    assert get(client, path)["total"] == 1

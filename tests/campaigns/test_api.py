@@ -137,8 +137,11 @@ def test_what_is_asked_for_cannot_change_while_a_flight_is_asked_for(client: Tes
     campaign = create_ready_campaign(client, database)
     path = f"/api/campaigns/{campaign['id']}"
     create_trial(client, campaign["id"], fly={"speed": None})
-    assert get(client, path)["actions"] == ["rename", "propose", "clone"]
-    for answer in (client.patch(path, json={"version": 1, "definition": {"seed": 2}}), client.delete(path)):
+    assert get(client, path)["actions"] == ["rename", "propose", "clone", "judge"]
+    for answer in (
+        client.patch(path, json={"version": 1, "definition": {"seed": 2}}),
+        client.delete(f"{path}?version=1"),
+    ):
         assert answer.status_code == 409
         assert "flight under way" in answer.json()["detail"]
     assert client.patch(path, json={"version": 1, "name": "Still possible"}).status_code == 200
@@ -148,7 +151,7 @@ def test_what_is_asked_for_cannot_change_while_a_flight_is_asked_for(client: Tes
 def test_a_campaign_is_deleted_with_everything_that_it_made(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     create_trial(client, campaign["id"])
-    assert client.delete(f"/api/campaigns/{campaign['id']}").status_code == 204
+    assert client.delete(f"/api/campaigns/{campaign['id']}?version=1").status_code == 204
     assert client.get(f"/api/campaigns/{campaign['id']}").status_code == 404
     with database.read() as session:
         assert [session.query(table).count() for table in (CampaignRow, ProposalRow, TrajectoryRow)] == [0, 0, 0]
@@ -157,33 +160,33 @@ def test_a_campaign_is_deleted_with_everything_that_it_made(client: TestClient, 
 def test_a_campaign_with_flights_is_never_deleted(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     create_flown_trial(client, database, campaign["id"])
-    assert client.delete(f"/api/campaigns/{campaign['id']}").status_code == 409
+    assert client.delete(f"/api/campaigns/{campaign['id']}?version=1").status_code == 409
 
 
 def test_the_budget_ends_a_campaign_and_nothing_more_is_flown(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=BUDGET)
     first = create_flown_trial(client, database, campaign["id"], 2.0)
-    waiting = create_trial(client, campaign["id"], gains=first["gains"])
-    assert waiting["kind"] == "repeat"
     create_flown_trial(client, database, campaign["id"], 1.0)
     path = f"/api/campaigns/{campaign['id']}"
     done = get(client, path)
     assert (done["state"], done["outcome"]) == ("finished", "budget")
     assert done["stop_reason"] == "All 2 flights of the budget are flown."
-    assert get(client, f"/api/trials/{waiting['id']}")["state"] == "cancelled"
     assert get(client, f"{path}/proposal")["proposal"]["recommended"] == "stop"
     assert client.post(f"{path}/trials", json={"gains": first["gains"]}).status_code == 409
-    assert done["actions"] == ["rename", "archive", "clone"]
+    assert done["actions"] == ["rename", "archive", "clone", "judge"]
 
 
 def test_a_campaign_can_be_stopped_archived_and_continued_as_a_clone(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=BUDGET)
     path = f"/api/campaigns/{campaign['id']}"
     assert client.post(f"{path}/finish").status_code == 409  # nothing has flown: delete it instead
-    create_flown_trial(client, database, campaign["id"])
+    flown = create_flown_trial(client, database, campaign["id"])
+    waiting = create_trial(client, campaign["id"], gains=flown["gains"])
+    assert waiting["kind"] == "repeat"
     assert client.post(f"{path}/archive").status_code == 409
     stopped = client.post(f"{path}/finish", json={"reason": "rain"}).json()
     assert (stopped["state"], stopped["outcome"], stopped["stop_reason"]) == ("finished", "stopped", "rain")
+    assert get(client, f"/api/trials/{waiting['id']}")["state"] == "cancelled"
     assert client.post(f"{path}/archive").json()["state"] == "archived"
     clone = client.post(f"{path}/clone", json={"vehicle": {"kind": "jsbsim"}})
     assert clone.status_code == 201

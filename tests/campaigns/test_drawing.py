@@ -59,7 +59,7 @@ def test_the_prediction_of_the_next_flight_is_drawn_until_it_has_flown(client: T
 
 
 def test_errors_and_gains_are_those_of_the_trials(client: TestClient, campaign_id: int) -> None:
-    trials = get(client, f"/api/campaigns/{campaign_id}/trials")
+    trials = get(client, f"/api/campaigns/{campaign_id}/trials")["items"]
     measured = trace(traces(client, f"/api/campaigns/{campaign_id}/figures/errors"), "measured")
     assert measured["y"] == pytest.approx([trial["error"] for trial in trials], abs=1e-6)
     gains = traces(client, f"/api/campaigns/{campaign_id}/figures/gains")
@@ -67,7 +67,7 @@ def test_errors_and_gains_are_those_of_the_trials(client: TestClient, campaign_i
 
 
 def test_a_flight_by_itself_is_drawn_over_the_best(client: TestClient, campaign_id: int) -> None:
-    first = get(client, f"/api/campaigns/{campaign_id}/trials")[0]
+    first = get(client, f"/api/campaigns/{campaign_id}/trials")["items"][0]
     drawn = traces(client, f"/api/trials/{first['id']}/figure?theme=dark")
     assert trace(drawn, "best")["name"] == "Flight 2 · best"
     assert max(trace(drawn, "flight")["y"]) == pytest.approx(create_climb(2.0)["altitude_m"].max(), abs=1e-3)

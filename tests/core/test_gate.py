@@ -25,7 +25,7 @@ def check(name: str, gains: dict[str, float], definition: Definition | None = No
         (DEFAULT | {"kp": -1}, "kp must lie in 0 … 4000 counts, got -1.", 1 / 4000),
         (DEFAULT | {"ki": 1356}, "ki must lie in 0 … 1073 counts, got 1356.", 283 / 1073),
         (DEFAULT | {"kd": 82.5}, "kd must be a whole number of counts, got 82.5.", 0.0),
-        (DEFAULT | {"kd": math.nan}, "kd must be a finite number.", math.inf),
+        (DEFAULT | {"kd": math.nan}, "kd must be a finite number, got nan.", math.inf),
     ],
 )
 def test_gains_that_cannot_be_flown_are_refused_by_name(gains: dict[str, float], sentence: str, worst: float) -> None:

@@ -20,7 +20,7 @@ GOOD = {"kp": 283, "ki": 13, "kd": 82}
         ({"kp": 1, "ki": 13.5, "kd": 82}, {"gains.ki": "must be a whole number of counts, got 13.5"}),
         (
             {"kp": math.nan, "ki": math.inf, "kd": 82},
-            {"gains.kp": "must be a finite number", "gains.ki": "must be a finite number"},
+            {"gains.kp": "must be a finite number, got nan", "gains.ki": "must be a finite number, got inf"},
         ),
         (
             {"kp": "283", "ki": True, "kd": None},

@@ -40,15 +40,12 @@ def test_a_heartbeat_alone_is_no_change(database: Database) -> None:
     with database.write() as session:
         assert jobs.heartbeat_job(session, job, worker="w", lease_s=50.0)
     assert len(topics(database)) == before
-    with database.write() as session:
-        assert jobs.heartbeat_job(session, job, worker="w", lease_s=50.0, progress=0.5)
-    assert len(topics(database)) == before + 1
 
 
 def test_a_deleted_campaign_is_told(client: TestClient, database: Database) -> None:
     campaign = create_campaign(client)["id"]
     before = len(topics(database))
-    client.delete(f"/api/campaigns/{campaign}")
+    client.delete(f"/api/campaigns/{campaign}?version=1")
     assert topics(database)[before:] == [("campaign", campaign, campaign)]
 
 

@@ -93,7 +93,7 @@ def test_a_full_disk_is_said_in_words_and_loses_nothing(database: Database) -> N
         session.add(JobRow(kind="before", state=JobState.QUEUED))
     fill_up(database)
     with pytest.raises(StorageError, match=r"is full; nothing.*Free some space"), database.write() as session:
-        session.add(JobRow(kind="too much", state=JobState.QUEUED, progress_note="x" * 100_000))
+        session.add(JobRow(kind="too much", state=JobState.QUEUED, worker="x" * 100_000))
     with database.read() as session:
         assert [row.kind for row in session.query(JobRow)] == ["before"]
 
@@ -149,7 +149,7 @@ def test_the_database_itself_refuses_an_unknown_state(client: TestClient, databa
 
 def test_ids_are_never_used_twice(client: TestClient, database: Database) -> None:
     first = create_campaign(client)
-    assert client.delete(f"/api/campaigns/{first['id']}").status_code == 204
+    assert client.delete(f"/api/campaigns/{first['id']}?version=1").status_code == 204
     assert create_campaign(client)["id"] > first["id"]
     with database.read() as session:
         assert session.query(CampaignRow).count() == 1

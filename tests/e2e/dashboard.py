@@ -111,7 +111,7 @@ class Dashboard:
         return campaign_id
 
     def trials(self, campaign_id: int) -> list[Json]:
-        found: list[Json] = self.get(f"/campaigns/{campaign_id}/trials")
+        found: list[Json] = self.get(f"/campaigns/{campaign_id}/trials?limit=200")["items"]
         return found
 
     def fly_headless(self, campaign_id: int, flights: int) -> None:

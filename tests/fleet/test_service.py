@@ -9,10 +9,10 @@ DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
 
 
 def test_a_vehicle_is_registered_when_the_first_campaign_wants_it(client: TestClient) -> None:
-    assert get(client, "/api/vehicles") == []
+    assert get(client, "/api/vehicles") == {"items": [], "total": 0, "next_cursor": None}
     first, second = create_campaign(client), create_campaign(client)
     assert first["vehicle"]["id"] == second["vehicle"]["id"]
-    (vehicle,) = get(client, "/api/vehicles")
+    (vehicle,) = get(client, "/api/vehicles?limit=1")["items"]
     assert (vehicle["kind"], vehicle["state"], vehicle["is_real"]) == ("twin", "ready", False)
     assert vehicle["safe_gains"] == DEFAULT_GAINS
     assert vehicle["actions"] == ["fly"]

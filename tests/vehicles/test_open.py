@@ -1,4 +1,5 @@
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -74,7 +75,7 @@ def test_options_are_completed_with_their_defaults() -> None:
     ("options", "reason"),
     [
         ({"scatter": -0.1}, "must lie in 0 … 5 ×, got -0.1"),
-        ({"scatter": float("nan")}, "must be a finite number"),
+        ({"scatter": float("nan")}, "must be a finite number, got nan"),
         ({"scatter": "much"}, "must be a number, got 'much'"),
         ({"scatter": True}, "must be a number, got True"),
         ({"scatter": None}, "must be a number, got None"),
@@ -96,3 +97,33 @@ def test_every_wrong_option_is_named_at_once() -> None:
 def test_every_default_option_is_within_its_own_range(kind: str) -> None:
     options = VEHICLE_KINDS[kind].options
     assert check_options(kind, {option.name: option.default for option in options}) == check_options(kind, {})
+
+
+class DeafVehicle(SimulatedVehicle):
+    """A vehicle whose link breaks once it has experimental gains, and whose closing then fails too."""
+
+    def stage(self, gains: Gains) -> dict[str, float]:
+        if self.read_gains() != SAFE:
+            raise ConnectionError("the link is gone")
+        return super().stage(gains)
+
+    def close(self) -> None:
+        raise VehicleError("The link cannot be closed.", hint="It is gone.")
+
+
+def opened_deaf(_options: Options, safe_gains: Gains) -> Vehicle:
+    def launch(_order: object) -> Simulation:
+        raise VehicleError("It does not fly.", hint="It is a test.")
+
+    return DeafVehicle("deaf", safe_gains, {}, launch)
+
+
+def test_safe_gains_that_cannot_even_be_sent_are_reported_as_loudly(monkeypatch: pytest.MonkeyPatch) -> None:
+    deaf = replace(STUBBORN, name="deaf", open=opened_deaf)
+    monkeypatch.setattr(opening, "VEHICLE_KINDS", {**VEHICLE_KINDS, "deaf": deaf})
+    with (
+        pytest.raises(SafeGainsError, match="could not be set: the link is gone") as loud,
+        open_vehicle("deaf", {}, safe_gains=SAFE) as vehicle,
+    ):
+        vehicle.stage(TUNED)
+    assert "Do not fly it" in loud.value.hint

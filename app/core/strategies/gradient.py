@@ -35,14 +35,15 @@ class _Metric:
 
 def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vector) -> Vector:
     """∂error/∂gain at `base`, shape (n,): central differences over a tenth of the scale to each side, at least 2 counts
-    for integer gains, cut off at the bounds."""
+    for integer gains, cut off at the bounds; zero where the bounds pin a gain."""
     integer = np.array([gain.integer for gain in space.gains])
     steps = np.where(integer, np.maximum(np.rint(scale / 10), MIN_DIFFERENCE), scale / 10)
     above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
     ups = np.where(np.eye(len(base), dtype=bool), above, base)
     downs = np.where(np.eye(len(base), dtype=bool), below, base)
     errors = model.errors(np.concatenate((ups, downs)))
-    return np.asarray((errors[: len(base)] - errors[len(base) :]) / (above - below))
+    rise, run = errors[: len(base)] - errors[len(base) :], above - below
+    return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
 
 
 def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:

@@ -12,7 +12,9 @@ import {
   getTrial,
   listCampaigns,
   listTrials,
+  type PageTrial,
   type Sort,
+  type Trial,
 } from "./generated";
 
 export type Theme = "light" | "dark";
@@ -56,10 +58,25 @@ export function useProposal(campaignId: number) {
   });
 }
 
+const LARGEST_PAGE = 200;
+
+/** Every trial of a campaign, page after page. */
+async function allTrials(campaignId: number): Promise<Trial[]> {
+  const trials: Trial[] = [];
+  let cursor: string | null = null;
+  do {
+    const query: { limit: number; cursor?: string } = { limit: LARGEST_PAGE, ...(cursor === null ? {} : { cursor }) };
+    const page: PageTrial = await answer(listTrials({ path: { campaign_id: campaignId }, query }));
+    trials.push(...page.items);
+    cursor = page.next_cursor;
+  } while (cursor !== null);
+  return trials;
+}
+
 export function useTrials(campaignId: number) {
   return useQuery({
     queryKey: ["campaign", campaignId, "trials"],
-    queryFn: () => answer(listTrials({ path: { campaign_id: campaignId } })),
+    queryFn: () => allTrials(campaignId),
   });
 }
 

@@ -56,7 +56,7 @@ export const createCampaign = <ThrowOnError extends boolean = false>(options: Op
 /**
  * Delete Campaign
  *
- * Delete a campaign in which nothing has flown.
+ * Delete a campaign in which no flight was begun.
  */
 export const deleteCampaign = <ThrowOnError extends boolean = false>(options: Options<DeleteCampaignData, ThrowOnError>): RequestResult<DeleteCampaignResponses, DeleteCampaignErrors, ThrowOnError> => (options.client ?? client).delete<DeleteCampaignResponses, DeleteCampaignErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}', ...options });
 
@@ -131,7 +131,7 @@ export const computeProposal = <ThrowOnError extends boolean = false>(options: O
 /**
  * List Trials
  *
- * All trials of a campaign, in the order of their numbers.
+ * The trials of a campaign, in the order of their numbers.
  */
 export const listTrials = <ThrowOnError extends boolean = false>(options: Options<ListTrialsData, ThrowOnError>): RequestResult<ListTrialsResponses, ListTrialsErrors, ThrowOnError> => (options.client ?? client).get<ListTrialsResponses, ListTrialsErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/trials', ...options });
 

@@ -19,7 +19,8 @@ export type Abort = {
 /**
  * AbortAnswer
  *
- * `accepted` is true when the worker has taken the abort; the flight's end is reported by its events.
+ * `accepted` is true when the worker has taken the abort, or the flight is over without it; the flight's end is
+ * reported by its events.
  */
 export type AbortAnswer = {
     /**
@@ -90,7 +91,7 @@ export type Campaign = {
     /**
      * Definition Digest
      *
-     * SHA-256 of the definition, once it is frozen
+     * SHA-256 of definition and vehicle, once they are frozen
      */
     definition_digest: string | null;
     vehicle: CampaignVehicle;
@@ -787,14 +788,6 @@ export type Job = {
      * Campaign Id
      */
     campaign_id: number | null;
-    /**
-     * Progress
-     */
-    progress: number;
-    /**
-     * Progress Note
-     */
-    progress_note: string;
     problem: Trouble | null;
     /**
      * Attempts
@@ -987,6 +980,42 @@ export type PageJob = {
 };
 
 /**
+ * Page[Trial]
+ */
+export type PageTrial = {
+    /**
+     * Items
+     */
+    items: Array<Trial>;
+    /**
+     * Total
+     */
+    total: number;
+    /**
+     * Next Cursor
+     */
+    next_cursor: string | null;
+};
+
+/**
+ * Page[Vehicle]
+ */
+export type PageVehicle = {
+    /**
+     * Items
+     */
+    items: Array<Vehicle>;
+    /**
+     * Total
+     */
+    total: number;
+    /**
+     * Next Cursor
+     */
+    next_cursor: string | null;
+};
+
+/**
  * PresetInfo
  *
  * A campaign that is ready to be created.
@@ -1065,13 +1094,17 @@ export type Proposal = {
 /**
  * RecordBrief
  *
- * The stored record of a flight, without its samples.
+ * The stored record of a flight, without its samples. `ending`: whether the flight was broken off.
  */
 export type RecordBrief = {
     /**
      * Samples
      */
     samples: number;
+    /**
+     * Ending
+     */
+    ending: 'completed' | 'aborted';
     /**
      * Duration S
      */
@@ -1089,7 +1122,15 @@ export type RecordBrief = {
      */
     channels: Array<string>;
     /**
+     * Units
+     */
+    units: {
+        [key: string]: string;
+    };
+    /**
      * Checksum
+     *
+     * SHA-256 of the stored samples; docs/api.md says how to verify it
      */
     checksum: string;
 };
@@ -1415,6 +1456,14 @@ export type Trial = {
      * Speed
      */
     speed: number | null;
+    /**
+     * Settings
+     *
+     * what the vehicle said of itself after the flight
+     */
+    settings: {
+        [key: string]: boolean | number | number | string;
+    };
     /**
      * Created At
      */
@@ -1869,7 +1918,14 @@ export type DeleteCampaignData = {
          */
         campaign_id: number;
     };
-    query?: never;
+    query: {
+        /**
+         * Version
+         *
+         * the version, as last read
+         */
+        version: number;
+    };
     url: '/api/campaigns/{campaign_id}';
 };
 
@@ -2147,7 +2203,20 @@ export type ListTrialsData = {
          */
         campaign_id: number;
     };
-    query?: never;
+    query?: {
+        /**
+         * Limit
+         *
+         * how many items the page may hold
+         */
+        limit?: number;
+        /**
+         * Cursor
+         *
+         * `next_cursor` of the page before
+         */
+        cursor?: string | null;
+    };
     url: '/api/campaigns/{campaign_id}/trials';
 };
 
@@ -2162,11 +2231,9 @@ export type ListTrialsError = ListTrialsErrors[keyof ListTrialsErrors];
 
 export type ListTrialsResponses = {
     /**
-     * Response List Trials
-     *
      * Successful Response
      */
-    200: Array<Trial>;
+    200: PageTrial;
 };
 
 export type ListTrialsResponse = ListTrialsResponses[keyof ListTrialsResponses];
@@ -2525,7 +2592,20 @@ export type GetTrajectoryCsvResponse = GetTrajectoryCsvResponses[keyof GetTrajec
 export type ListVehiclesData = {
     body?: never;
     path?: never;
-    query?: never;
+    query?: {
+        /**
+         * Limit
+         *
+         * how many items the page may hold
+         */
+        limit?: number;
+        /**
+         * Cursor
+         *
+         * `next_cursor` of the page before
+         */
+        cursor?: string | null;
+    };
     url: '/api/vehicles';
 };
 
@@ -2540,11 +2620,9 @@ export type ListVehiclesError = ListVehiclesErrors[keyof ListVehiclesErrors];
 
 export type ListVehiclesResponses = {
     /**
-     * Response List Vehicles
-     *
      * Successful Response
      */
-    200: Array<Vehicle>;
+    200: PageVehicle;
 };
 
 export type ListVehiclesResponse = ListVehiclesResponses[keyof ListVehiclesResponses];

@@ -1,0 +1,135 @@
+"""Campaigns over HTTP: what is kept for ever, what is frozen, what a later word on a flight changes."""
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy.exc import IntegrityError
+
+from app.db.models import CampaignRow, FlightRow
+from app.db.session import Database
+from app.trials import flights
+from tests.builders import (
+    claim,
+    create_campaign,
+    create_flown_trial,
+    create_ready_campaign,
+    create_trial,
+    get,
+    run_jobs,
+)
+from tests.trials.test_service import PATIENT, classify
+
+
+def test_a_vehicles_ledger_outlives_the_wish_to_delete_a_campaign(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    path = f"/api/campaigns/{campaign['id']}"
+    create_trial(client, campaign["id"], fly={"speed": None})
+    task = claim(database)
+    with database.write() as session:
+        flights.record_failure(session, task.flight_id, "the vehicle did not answer")
+    answer = client.delete(f"{path}?version=1")
+    assert answer.status_code == 409
+    assert "ledger" in answer.json()["detail"]
+    assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}/ledger")["total"] == 1
+    with pytest.raises(IntegrityError), database.write() as session:
+        session.delete(session.get_one(CampaignRow, campaign["id"]))
+
+
+def test_a_flight_that_nobody_began_does_not_keep_a_campaign(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    client.post(f"/api/trials/{trial['id']}/cancel")
+    assert client.delete(f"/api/campaigns/{campaign['id']}?version=1").status_code == 204
+    with database.read() as session:
+        assert session.query(FlightRow).count() == 0
+
+
+def test_deleting_takes_the_version_that_was_looked_at(client: TestClient) -> None:
+    path = f"/api/campaigns/{create_campaign(client)['id']}"
+    client.patch(path, json={"version": 1, "name": "Renamed"})
+    assert client.delete(path).status_code == 422
+    assert client.delete(f"{path}?version=1").status_code == 409
+    assert client.delete(f"{path}?version=2").status_code == 204
+
+
+def test_an_edit_that_changes_nothing_is_none(client: TestClient) -> None:
+    path = f"/api/campaigns/{create_campaign(client)['id']}"
+    assert client.patch(path, json={"version": 1}).json()["version"] == 1
+
+
+def test_the_frozen_digest_covers_the_vehicle(client: TestClient, database: Database) -> None:
+    digests = set()
+    for vehicle in ({"kind": "twin"}, {"kind": "twin", "options": {"scatter": 0.0}}, {"kind": "jsbsim"}):
+        made = client.post("/api/campaigns", json={"name": "Test", "vehicle": vehicle}).json()
+        run_jobs(database)
+        create_flown_trial(client, database, made["id"])
+        digests.add(get(client, f"/api/campaigns/{made['id']}")["definition_digest"])
+    assert len(digests) == 3
+
+
+def test_a_finished_campaign_says_why_it_is_over_in_the_light_of_its_flights(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 2}})
+    path = f"/api/campaigns/{campaign['id']}"
+    create_flown_trial(client, database, campaign["id"], 2.0)
+    last = create_flown_trial(client, database, campaign["id"], 1.0)
+    done = get(client, path)
+    assert (done["state"], done["outcome"]) == ("finished", "budget")
+    assert classify(client, last["id"], "invalid") == 200
+    run_jobs(database)
+    after = get(client, path)
+    assert (after["state"], after["outcome"]) == ("finished", None)
+    assert after["stop_reason"] == (
+        "It is over, but its flights, as they are classed now, no longer say so: 1 of 2 flights are left."
+    )
+    assert classify(client, last["id"], "valid") == 200
+    run_jobs(database)
+    again = get(client, path)
+    assert (again["outcome"], again["stop_reason"]) == ("budget", done["stop_reason"])
+
+
+def test_what_an_operator_stopped_stays_stopped_by_the_operator(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    path = f"/api/campaigns/{campaign['id']}"
+    flown = create_flown_trial(client, database, campaign["id"])
+    client.post(f"{path}/finish", json={"reason": "rain"})
+    assert classify(client, flown["id"], "invalid") == 200
+    run_jobs(database)
+    after = get(client, path)
+    assert (after["outcome"], after["stop_reason"]) == ("stopped", "rain")
+
+
+def test_a_finished_campaign_without_a_proposal_says_why(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    path = f"/api/campaigns/{campaign['id']}"
+    flown = create_flown_trial(client, database, campaign["id"])
+    client.post(f"{path}/finish", json={"reason": "rain"})
+    classify(client, flown["id"], "invalid")
+    (job,) = get(client, "/api/jobs?state=queued")["items"]
+    client.post(f"/api/jobs/{job['id']}/cancel")
+    problem = get(client, f"{path}/proposal")["problem"]
+    assert problem["detail"] == "Its computation was cancelled."
+    assert "clone" in problem["hint"].lower()
+
+
+def test_gains_of_ones_own_are_judged_without_searching_the_model_again(
+    client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    campaign = create_ready_campaign(client, database, definition={"start": {"kind": "simplex"}})
+    gains = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["gains"]
+
+    def searched(*_: object) -> None:
+        raise AssertionError("the start gains are stored with the first proposal")
+
+    monkeypatch.setattr("app.core.starting.model_optimum", searched)
+    trial = create_trial(client, campaign["id"], gains={**gains, "kp": gains["kp"] + 10})
+    assert trial["gate"]["passed"]
+
+
+def test_gains_of_ones_own_wait_for_the_start_gains(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    path = f"/api/campaigns/{campaign['id']}"
+    client.patch(path, json={"version": 1, "definition": {"start": {"kind": "simplex"}}})
+    answer = client.post(f"{path}/trials", json={"gains": {"kp": 1600, "ki": 900, "kd": 200}})
+    assert answer.status_code == 409
+    assert "start gains" in answer.json()["detail"]
