@@ -27,11 +27,14 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
   const best = bestOf(campaign, trials);
   const first = trials.find((trial) => trial.state === "valid");
+  const title = campaignWords("finished", campaign.outcome).word;
   const change = percentChange(best?.error, first?.error);
   return (
-    <Panel title={campaignWords("finished", campaign.outcome).word}>
+    <Panel title={title}>
       <div className={classes["stack"]}>
-        <p className={classes["quiet"]}>{campaign.stop_reason}</p>
+        {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && (
+          <p className={classes["quiet"]}>{campaign.stop_reason}</p>
+        )}
         {best !== null && (
           <div className={`${classes["best"]} numbers`}>
             <p>Best: flight {best.number}</p>

@@ -82,7 +82,21 @@ export function CampaignsPage() {
         </div>
       )}
       {campaigns.data && found.length === 0 && (
-        <p className={classes["none"]}>No campaign fits this search. Take a filter away, or create one.</p>
+        <div className={classes["none"]}>
+          <p>No campaign fits this search.</p>
+          {filtered && (
+            <Button
+              variant="default"
+              onClick={() => {
+                setSearch("");
+                setState("all");
+                setVehicle(null);
+              }}
+            >
+              Show all campaigns
+            </Button>
+          )}
+        </div>
       )}
       <ul className={classes["cards"]} aria-label="Campaigns">
         {found.map((campaign) => (

@@ -14,6 +14,20 @@ const petrol: MantineColorsTuple = [
   "#034f46",
 ];
 
+/** What ends something. Shade 7 carries white text at 6:1. */
+const red: MantineColorsTuple = [
+  "#fcebea",
+  "#f8d3d0",
+  "#f0aaa5",
+  "#ea837c",
+  "#e2604f",
+  "#d6352c",
+  "#cc2a21",
+  "#c21f17",
+  "#a01811",
+  "#7d110c",
+];
+
 /** Mantine's greys for the dark theme, on the blue side like the page behind them. */
 const dark: MantineColorsTuple = [
   "#eef2f6",
@@ -33,7 +47,7 @@ export const TOUCH_TARGET_PX = 48;
 const tall = { styles: { input: { minHeight: TOUCH_TARGET_PX } }, defaultProps: { size: "md" } } as const;
 
 export const theme = createTheme({
-  colors: { petrol, dark },
+  colors: { petrol, red, dark },
   primaryColor: "petrol",
   primaryShade: 7,
   defaultRadius: "md",
