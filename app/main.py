@@ -12,6 +12,7 @@ from app.api import catalogue, errors, events, figures
 from app.api.headers import HeadersMiddleware
 from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
+from app.api.origin import OriginMiddleware
 from app.campaigns.router import router as campaigns
 from app.db.migrate import require_current
 from app.db.session import Database
@@ -56,7 +57,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(router)
     errors.install(app)
     describe(app)
-    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.too_large)
+    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.own_error)
+    app.add_middleware(OriginMiddleware, host=settings.host, refuse=errors.foreign)
     app.add_middleware(GZipMiddleware, minimum_size=1000)
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():

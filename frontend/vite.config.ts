@@ -6,7 +6,8 @@ const api = process.env["GAINLINE_URL"] ?? "http://127.0.0.1:8000";
 
 export default defineConfig({
   plugins: [react()],
-  server: { host: "127.0.0.1", proxy: { "/api": api, "/metrics": api } },
+  // The name that the browser asked for is passed on: the API refuses acts from pages of another origin.
+  server: { host: "127.0.0.1", proxy: { "/api": { target: api, changeOrigin: false } } },
   build: { target: "es2023", sourcemap: false },
   test: { environment: "jsdom", include: ["src/**/*.test.{ts,tsx}"], restoreMocks: true },
 });

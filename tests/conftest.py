@@ -46,5 +46,5 @@ def database(application: FastAPI) -> Database:
 @pytest.fixture
 def client(application: FastAPI) -> Iterator[TestClient]:
     """HTTP to the running application, in this process. Errors come as answers, as from a server."""
-    with TestClient(application, raise_server_exceptions=False) as running:
+    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as running:
         yield running

@@ -1,15 +1,15 @@
 """Errors over HTTP: problem details (RFC 9457) with a hint. The only place that knows what error has which status."""
 
 import errno
+import json
 import uuid
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from typing import Any, Final
 
 import structlog
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from app.errors import (
@@ -53,10 +53,6 @@ _HTTP: Final[Mapping[int, tuple[str, str]]] = {
     ),
     404: ("There is nothing at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
     405: ("{path} does not know the method {method}.", "The methods of each path are listed in /api/openapi.json."),
-    413: (
-        "The request is too large; nothing was stored.",
-        "A JSON body has at most 1 MiB, a flight record at most 200 000 rows and 48 MiB.",
-    ),
 }
 """What the framework refuses by itself."""
 
@@ -93,7 +89,7 @@ def _problem(
     *,
     title: str = "",
     headers: Mapping[str, str] | None = None,
-) -> JSONResponse:
+) -> Response:
     kind = f"urn:gainline:{title.lower().replace(' ', '-')}" if title else "about:blank"
     body = Problem(
         type=kind,
@@ -103,11 +99,18 @@ def _problem(
         hint=hint,
         problems=list(problems),
     )
-    return JSONResponse(body.model_dump(), status, headers, media_type=MEDIA_TYPE)
+    # What is quoted from a request may hold half a character, which has no UTF-8.
+    content = json.dumps(body.model_dump(), ensure_ascii=False).encode("utf-8", "replace")
+    return Response(content, status, headers, media_type=MEDIA_TYPE)
 
 
-async def _own_error(_request: Request, error: Exception) -> JSONResponse:
+async def _own_error(_request: Request, error: Exception) -> Response:
     assert isinstance(error, GainlineError)
+    return own_error(error)
+
+
+def own_error(error: GainlineError) -> Response:
+    """The answer that one of our errors makes, also before the application has seen the request."""
     status, title = kind_of(error)
     return _problem(
         status,
@@ -118,7 +121,7 @@ async def _own_error(_request: Request, error: Exception) -> JSONResponse:
     )
 
 
-async def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
+async def _invalid_request(_request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     problems = [_refused(found) for found in error.errors()]
     return _problem(
@@ -139,7 +142,7 @@ def _refused(found: Mapping[str, Any]) -> ProblemField:
     return ProblemField(field=".".join(map(str, inner or [part])), reason=text[:1].lower() + text[1:])
 
 
-async def _http_error(request: Request, error: Exception) -> JSONResponse:
+async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     detail, hint = str(error.detail), "Correct the request and send it again."
     if error.status_code in _HTTP:
@@ -148,12 +151,12 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
     return _problem(error.status_code, detail, hint, headers=error.headers)
 
 
-def too_large() -> JSONResponse:
-    """Before the application sees the request."""
-    return _problem(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, *_HTTP[HTTPStatus.REQUEST_ENTITY_TOO_LARGE])
+def foreign(detail: str, hint: str) -> Response:
+    """A request that is not from us or not for us."""
+    return _problem(HTTPStatus.FORBIDDEN, detail, hint, title="Foreign request")
 
 
-async def _system_error(request: Request, error: Exception) -> JSONResponse:
+async def _system_error(request: Request, error: Exception) -> Response:
     """A full disk may also show outside of the database, for instance while an upload is set aside."""
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
         return await _own_error(
@@ -166,7 +169,7 @@ async def _system_error(request: Request, error: Exception) -> JSONResponse:
     return await _unforeseen(request, error)
 
 
-async def _unforeseen(request: Request, error: Exception) -> JSONResponse:
+async def _unforeseen(request: Request, error: Exception) -> Response:
     number = uuid.uuid4().hex[:12]
     _log.error("unforeseen error", error_id=number, method=request.method, path=request.url.path, exc_info=error)
     return _problem(

@@ -1,13 +1,13 @@
 """How much may be sent at once: refused by the stated length where there is one, else as soon as it is passed."""
 
 from collections.abc import Callable
-from http import HTTPStatus
 from typing import Final
 
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.errors import GainlineError, Problem, TooLargeError
 
 JSON_BYTES: Final = 2**20
 """Largest JSON body."""
@@ -17,7 +17,7 @@ _UPLOADS: Final = "/trajectory"
 class BodyLimitMiddleware:
     """Bounds every request's body: flight records to `upload_bytes`, everything else to 1 MiB."""
 
-    def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[], Response]) -> None:
+    def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
         self._upload_bytes = upload_bytes
         self._refuse = refuse
@@ -26,10 +26,10 @@ class BodyLimitMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        limit = self._upload_bytes if scope["path"].endswith(_UPLOADS) else JSON_BYTES
+        field, limit = ("file", self._upload_bytes) if scope["path"].endswith(_UPLOADS) else ("body", JSON_BYTES)
         stated = Headers(scope=scope).get("content-length", "")
         if stated.isdecimal() and int(stated) > limit:
-            await self._refuse()(scope, receive, send)
+            await self._refuse(_too_large(field, limit))(scope, receive, send)
             return
         received = 0
 
@@ -38,7 +38,16 @@ class BodyLimitMiddleware:
             message = await receive()
             received += len(message.get("body", b""))
             if received > limit:
-                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+                raise _too_large(field, limit)
             return message
 
         await self._app(scope, receive_bounded, send)
+
+
+def _too_large(field: str, limit_bytes: int) -> TooLargeError:
+    size = f"{limit_bytes / 2**20:g} MiB"
+    return TooLargeError(
+        "The request is too large; nothing was stored.",
+        hint=f"Send at most {size}; a flight record has at most 200 000 rows, so thin a longer one or cut it.",
+        problems=(Problem(field, f"is larger than {size}"),),
+    )

@@ -15,7 +15,7 @@ from app.errors import InputError, MediaTypeError, Problem
 
 _IN_MEMORY_BYTES: Final = 2**20
 _CHUNK_BYTES: Final = 2**18
-_RAW: Final = frozenset({"text/csv", "application/csv", "text/plain", "application/octet-stream"})
+_RAW: Final = frozenset({"text/csv", "application/csv", "application/octet-stream"})
 
 REQUEST_BODY: Final = {
     "requestBody": {

@@ -1,5 +1,6 @@
 """Problem documents: every refusal says what happened, what to do, and which field is to blame."""
 
+import base64
 import errno
 
 import pytest
@@ -97,6 +98,7 @@ def test_an_unknown_method_is_405(client: TestClient) -> None:
         (b'{"name": "\\ud800"}', "application/json", 422),
         (b"\xff\xfe", "application/json", 422),
         (b'{"name": "' + b"x" * 2**20 + b'"}', "application/json", 413),
+        (b'{"name": "a", "definition": {"options": {"scaled": "\\ud800"}}}', "application/json", 422),
         (b"[" * 100_000, "application/json", 400),
     ],
 )
@@ -130,6 +132,33 @@ def test_gains_that_may_not_fly_are_refused_by_field(
     assert answer.status_code == 422
     assert field in problems_of(answer)
     assert get(client, f"{CAMPAIGN}/{campaign['id']}/trials")["total"] == 0
+
+
+def test_half_a_character_is_refused_by_field(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    answer = client.post(
+        f"{CAMPAIGN}/{campaign['id']}/trials",
+        headers={"Content-Type": "application/json"},
+        content=b'{"gains": {"\\ud800": 1}}',
+    )
+    assert (answer.status_code, is_problem(answer)) == (422, True)
+    options = b'{"name": "a", "vehicle": {"kind": "twin", "options": {"\\ud800": 1}}}'
+    answer = client.post(CAMPAIGN, headers={"Content-Type": "application/json"}, content=options)
+    assert (answer.status_code, is_problem(answer)) == (422, True)
+
+
+def test_a_number_that_no_float_can_hold_is_refused_by_field(client: TestClient) -> None:
+    options = {"kind": "twin", "options": {"scatter": 10**400}}
+    answer = client.post(CAMPAIGN, json={"name": "a", "vehicle": options})
+    assert answer.status_code == 422
+    assert problems_of(answer)["vehicle.options.scatter"].startswith("must be a finite number, got 1000")
+
+
+@pytest.mark.parametrize("path", ["/api/campaigns?sort=error", "/api/jobs?limit=5", "/api/campaigns?sort=-created"])
+def test_a_cursor_with_a_number_that_no_float_can_hold_is_refused(client: TestClient, path: str) -> None:
+    order = {"/api/campaigns?sort=error": "error", "/api/campaigns?sort=-created": "-created"}.get(path, "-id")
+    huge = base64.urlsafe_b64encode(f'["{order}", {"9" * 330}, 1]'.encode()).decode().rstrip("=")
+    assert client.get(f"{path}&cursor={huge}").status_code == 422
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
@@ -193,7 +222,7 @@ def test_a_full_disk_outside_of_the_database_is_503_too(application: FastAPI) ->
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    with TestClient(application, raise_server_exceptions=False) as client:
+    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as client:
         answer = client.get("/api/full")
     assert (answer.status_code, is_problem(answer)) == (503, True)
 
@@ -203,7 +232,7 @@ def test_a_mistake_of_ours_is_500_with_a_number(application: FastAPI) -> None:
     def mistake() -> None:
         raise ZeroDivisionError
 
-    with TestClient(application, raise_server_exceptions=False) as client:
+    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as client:
         answer = client.get("/api/mistake")
     assert (answer.status_code, is_problem(answer)) == (500, True)
     assert "ZeroDivisionError" not in answer.text

@@ -79,6 +79,7 @@ def test_ten_million_rows_are_refused_without_filling_the_memory(client: TestCli
     )
     assert answer.status_code == 413
     assert "200 000 rows" in answer.json()["hint"]
+    assert problems_of(answer) == {"file": "is larger than 48 MiB"}
     # 98 MB of text arrive in the test's own memory as well; the server's share stays below the limit of an upload.
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib < 400_000
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
@@ -112,6 +113,7 @@ def test_a_record_may_come_as_a_form(client: TestClient, trial: Json) -> None:
         ({"data": {"file": "text"}, "files": {"other": ("a", b"x")}}, 422),
         ({"json": {"time_s": [0], "altitude_m": [0]}}, 415),
         ({"content": b"x", "headers": {"Content-Type": "application/zip"}}, 415),
+        ({"content": create_csv(), "headers": {"Content-Type": "text/plain"}}, 415),
         ({"content": b"broken", "headers": {"Content-Type": "multipart/form-data"}}, 400),
         ({"content": b"broken", "headers": {"Content-Type": "multipart/form-data; boundary=b"}}, 400),
     ],
