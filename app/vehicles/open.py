@@ -1,7 +1,7 @@
 """The vehicles there are, and the one way to take control of one."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import MappingProxyType
 from typing import Final
 
@@ -49,15 +49,19 @@ def open_vehicle(kind: str, options: Mapping[str, object], *, safe_gains: Gains)
     finally:
         try:
             _restore(vehicle)
-        finally:
-            vehicle.close()
+        except SafeGainsError:
+            with suppress(Exception):  # what must be heard is that its gains are in doubt
+                vehicle.close()
+            raise
+        vehicle.close()
 
 
 def _restore(vehicle: Vehicle) -> None:
     wanted = dict(vehicle.safe_gains)
-    held = vehicle.stage(wanted)
+    hint = "Do not fly it. Set its gains by hand, read them back, then release it."
+    try:
+        held = vehicle.stage(wanted)
+    except Exception as error:
+        raise SafeGainsError(f"The vehicle's safe gains {wanted} could not be set: {error}", hint=hint) from error
     if held != wanted:
-        raise SafeGainsError(
-            f"The vehicle holds {held} instead of its safe gains {wanted}.",
-            hint="Do not fly it. Set its gains by hand, read them back, then release it.",
-        )
+        raise SafeGainsError(f"The vehicle holds {held} instead of its safe gains {wanted}.", hint=hint)
