@@ -121,9 +121,7 @@ class Worker:
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
-            live = stack.enter_context(
-                LiveServer(live_address(self._settings.data_dir), abort=self._airspace.abort, hello=self._hello)
-            )
+            live = LiveServer(live_address(self._settings.data_dir), abort=self._airspace.abort, hello=self._hello)
             deck = FlightDeck(
                 database,
                 self._settings.data_dir,
@@ -133,12 +131,13 @@ class Worker:
                 closing=self._ending.event,
             )
             stack.callback(deck.close)
+            self._until_stored(deck.recover)
+            stack.enter_context(live)  # from here on flights can be asked for, which recovery would withdraw
             computing = stack.enter_context(ThreadPoolExecutor(SPARE_PROCESSORS, thread_name_prefix="job"))
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
             desk = ProposalDesk(database, pool, worker=self._name, lease_s=self._settings.lease_s)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self._ending.ask, "the worker failed; its log says why")
-            self._until_stored(deck.recover)
             self._until_stored(desk.recover)
             computing.submit(pool.run, os.getpid)
             _log.info("worker ready", worker=self._name)

@@ -5,10 +5,14 @@
                        ├→ record_failure      (not flown: the vehicle refused, or took other gains)
                        └→ record_withdrawal   (not flown: somebody ended it before lift-off)
 
+give_up_flight serves wherever the flight stands: before lift-off it was not flown, afterwards it is lost.
+
 What the vehicle is asked stands in the flight row before it is sent; what it answers, as soon as it is known.
 """
 
 from dataclasses import dataclass
+from datetime import timedelta
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -23,6 +27,12 @@ from app.trials.capture import capture
 from app.trials.lifecycle import move_flight, move_trial
 from app.trials.states import FlightState, TrialState
 from app.vehicles.base import FlightRecord, OptionValue
+
+BEGINS_WITHIN: Final = timedelta(seconds=10)
+"""How old a request may be when a worker takes it."""
+
+_WORKER_ENDED: Final = {True: "the worker ended while it flew", False: "the worker ended before lift-off"}
+_NOT_VERIFIED: Final = "whoever had it ended before its safe gains were read back, so nobody knows which gains it holds"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,9 +52,31 @@ class FlightTask:
 
 
 def claim_flight(session: Session, worker: str) -> FlightTask | None:
-    """The flight that has waited longest, now this worker's; None when none waits."""
-    if (flight := repository.first_requested(session)) is None:
-        return None
+    """The flight that has waited longest, now this worker's; None when none waits.
+
+    A flight begins when its operator expects it or not at all: one that could not be begun at once is withdrawn.
+    """
+    while (flight := repository.first_requested(session)) is not None:
+        if utc_now() - flight.requested_at <= BEGINS_WITHIN:
+            return _claimed(session, flight, worker)
+        _withdraw(flight, f"it could not be begun within {BEGINS_WITHIN.total_seconds():g} s")
+    return None
+
+
+def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
+    """At a worker's start: nothing takes off that was asked for while there was nobody to fly it. Gives their ids."""
+    withdrawn: list[int] = []
+    while (flight := repository.first_requested(session)) is not None:
+        _withdraw(flight, reason)
+        withdrawn.append(flight.id)
+    return withdrawn
+
+
+def _withdraw(flight: FlightRow, reason: str) -> None:
+    move_flight(flight, FlightState.CANCELLED, problem=f"It was not flown: {reason}. Ask again if it is still wanted.")
+
+
+def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightTask:
     move_flight(flight, FlightState.RUNNING)
     flight.worker, flight.claimed_at = worker, utc_now()
     trial, campaign = flight.trial, campaigns.get_row(session, flight.campaign_id)
@@ -110,8 +142,8 @@ def record_loss(session: Session, flight_id: int, problem: str) -> None:
     if flight.state != FlightState.RUNNING:
         return
     move_trial(flight.trial, TrialState.LOST, reason=problem)
-    concern = "its last flight was lost, so nobody knows which gains it holds" if flight.vehicle.is_real else ""
-    _end(flight, FlightState.LOST, problem=problem, concern=concern)
+    _end(flight, FlightState.LOST, problem=problem)
+    doubt_vehicle(session, flight_id)
     campaigns.end_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
@@ -130,16 +162,31 @@ def quarantine_vehicle(session: Session, flight_id: int, concern: str) -> None:
     fleet.settle_vehicle(repository.get_flight(session, flight_id).vehicle, concern=concern)
 
 
+def doubt_vehicle(session: Session, flight_id: int) -> None:
+    """After a flight at whose end nobody said that the safe gains are restored. A real vehicle is quarantined; a
+    simulated one starts afresh with every flight."""
+    if repository.get_flight(session, flight_id).vehicle.is_real:
+        quarantine_vehicle(session, flight_id, _NOT_VERIFIED)
+
+
+def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
+    """Nothing more is heard of a flight: it is lost, or was not flown if it had not lifted off. Whether it is lost."""
+    lifted_off = repository.get_flight(session, flight_id).trial.state == TrialState.FLYING
+    if lifted_off:
+        record_loss(session, flight_id, problem)
+    else:
+        record_failure(session, flight_id, problem)
+    doubt_vehicle(session, flight_id)
+    return lifted_off
+
+
 def lose_running_flights(session: Session) -> list[int]:
     """At a worker's start: what flew is lost, what was only staged is planned again. Gives the lost trials' ids."""
-    lost: list[int] = []
-    for flight in repository.running(session):
-        if flight.trial.state == TrialState.FLYING:
-            record_loss(session, flight.id, "the worker ended while it flew")
-            lost.append(flight.trial_id)
-        else:
-            record_failure(session, flight.id, "the worker ended before lift-off")
-    return lost
+    return [
+        flight.trial_id
+        for flight in repository.running(session)
+        if give_up_flight(session, flight.id, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
+    ]
 
 
 def recover_record(session: Session, flight_id: int, record: FlightRecord) -> None:
@@ -173,6 +220,6 @@ def _not_flown(session: Session, flight_id: int, state: FlightState, problem: st
     _end(flight, state, problem=problem)
 
 
-def _end(flight: FlightRow, state: FlightState, *, problem: str = "", concern: str = "") -> None:
+def _end(flight: FlightRow, state: FlightState, *, problem: str = "") -> None:
     move_flight(flight, state, problem=problem)
-    fleet.settle_vehicle(flight.vehicle, concern=concern)
+    fleet.settle_vehicle(flight.vehicle)

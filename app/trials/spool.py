@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -45,7 +46,8 @@ class Spool:
             with path.open("wb") as file:
                 os.posix_fallocate(file.fileno(), 0, ROOM_BYTES)
         except OSError as error:
-            path.unlink(missing_ok=True)
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
             raise StorageError(
                 f"There is no room for the flight's record in {self._folder}: {error.strerror}.",
                 hint=f"Free at least {2 * ROOM_BYTES // 2**20} MB there, then fly again; nothing has moved.",
@@ -54,17 +56,16 @@ class Spool:
     def keep(self, flight_id: int, record: FlightRecord) -> None:
         """Write a record into its room, from where on it survives a crash. Raises StorageError when it does not fit."""
         path = self._path(flight_id, _UNFINISHED)
-        content = _pack(Spooled(flight_id, record))
         try:
             with path.open("r+b") as file:
-                file.write(content)
+                file.write(_pack(Spooled(flight_id, record)))
                 file.truncate()
                 os.fsync(file.fileno())
             path.replace(self._path(flight_id, _FINISHED))
             _sync_folder(self._folder)
-        except OSError as error:
+        except (OSError, ValueError, TypeError) as error:
             raise StorageError(
-                f"The record of flight {flight_id} could not be written to {path}: {error.strerror}.",
+                f"The record of flight {flight_id} could not be written to {path}: {error}.",
                 hint="Free some space there; the worker keeps trying while it runs.",
             ) from error
 
@@ -84,14 +85,20 @@ class Spool:
             ) from error
 
     def drop(self, flight_id: int) -> None:
-        """Give the room back: the record is in the database, or the flight never began."""
+        """Give the room back: the record is in the database, or the flight never began. What cannot be removed now is
+        at the next start: to recover a record twice is harmless."""
         for suffix in (_UNFINISHED, _FINISHED):
-            self._path(flight_id, suffix).unlink(missing_ok=True)
+            with suppress(OSError):
+                self._path(flight_id, suffix).unlink(missing_ok=True)
 
-    def set_aside(self, flight_id: int) -> str:
-        """Put a record that cannot be used out of the way, without losing it; its new place."""
+    def set_aside(self, flight_id: int) -> str | None:
+        """Put a record that cannot be used out of the way, without losing it; its new place, or None when it is not
+        here."""
         path = self._path(flight_id, _FINISHED)
-        return str(path.replace(path.with_suffix(".unusable")))
+        try:
+            return str(path.replace(path.with_suffix(".unusable")))
+        except FileNotFoundError:
+            return None
 
     def sweep(self) -> None:
         """Give back the rooms of flights that left no record. Only before anything flies."""

@@ -6,6 +6,7 @@ nothing waits for the database; a record goes to the spool first, and from there
 
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -33,7 +34,8 @@ class Ended:
     """How a flight ended, so far as this process knows.
 
     With a `record` it took place. Without one, `lifted_off` says whether the vehicle had been told to take off, and
-    `withdrawn` that somebody ended it before that. `concern`: the safe gains could not be verified afterwards.
+    `withdrawn` that somebody ended it before that. `concern`: the safe gains could not be verified afterwards;
+    `unheard`: whoever had the vehicle ended without saying whether they are restored.
     """
 
     record: FlightRecord | None = None
@@ -41,6 +43,7 @@ class Ended:
     withdrawn: bool = False
     problem: str = ""
     concern: str = ""
+    unheard: bool = False
 
 
 class FlightDeck:
@@ -70,8 +73,11 @@ class FlightDeck:
         self._hangar.close()
 
     def recover(self) -> None:
-        """After a start: what was flying is lost, unless its record is in the spool. Raises StorageError."""
+        """After a start: what was flying is lost, unless its record is in the spool; what was asked for while nobody
+        could fly it is not flown. Raises StorageError."""
         with self._database.write() as session:
+            for flight_id in flights.withdraw_requested_flights(session, "the worker was away when it was asked for"):
+                _log.warning("flight withdrawn: it was asked for before this worker began", flight_id=flight_id)
             for trial_id in flights.lose_running_flights(session):
                 _log.warning("flight lost: the worker ended while it was under way", trial_id=trial_id)
         for flight_id in self._spool.kept():
@@ -80,10 +86,12 @@ class FlightDeck:
 
     def claim(self) -> FlightTask | None:
         """The flight that has waited longest, now this worker's; None when none waits. Raises StorageError."""
-        with self._database.write() as session:
-            task = flights.claim_flight(session, self._worker)
-        if task is not None:
-            self._airspace.enter(task.trial_id)
+        with ExitStack() as undo:
+            with self._database.write() as session:
+                if (task := flights.claim_flight(session, self._worker)) is not None:
+                    self._airspace.enter(task.trial_id)  # before anybody can see that it runs, and abort it
+                    undo.callback(self._airspace.leave, task.trial_id)
+            undo.pop_all()
         return task
 
     def carry_out(self, task: FlightTask) -> None:
@@ -94,15 +102,27 @@ class FlightDeck:
             try:
                 self._report(task, self._fly(task, self._airspace.enter(task.trial_id)))
             except Exception:  # noqa: BLE001 - the edge of the thread
-                _log.exception("the outcome of a flight cannot be stored; the trial is lost at the next start")
+                _log.exception("the end of a flight cannot be stored; the trial is lost at the next start")
             finally:
                 self._airspace.leave(task.trial_id)
 
     def _fly(self, task: FlightTask, flag: AbortFlag) -> Ended:
-        ended = Ended()
-        cockpit = self._hangar.take()
+        if flag.reason is not None:
+            return Ended(withdrawn=True, problem=flag.reason)
         try:
             self._spool.claim(task.flight_id)
+            cockpit = self._hangar.take()
+        except (GainlineError, OSError) as error:
+            return Ended(problem=f"It was not begun: {error}")
+        try:
+            return self._fly_in(cockpit, task, flag)
+        finally:
+            flag.tell(lambda _reason: None)
+
+    def _fly_in(self, cockpit: Cockpit, task: FlightTask, flag: AbortFlag) -> Ended:
+        """The part that the vehicle takes part in; whatever happens, its process is let go, and there is an end."""
+        ended = Ended()
+        try:
             self._phase(task, "staging")
             flag.tell(lambda reason: cockpit.stand_down(task.trial_id, reason))
             for said in cockpit.fly(self._orders(task)):
@@ -115,19 +135,10 @@ class FlightDeck:
                         ended = Ended(record=record, lifted_off=True)
                     case Trouble(what, unsafe):
                         ended = replace(ended, problem=ended.problem or what, concern=what if unsafe else "")
-        except GainlineError as error:
-            ended = replace(ended, problem=str(error))
+        except Exception as error:  # noqa: BLE001 - a mistake of the program must not leave the trial without an end
             cockpit.close()
-        except Exception as error:  # noqa: BLE001 - whatever happens, the process is let go and the trial has its end
-            _log.exception("flight broken off by a mistake of the program")
-            ended = replace(
-                ended, problem=f"The program made a mistake ({type(error).__name__}); see the worker's log."
-            )
-            cockpit.close()
-        else:
-            self._hangar.give_back(cockpit)
-        finally:
-            flag.tell(lambda _reason: None)
+            return replace(ended, problem=_spoken(error), unheard=True)
+        self._hangar.give_back(cockpit)
         return ended
 
     def _staged(self, task: FlightTask, flag: AbortFlag, cockpit: Cockpit, read_back: dict[str, float]) -> Ended:
@@ -166,34 +177,32 @@ class FlightDeck:
         self._publish(FlightPhase(campaign_id=task.campaign_id, trial_id=task.trial_id, phase=phase, note=note))
 
     def _report(self, task: FlightTask, ended: Ended) -> None:
-        """Store the outcome; a record that is refused is put aside, and the trial is lost."""
+        """Store the outcome. What the database refuses is put aside, and the flight is given up in its place: nothing
+        but a worker's end leaves a flight running."""
         _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
         if ended.record is not None:
             self._keep(task, ended.record)
         try:
-            stored = self._store_patiently(task, ended)
-        except GainlineError as error:
-            if ended.record is None:
-                raise
-            kept_as = self._spool.set_aside(task.flight_id)
-            _log.error("record refused", why=str(error), kept_as=kept_as)
-            stored = self._store_patiently(
-                task,
-                Ended(
-                    lifted_off=True,
-                    concern=ended.concern,
-                    problem=f"Its record cannot be stored ({error}); it is kept as {kept_as}.",
-                ),
-            )
+            stored = self._store_patiently(task, lambda session: _record(session, task, ended))
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, the vehicle is not blocked by it
+            problem = self._refused(task, ended, error)
+            stored = self._store_patiently(task, lambda session: _give_up(session, task, ended, problem))
         if stored:
             self._spool.drop(task.flight_id)
             self._phase(task, "ended")
 
-    def _store_patiently(self, task: FlightTask, ended: Ended) -> bool:
+    def _refused(self, task: FlightTask, ended: Ended, error: Exception) -> str:
+        why = f"Its outcome cannot be stored: {_spoken(error)}"
+        if ended.record is None:
+            return why
+        kept_as = self._spool.set_aside(task.flight_id)
+        return f"{why} The record is kept as {kept_as}." if kept_as else f"{why} The record could not be kept either."
+
+    def _store_patiently(self, task: FlightTask, work: Callable[[Session], None]) -> bool:
         """Try until the database takes it; false when the worker closes meanwhile (the spool keeps the record)."""
         while True:
             try:
-                self._store(lambda session: _record(session, task, ended))
+                self._store(work)
             except StorageError as error:
                 _log.error("outcome not stored yet", why=str(error))
                 self._phase(task, "landed", f"The outcome is kept, but not stored yet: {error}")
@@ -244,14 +253,33 @@ def mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None
     return f"The vehicle did not take the gains: {'; '.join(wrong)}. It was not flown." if wrong else None
 
 
+def _spoken(error: Exception) -> str:
+    """What went wrong, in words for the operator; what the program did wrong goes to the log in full."""
+    if isinstance(error, GainlineError):
+        return str(error)
+    _log.error("a mistake of the program", exc_info=error)
+    return f"The program made a mistake ({type(error).__name__}); see the worker's log."
+
+
 def _record(session: Session, task: FlightTask, ended: Ended) -> None:
     if ended.record is not None:
         flights.record_landing(session, task.flight_id, ended.record)
     elif ended.lifted_off:
-        flights.record_loss(session, task.flight_id, ended.problem)
+        flights.record_loss(session, task.flight_id, ended.problem or "its process ended without a record")
     elif ended.withdrawn:
         flights.record_withdrawal(session, task.flight_id, ended.problem)
     else:
         flights.record_failure(session, task.flight_id, ended.problem)
+    _record_doubts(session, task, ended)
+
+
+def _give_up(session: Session, task: FlightTask, ended: Ended, problem: str) -> None:
+    flights.give_up_flight(session, task.flight_id, problem)
+    _record_doubts(session, task, ended)
+
+
+def _record_doubts(session: Session, task: FlightTask, ended: Ended) -> None:
     if ended.concern:
         flights.quarantine_vehicle(session, task.flight_id, ended.concern)
+    elif ended.unheard:
+        flights.doubt_vehicle(session, task.flight_id)

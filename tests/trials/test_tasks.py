@@ -1,0 +1,257 @@
+"""Carrying out flights: a real deck on a real database, with real vehicles in processes of their own."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import event, text
+from sqlalchemy.orm import Session
+
+from app.db.models import FlightRow
+from app.db.session import Database
+from app.live.messages import FlightPhase, Telemetry
+from app.settings import Settings
+from app.trials.flights import BEGINS_WITHIN
+from app.trials.flying import Airspace
+from app.trials.states import FlightState, TrialState
+from app.trials.tasks import FlightDeck
+from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
+from tests.trials.states import make_vehicle_real
+
+Watch = Callable[[Telemetry | FlightPhase], None]
+
+
+class Airfield:
+    """A deck with its airspace; `watch` hears what the flights say."""
+
+    def __init__(self, database: Database, settings: Settings) -> None:
+        self.airspace = Airspace()
+        self.heard: list[Telemetry | FlightPhase] = []
+        self.watch: Watch = lambda _said: None
+        self.deck = FlightDeck(
+            database, settings.data_dir, self.airspace, self._hear, worker="tests", closing=threading.Event()
+        )
+
+    def fly_next(self) -> None:
+        task = self.deck.claim()
+        assert task is not None
+        self.deck.carry_out(task)
+
+    def kill_cockpits(self) -> None:
+        for cockpit in self.deck._hangar._waiting:
+            os.kill(cockpit._process.pid or 0, signal.SIGKILL)
+
+    def _hear(self, said: Telemetry | FlightPhase) -> None:
+        self.heard.append(said)
+        self.watch(said)
+
+
+@pytest.fixture
+def field(client: TestClient, database: Database, settings: Settings) -> Iterator[Airfield]:
+    one = Airfield(database, settings)
+    yield one
+    one.deck.close()
+
+
+@pytest.fixture
+def trial_id(client: TestClient, database: Database, field: Airfield) -> int:
+    """A trial whose flight on the twin is asked for."""
+    campaign = create_ready_campaign(client, database)
+    identity: int = create_trial(client, campaign["id"], fly={"speed": None})["id"]
+    return identity
+
+
+def vehicle_state(client: TestClient) -> str:
+    state: str = get(client, "/api/vehicles/1")["state"]
+    return state
+
+
+def when_changed_to(
+    database: Database, state: TrialState | FlightState, act: Callable[[], object], *, stored: bool = True
+) -> None:
+    """Something that happens once: as soon as others can see this state, or before it is `stored`."""
+    still_to_happen = [act]
+    changed: list[bool] = []
+
+    def look(session: Session, _context: object) -> None:
+        if any(getattr(row, "state", None) is state for row in session.dirty):
+            changed.append(True)
+            if not stored:
+                happen(session)
+
+    def happen(_session: Session) -> None:
+        if changed and still_to_happen:
+            still_to_happen.pop()()
+
+    event.listen(database._writers, "after_flush", look)
+    event.listen(database._writers, "after_commit", happen)
+
+
+def refuse(database: Database, operation: str) -> None:
+    """The database takes no such statement any more, for a reason that is no trouble of the storage."""
+    with database.write() as session:
+        session.execute(
+            text(f"CREATE TRIGGER refusal BEFORE {operation} BEGIN SELECT RAISE(ABORT, 'not this one'); END")
+        )
+
+
+def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field: Airfield, trial_id: int) -> None:
+    field.fly_next()
+    flown = get(client, f"/api/trials/{trial_id}")
+    assert (flown["state"], flown["flight"]["state"]) == ("valid", "landed")
+    assert [said.phase for said in field.heard if isinstance(said, FlightPhase)] == [
+        "staging", "flying", "landed", "ended"]  # fmt: skip
+    assert field.airspace.trials() == []
+    assert vehicle_state(client) == "ready"
+
+
+def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_ground(
+    client: TestClient, database: Database, field: Airfield, trial_id: int
+) -> None:
+    when_changed_to(database, TrialState.FLYING, lambda: field.airspace.abort(trial_id, "somebody walked in"))
+    field.fly_next()
+    ended = get(client, f"/api/trials/{trial_id}")
+    assert (ended["state"], ended["reason"]) == ("aborted", "somebody walked in")
+    assert ended["record"]["samples"] == 1
+    assert vehicle_state(client) == "ready"
+
+
+def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
+    client: TestClient, database: Database, field: Airfield, trial_id: int
+) -> None:
+    seen: list[bool] = []
+
+    when_changed_to(
+        database, FlightState.RUNNING, lambda: seen.append(field.airspace.abort(trial_id, "changed my mind"))
+    )
+    field.fly_next()
+    assert seen == [True]
+    ended = get(client, f"/api/trials/{trial_id}")
+    assert (ended["state"], ended["flight"]["state"]) == ("planned", "cancelled")
+    assert ended["flight"]["problem"] == "changed my mind"
+    assert ended["read_back"] is None, "nothing was sent to the vehicle"
+
+
+def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
+    client: TestClient, database: Database, field: Airfield, trial_id: int
+) -> None:
+    def fail() -> None:
+        raise RuntimeError("the power went")
+
+    when_changed_to(database, FlightState.RUNNING, fail, stored=False)
+    with pytest.raises(RuntimeError, match="the power went"):
+        field.deck.claim()
+    assert field.airspace.trials() == []
+
+
+def test_a_flight_that_was_asked_for_while_the_worker_was_away_does_not_take_off(
+    client: TestClient, field: Airfield, trial_id: int
+) -> None:
+    field.deck.recover()
+    assert field.deck.claim() is None
+    after = get(client, f"/api/trials/{trial_id}")
+    assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
+    assert "the worker was away when it was asked for" in after["flight"]["problem"]
+    assert client.post(f"/api/trials/{trial_id}/fly").status_code in {202, 503}, "it can be asked for again"
+
+
+def test_a_flight_that_waited_too_long_is_withdrawn_and_one_of_now_is_flown(
+    client: TestClient, database: Database, field: Airfield, trial_id: int
+) -> None:
+    with database.write() as session:
+        for row in session.query(FlightRow):
+            row.requested_at -= BEGINS_WITHIN + timedelta(seconds=1)
+    assert field.deck.claim() is None
+    flight = get(client, f"/api/trials/{trial_id}")["flight"]
+    assert flight["state"] == "cancelled"
+    assert "could not be begun within 10 s" in flight["problem"]
+
+
+def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothing(
+    client: TestClient, database: Database, field: Airfield, settings: Settings, trial_id: int
+) -> None:
+    refuse(database, "INSERT ON trajectory")
+    field.fly_next()
+    lost = get(client, f"/api/trials/{trial_id}")
+    assert (lost["state"], lost["flight"]["state"]) == ("lost", "lost")
+    (kept,) = (settings.data_dir / "spool").iterdir()
+    assert f"kept as {kept}" in lost["reason"]
+    assert kept.suffix == ".unusable"
+    assert vehicle_state(client) == "ready"
+    assert field.airspace.trials() == []
+
+
+def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
+    client: TestClient, database: Database, field: Airfield, settings: Settings, trial_id: int
+) -> None:
+    refuse(database, "INSERT ON trajectory")
+    spool = settings.data_dir / "spool"
+
+    def lose_the_spool(said: Telemetry | FlightPhase) -> None:
+        if isinstance(said, FlightPhase) and said.phase == "landed" and spool.exists():
+            for path in spool.iterdir():
+                path.unlink()
+            spool.rmdir()
+
+    field.watch = lose_the_spool
+    field.fly_next()
+    lost = get(client, f"/api/trials/{trial_id}")
+    assert lost["state"] == "lost"
+    assert "could not be kept either" in lost["reason"]
+    assert vehicle_state(client) == "ready"
+
+
+@pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
+def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
+    client: TestClient, database: Database, field: Airfield, trial_id: int, real: bool, then: str
+) -> None:
+    if real:
+        make_vehicle_real(database)
+    field.kill_cockpits()
+    field.fly_next()
+    after = get(client, f"/api/trials/{trial_id}")
+    assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
+    assert "exit code -9" in after["flight"]["problem"]
+    vehicle = get(client, "/api/vehicles/1")
+    assert vehicle["state"] == then
+    assert ("nobody knows which gains it holds" in vehicle["concern"]) == real
+
+
+@pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
+def test_a_worker_that_died_with_gains_staged_leaves_a_real_vehicle_in_quarantine(
+    client: TestClient, database: Database, field: Airfield, trial_id: int, real: bool, then: str
+) -> None:
+    if real:
+        make_vehicle_real(database)
+    stage(database)
+    field.deck.recover()
+    assert get(client, f"/api/trials/{trial_id}")["state"] == "planned"
+    assert vehicle_state(client) == then
+
+
+def test_a_real_vehicle_is_not_in_doubt_when_nothing_was_sent_to_it(
+    client: TestClient, database: Database, field: Airfield, settings: Settings, trial_id: int
+) -> None:
+    make_vehicle_real(database)
+    (settings.data_dir / "spool").write_text("a file in the way")
+    field.fly_next()
+    assert "no room for the flight's record" in get(client, f"/api/trials/{trial_id}")["flight"]["problem"]
+    assert vehicle_state(client) == "ready"
+
+
+def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
+    client: TestClient, database: Database, field: Airfield, trial_id: int
+) -> None:
+    task = field.deck.claim()
+    assert task is not None
+    with database.write() as session:
+        session.query(FlightRow).one().trial.state = TrialState.FLYING
+    field.deck._spool.claim(task.flight_id)
+    field.deck._spool.keep(task.flight_id, create_record(1.0))
+    field.deck.recover()
+    assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
+    assert field.deck._spool.kept() == []
