@@ -11,6 +11,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
+from app.core.policy import shortened
 from app.errors import InputError, NotFoundError, Problem
 from app.schemas import Text
 
@@ -118,7 +119,10 @@ def with_settings(file: CampaignFile, settings: Mapping[tuple[str, ...], object]
     try:
         return CampaignFile.model_validate(document)
     except ValidationError as error:
-        problems = tuple(Problem(".".join(map(str, entry["loc"])), entry["msg"]) for entry in error.errors())
+        problems = tuple(
+            Problem(".".join(map(str, entry["loc"])), f"{entry['msg']}, got {shortened(entry['input'])}")
+            for entry in error.errors()
+        )
         raise InputError(
             "These settings do not make a campaign.", problems=problems, hint="Correct the named settings."
         ) from error

@@ -1,5 +1,6 @@
 """Records sent in: every malformed one is refused in words and stores nothing; the largest never fills the memory."""
 
+import hashlib
 import resource
 from collections.abc import Iterator
 
@@ -160,3 +161,13 @@ def test_a_thinned_record_keeps_its_ends_and_its_peak(client: TestClient, trial:
     assert thinned["time_s"][-1] == pytest.approx(time_s[-1], rel=1e-6)
     whole = get(client, f"/api/trials/{trial['id']}/trajectory?points=20000")
     assert len(whole["time_s"]) == 16_700
+
+
+def test_the_checksum_of_an_export_can_be_verified_by_anybody(client: TestClient, trial: Json) -> None:
+    """As docs/api.md says: SHA-256 of the column names, a NUL, and the columns as little-endian single precision."""
+    send(client, trial["id"], create_csv(0.8))
+    export = client.get(f"/api/trials/{trial['id']}/trajectory.csv")
+    header, *lines = export.text.splitlines()
+    table = np.array([line.split(",") for line in lines], dtype="<f4").T
+    content = "\n".join(header.split(",")).encode() + b"\0" + table.tobytes()
+    assert hashlib.sha256(content).hexdigest() == export.headers["x-checksum-sha256"]

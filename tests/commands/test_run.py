@@ -94,6 +94,7 @@ def test_json_can_go_to_standard_output_alone() -> None:
         (("--set", "wind_m_s"), "--set wind_m_s"),
         (("--set", "wind_m_s=-3"), "vehicle.options.wind_m_s"),
         (("--set", "wind_m_s=.nan"), "vehicle.options.wind_m_s"),
+        (("--set", f"wind_m_s={'9' * 400}"), "vehicle.options.wind_m_s"),
         (("--set", "scaled=maybe"), "definition.options.scaled"),
         (("--start", "1,2"), "--start"),
         (("--start", "-1,13,82"), "definition.start.gains.kp"),
@@ -107,6 +108,13 @@ def test_what_cannot_be_flown_is_refused_by_name(arguments: tuple[str, ...], nam
     result = gainline("run", "ardrone-takeoff", *arguments)
     assert result.exit_code == 1
     assert f"  {named}: " in result.stderr
+
+
+@pytest.mark.parametrize("given", [("--set", "wind_m_s=.inf"), ("--set", "step_fraction=.inf")])
+def test_a_number_that_is_not_finite_is_said_back(given: tuple[str, str]) -> None:
+    result = gainline("run", "ardrone-takeoff", *given)
+    assert result.exit_code == 1
+    assert "got inf" in result.stderr
 
 
 def test_an_unknown_preset_names_those_there_are() -> None:

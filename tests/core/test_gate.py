@@ -75,3 +75,18 @@ def test_what_is_reachable_passes_and_what_passes_is_reachable(gains: dict[str, 
     low, high = SPACE.reachable(SPACE.default, fraction)
     reachable = bool(((low <= SPACE.vector(gains)) & (SPACE.vector(gains) <= high)).all())
     assert check_policy(definition, TAKEOFF, SPACE, gains, []).passed == reachable
+
+
+def test_a_pinned_gain_is_refused_at_any_other_value_and_flown_at_its_own() -> None:
+    space = TAKEOFF.space.narrowed({"ki": (13, 13)})
+    definition = Definition(bounds={"ki": (13, 13)})
+    for ki, passed in ((13, True), (14, False)):
+        gate = check_policy(definition, TAKEOFF, space, DEFAULT | {"ki": ki}, [])
+        assert gate.passed is passed
+    refused = gate.checks[0]
+    assert (refused.name, refused.gain, refused.worst) == ("bounds", "ki", math.inf)
+
+
+def test_a_refused_step_names_its_gain() -> None:
+    gate = check_policy(Definition(), TAKEOFF, TAKEOFF.space, DEFAULT | {"kd": 400}, [])
+    assert [(check.name, check.gain) for check in gate.checks if not check.passed] == [("step", "kd")]

@@ -19,7 +19,6 @@ STEP_S: Final = 1 / RATE_HZ
 FULL_THRUST: Final = 9600
 POSITION_BITS: Final = 8
 SPEED_BITS: Final = 19
-ACCELERATION_BITS: Final = 10
 R33_BITS: Final = 14
 LEVEL: Final = 1 << R33_BITS
 

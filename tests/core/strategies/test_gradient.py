@@ -127,3 +127,17 @@ def test_the_step_limit_holds_each_gain_and_is_named() -> None:
     assert proposal.gains == pytest.approx({"a": 40.0, "b": 60})
     assert proposal.explanation.clipped == ("a", "b")
     assert proposal.explanation.notes[-1] == "A bound or the step limit stopped a, b."
+
+
+def test_a_pinned_gain_stays_and_the_others_descend() -> None:
+    """With b pinned at 70 only ∂/∂a = 0.4 is left: the unit direction is −10 counts of a, and 2 units reach a = 30."""
+    pinned = SPACE.narrowed({"b": (70, 70)})
+    proposal = propose(Definition(bounds={"b": (70, 70)}), BOWL, pinned, [fly(1, 50.0, 70)])
+    assert proposal.explanation.gradient == pytest.approx({"a": 0.4, "b": 0.0})
+    assert proposal.gains == pytest.approx({"a": 30.0, "b": 70})
+
+
+def test_with_every_gain_pinned_there_is_nothing_better() -> None:
+    bounds = {"a": (50.0, 50.0), "b": (70.0, 70.0)}
+    proposal = propose(Definition(bounds=bounds), BOWL, SPACE.narrowed(bounds), [fly(1, 50.0, 70)])
+    assert (proposal.kind, proposal.gains) == ("none", {"a": 50.0, "b": 70})

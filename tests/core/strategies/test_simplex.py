@@ -44,3 +44,9 @@ def test_a_step_limit_lets_it_approach_the_optimum_flight_by_flight() -> None:
     proposal = propose(Definition(step_fraction=0.2), BOWL, Bowl.space, [fly(1, 90.0, 90)])
     assert proposal.gains == pytest.approx({"a": 70.0, "b": 70})
     assert proposal.explanation.clipped == ("a", "b")
+
+
+def test_the_search_leaves_a_pinned_gain_where_it_is() -> None:
+    pinned = Bowl.space.narrowed({"b": (70, 70)})
+    optimum = model_optimum(BOWL, pinned, np.array([90.0, 70.0]))
+    assert optimum.gains == pytest.approx([30.0, 70.0], abs=1e-3)
