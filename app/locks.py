@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+from app.errors import StorageError
+
 POLL_S: Final = 0.1
 
 
@@ -37,9 +39,16 @@ class LockedError(Exception):
 def exclusive(path: Path, *, keep_waiting: Callable[[], bool] = lambda: False) -> Iterator[Callable[[str], None]]:
     """Hold the lock file at `path`; what it yields writes the holder's address into it.
 
-    Raises LockedError when another process holds it and `keep_waiting()` is false.
+    Raises LockedError when another process holds it and `keep_waiting()` is false, StorageError when there can be no
+    such file.
     """
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise StorageError(
+            f"The lock file {path} cannot be opened: {error.strerror}.",
+            hint="Give this user the right to read and write it, or choose another folder with --data-dir.",
+        ) from error
     try:
         while not _take(descriptor):
             if not keep_waiting():

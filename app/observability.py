@@ -9,6 +9,8 @@ from typing import Final, Literal
 import structlog
 from structlog.typing import Processor
 
+from app.data_dir import prepare_data_dir
+
 MAX_LOG_BYTES: Final = 5_000_000
 KEPT_LOGS: Final = 5
 
@@ -23,7 +25,7 @@ _SHARED: Final[tuple[Processor, ...]] = (
 def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -> None:
     """Send this process's logs, the libraries' included, to its file and to standard error (readable on a terminal)."""
     folder = data_dir / "log"
-    folder.mkdir(parents=True, exist_ok=True)
+    prepare_data_dir(folder)
     to_file = logging.handlers.RotatingFileHandler(
         folder / f"{role}.log", maxBytes=MAX_LOG_BYTES, backupCount=KEPT_LOGS, delay=True, encoding="utf-8"
     )

@@ -13,6 +13,7 @@ from typing import Final
 import structlog
 import uvicorn
 
+from app.data_dir import prepare_data_dir
 from app.db.migrate import migrate
 from app.errors import AddressError, AlreadyRunningError, Problem
 from app.locks import LockedError, exclusive
@@ -37,9 +38,9 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
     """Run the dashboard until SIGINT or SIGTERM; the main thread only.
 
     Raises AlreadyRunningError when another server has this database, AddressError when the host or port cannot be had,
-    and StorageError when the database cannot be opened or brought up to date.
+    and StorageError when the data folder cannot be used or the database cannot be opened or brought up to date.
     """
-    settings.data_dir.mkdir(parents=True, exist_ok=True)
+    prepare_data_dir(settings.data_dir)
     with ExitStack() as stack:
         for number in (signal.SIGINT, signal.SIGTERM):
             stack.callback(signal.signal, number, signal.signal(number, _leave))

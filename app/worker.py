@@ -19,6 +19,7 @@ import structlog
 
 from app import __version__
 from app.campaigns.tasks import ProposalDesk, prepare
+from app.data_dir import prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import AlreadyRunningError, StorageError
@@ -57,7 +58,7 @@ def run_worker(settings: Settings) -> None:
     """Work until SIGINT or SIGTERM, which also end the flights under way; the main thread only.
 
     Raises AlreadyRunningError when another worker has this database, SchemaError when it is not up to date, and
-    StorageError when it cannot be opened.
+    StorageError when it cannot be opened or the data folder cannot be used.
     """
     airspace, ending = Airspace(), Ending()
     _end_on(signal.SIGINT, signal.SIGTERM, ending=ending, airspace=airspace)
@@ -84,7 +85,7 @@ def run_supervised_worker(settings: Settings) -> None:
 
 
 def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting: Callable[[], bool]) -> None:
-    settings.data_dir.mkdir(parents=True, exist_ok=True)
+    prepare_data_dir(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
     with exclusive(settings.data_dir / "worker.lock", keep_waiting=keep_waiting):
         require_current(settings.database_file)

@@ -8,10 +8,10 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import text
-from sqlalchemy.exc import DBAPIError
 
-from app.db.session import open_engine, storage_error
-from app.errors import SchemaError, StorageError
+from app.data_dir import prepare_data_dir
+from app.db.session import open_engine, translated
+from app.errors import SchemaError
 
 _APP: Final = Path(__file__).resolve().parent.parent
 _COMMAND: Final = "gainline serve"
@@ -22,13 +22,7 @@ def migrate(database_file: Path) -> None:
 
     Raises SchemaError when it was written by a newer program, StorageError when it cannot be opened or written.
     """
-    try:
-        database_file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(
-            f"The data folder {database_file.parent} cannot be made: {error.strerror}.",
-            hint="Choose another one with --data-dir or GAINLINE_DATA_DIR.",
-        ) from error
+    prepare_data_dir(database_file.parent)
     held = revision_of(database_file)
     if held == newest_revision():
         return
@@ -37,7 +31,7 @@ def migrate(database_file: Path) -> None:
     engine = open_engine(database_file, foreign_keys=False)
     config = _config()
     try:
-        with engine.connect() as connection:
+        with translated(database_file), engine.connect() as connection:
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
             broken = connection.execute(text("PRAGMA foreign_key_check")).first()
@@ -47,10 +41,6 @@ def migrate(database_file: Path) -> None:
                     hint="Restore the last backup and report this.",
                 )
             connection.commit()
-    except DBAPIError as error:
-        if (known := storage_error(error, database_file)) is not None:
-            raise known from error
-        raise
     finally:
         engine.dispose()
 
@@ -72,12 +62,8 @@ def revision_of(database_file: Path) -> str | None:
     """The revision that the database is at; None for an empty one. Raises StorageError when it cannot be read."""
     engine = open_engine(database_file)
     try:
-        with engine.connect() as connection:
+        with translated(database_file), engine.connect() as connection:
             return MigrationContext.configure(connection).get_current_revision()
-    except DBAPIError as error:
-        if (known := storage_error(error, database_file)) is not None:
-            raise known from error
-        raise
     finally:
         engine.dispose()
 

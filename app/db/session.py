@@ -45,7 +45,7 @@ def _on_connect(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> 
     connection.isolation_level = None  # the "begin" event says how a transaction begins, not the driver
     for pragma in (
         "journal_mode = WAL",
-        "synchronous = NORMAL",
+        "synchronous = FULL",  # the spool gives a record up once it is committed
         "foreign_keys = ON",
         f"busy_timeout = {_BUSY_TIMEOUT_MS}",
     ):
@@ -73,30 +73,31 @@ class Database:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A consistent view of the database; whatever was changed in it is dropped."""
-        with self._translated(), self._readers() as session:
+        with translated(self.file), self._readers() as session:
             yield session
 
     @contextmanager
     def write(self) -> Iterator[Session]:
         """One transaction that holds the write lock: committed when the block ends, undone when it raises."""
-        with self._translated(), self._writers.begin() as session:
+        with translated(self.file), self._writers.begin() as session:
             yield session
-
-    @contextmanager
-    def _translated(self) -> Iterator[None]:
-        """Tell apart what a person can do something about. Raises StorageError for these, the rest passes."""
-        try:
-            yield
-        except DBAPIError as error:
-            if (known := storage_error(error, self.file)) is not None:
-                raise known from error
-            raise
 
     def close(self) -> None:
         self.engine.dispose()
 
 
-def storage_error(error: DBAPIError, database_file: Path) -> StorageError | None:
+@contextmanager
+def translated(database_file: Path) -> Iterator[None]:
+    """Tell apart what a person can do something about. Raises StorageError for these, the rest passes."""
+    try:
+        yield
+    except DBAPIError as error:
+        if (known := _storage_error(error, database_file)) is not None:
+            raise known from error
+        raise
+
+
+def _storage_error(error: DBAPIError, database_file: Path) -> StorageError | None:
     """The storage trouble behind a driver's error, or None when it is of another kind."""
     message = str(error.orig).lower()
     for words, (happened, hint) in _TROUBLES.items():

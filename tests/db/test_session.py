@@ -21,13 +21,13 @@ THREADS = 8
 WRITES = 25
 
 
-def test_the_file_is_in_wal_mode_with_foreign_keys(database: Database) -> None:
+def test_the_file_is_in_wal_mode_with_foreign_keys_and_a_commit_outlives_a_power_cut(database: Database) -> None:
     with database.read() as session:
         found = [
             session.execute(text(f"PRAGMA {name}")).scalar()
-            for name in ("journal_mode", "foreign_keys", "busy_timeout")
+            for name in ("journal_mode", "foreign_keys", "busy_timeout", "synchronous")
         ]
-    assert found == ["wal", 1, 5000]
+    assert found == ["wal", 1, 5000, 2]  # synchronous = FULL: the log is on the disk before a commit returns
 
 
 def test_concurrent_writers_that_read_first_lose_nothing(database: Database) -> None:
