@@ -22,6 +22,7 @@ MAX_ROWS: Final = 200_000
 MIN_ROWS: Final = 20
 
 _REQUIRED: Final = ("time_s", "altitude_m")
+_MISSING: Final = ("", "nan")
 _MAX_LINE_BYTES: Final = 4096
 _LARGEST: Final = 1e6
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
@@ -37,6 +38,8 @@ _ROW_HINT: Final = "Correct or remove the named line and upload the file again; 
 def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
     """Read a whole file, in memory bounded by 200 000 rows however long it is.
 
+    An optional column in which values are missing is left out, which the trajectory's `source` says.
+
     Raises TrajectoryError naming the line and the column of the first thing wrong, and what to do about it.
     """
     lines = _Lines(io.BytesIO(stream) if isinstance(stream, bytes) else stream)
@@ -50,7 +53,18 @@ def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
     time_s, *channels = (np.array(column, dtype=np.float64) for column in values)
     _require_rows(len(time_s))
     _require_rising_when_stored(time_s, numbers)
-    return Trajectory(time_s, dict(zip(columns[1:], channels, strict=True)), source="csv", clock="vehicle")
+    complete, source = _without_holes(dict(zip(columns[1:], channels, strict=True)), numbers)
+    return Trajectory(time_s, complete, source=source, clock="vehicle")
+
+
+def _without_holes(channels: dict[str, Samples], numbers: "array[int]") -> tuple[dict[str, Samples], str]:
+    """The columns in which no value is missing, and the flight's source, which names the others."""
+    holes = {name: int(np.isnan(values).argmax()) for name, values in channels.items() if np.isnan(values).any()}
+    complete = {name: values for name, values in channels.items() if name not in holes}
+    if not holes:
+        return complete, "csv"
+    named = ", ".join(f"{name} (line {numbers[row]})" for name, row in holes.items())
+    return complete, f"csv; left out, with its first missing value: {named}"
 
 
 class _Lines:
@@ -128,7 +142,7 @@ def _read_rows(
             raise _refused(
                 f"line {lines.number}", f"has {len(row)} values where the header names {len(header)} columns", _ROW_HINT
             )
-        numbers_of_row = [_number(row[place], lines.number, name) for place, name in zip(places, columns, strict=True)]
+        numbers_of_row = [_value(row[place], lines.number, name) for place, name in zip(places, columns, strict=True)]
         if numbers_of_row[0] <= last_s:
             raise _refused(
                 f"line {lines.number}, column time_s",
@@ -140,6 +154,13 @@ def _read_rows(
             column.append(value)
         numbers.append(lines.number)
     return values, numbers
+
+
+def _value(text: str, line: int, column: str) -> float:
+    """NaN where an optional value is missing."""
+    if column not in _REQUIRED and text.strip().lower() in _MISSING:
+        return math.nan
+    return _number(text, line, column)
 
 
 def _number(text: str, line: int, column: str) -> float:

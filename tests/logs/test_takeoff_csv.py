@@ -75,6 +75,33 @@ def test_known_columns_are_kept_in_any_order_and_others_left_in_the_file() -> No
     assert flight.time_s[3] == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize("hole", ["", " ", "nan", "NaN"])
+def test_an_optional_column_with_a_hole_is_left_out_and_the_flight_says_so(hole: str) -> None:
+    rows = "\n".join(f"{i * 0.1:.1f},{i},{hole if i == 7 else 11.1},{i * 2}" for i in range(30))
+    flight = read_takeoff_csv(f"time_s,altitude_m,battery_v,climb_rate_m_s\n{rows}\n".encode())
+    assert set(flight.channels) == {"altitude_m", "climb_rate_m_s"}
+    assert len(flight) == 30
+    assert flight["climb_rate_m_s"][8] == 16.0
+    assert flight.source == "csv; left out, with its first missing value: battery_v (line 9)"
+
+
+def test_every_column_with_holes_is_named() -> None:
+    rows = "\n".join(f"{i * 0.1:.1f},{i},,{i if i else ''}" for i in range(30))
+    flight = read_takeoff_csv(f"time_s,altitude_m,battery_v,thrust\n{rows}\n".encode())
+    assert set(flight.channels) == {"altitude_m"}
+    assert flight.source == "csv; left out, with its first missing value: thrust (line 2), battery_v (line 2)"
+
+
+@pytest.mark.parametrize(
+    ("cell", "reason"), [("low", "is not a number: 'low'"), ("inf", "is not a finite number: 'inf'")]
+)
+def test_an_optional_value_that_is_there_but_wrong_is_refused(cell: str, reason: str) -> None:
+    """It is no hole: the columns may have slipped, and then nothing in the file can be believed."""
+    rows = "\n".join(f"{i * 0.1:.1f},{i},{cell if i == 7 else 11.1}" for i in range(30))
+    problem = refusal_of(f"time_s,altitude_m,battery_v\n{rows}\n").problems[0]
+    assert (problem.field, problem.reason) == ("line 9, column battery_v", reason)
+
+
 def test_samples_before_the_command_are_read() -> None:
     assert read_takeoff_csv(csv_of(start=-50).encode()).time_s[0] == -1.0
 
