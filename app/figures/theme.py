@@ -92,11 +92,12 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
             "xanchor": "left",
             "font": {"size": 12, "color": palette.ink},
             "bgcolor": "rgba(0,0,0,0)",
+            "tracegroupgap": 0,
             "itemclick": "toggleothers",
             "itemdoubleclick": "toggle",
         },
         "dragmode": "zoom",
-        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": palette.dim, "activecolor": palette.ink},
+        "modebar": {"orientation": "v", "bgcolor": "rgba(0,0,0,0)", "color": palette.dim, "activecolor": palette.ink},
         **more,
     }
 

@@ -12,7 +12,7 @@ const WORDS = { valid: "Count it as valid", aborted: "Class as aborted", invalid
 /** Say what a flight is worth: one tap to undo, a reason to throw out. */
 export function Classify({ trial }: { trial: Trial }) {
   const [asking, setAsking] = useState(false);
-  const [reason, setReason] = useState("");
+  const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
   const classify = useClassify();
   const others = otherClasses(trial);
   if (others.length === 0) return null;

@@ -14,20 +14,24 @@ const campaign = {
     step_fraction: 1,
     seed: 3,
   },
-  vehicle: { kind: "jsbsim", title: "JSBSim", options: { mass_kg: 0.42 } },
+  vehicle: { kind: "jsbsim", title: "JSBSim", options: { mass_kg: 0.42, wind_from_deg: 90 } },
   definition_digest: "0123456789abcdef",
 } as unknown as Campaign;
+
+const MASS = { name: "mass_kg", title: "Mass", unit: "kg" };
+const WIND = { name: "wind_from_deg", title: "Wind from", unit: "°" };
 
 const catalogue = {
   experiments: [{ name: "takeoff", title: "Takeoff to 3 m", gains: [{ name: "kp", unit: "counts" }] }],
   strategies: [{ name: "gradient", title: "Gradient", options: [{ name: "scaled", title: "Scaled gains" }] }],
-  vehicle_kinds: [{ name: "jsbsim", options: [{ name: "mass_kg", title: "Mass", unit: "kg" }] }],
+  vehicle_kinds: [{ name: "jsbsim", options: [MASS, WIND] }],
 } as unknown as Catalogue;
 
 test("every setting that a proposal depends on is said in words", () => {
   const rows = Object.fromEntries(settingsOf(campaign, catalogue));
   expect(rows).toMatchObject({
     Mass: "0.42 kg",
+    "Wind from": "90°",
     Experiment: "Takeoff to 3 m",
     Strategy: "Gradient",
     "Scaled gains": "no",

@@ -9,6 +9,8 @@ const STARTS = {
   given: "Given gains",
 } as const;
 
+const CLOSE_UNITS = ["°", "×"];
+
 type Row = [title: string, value: string];
 
 interface Described {
@@ -23,7 +25,8 @@ function percent(share: number): string {
 
 function said(value: unknown, unit = ""): string {
   if (typeof value === "boolean") return value ? "yes" : "no";
-  return unit === "" ? String(value) : `${value} ${unit}`;
+  const gap = unit === "" || CLOSE_UNITS.includes(unit) ? "" : " ";
+  return `${value}${gap}${unit}`;
 }
 
 /** Options under the titles and in the units that the catalogue gives them; under their names until it is there. */

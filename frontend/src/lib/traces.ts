@@ -45,7 +45,7 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
   return traces.map((trace) => {
     if (trace.meta?.role !== "flight") return trace;
     return trace.meta.trial === trial
-      ? { ...trace, line: { ...trace.line, width: 3.5 } }
+      ? { ...trace, line: { ...trace.line, width: 3.5 }, showlegend: true }
       : { ...trace, opacity: FADED };
   });
 }
@@ -57,7 +57,7 @@ export function clickedTrial(traces: readonly Trace[], curveNumber: number): num
 }
 
 const LETTER_PX = 5.8;
-const WIDEST_PX = 92;
+const WIDEST_PX = 104;
 
 /** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
 export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {

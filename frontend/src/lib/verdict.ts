@@ -12,9 +12,9 @@ export function bestBeforeOf(trial: Trial, trials: readonly Trial[]): Trial | nu
   );
 }
 
-/** The verdict in a sentence, or the reason where there is none; "Aborted" stands beside it already. */
+/** The verdict in a sentence, or the reason where there is none; "Aborted" and "Lost" stand beside it already. */
 export function sentenceOf(trial: Trial): string {
-  if (trial.state !== "aborted" || trial.reason === "") return trial.verdict || trial.reason;
+  if (!["aborted", "lost"].includes(trial.state) || trial.reason === "") return trial.verdict || trial.reason;
   return trial.reason.charAt(0).toUpperCase() + trial.reason.slice(1);
 }
 
