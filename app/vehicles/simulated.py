@@ -8,11 +8,11 @@ import numpy as np
 from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
 from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S, THROTTLE
 from app.core.errors import GainsError, Problem
-from app.core.policy import Gains
+from app.core.policy import Gains, shortened
 from app.core.trajectory import Trajectory
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.errors import VehicleError
-from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, TARGET, Integers, Rows
+from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, SET_POINT, TARGET, Integers, Rows
 from app.vehicles.pacing import Pacer
 
 GAIN_NAMES: Final = ("kp", "ki", "kd")
@@ -163,7 +163,7 @@ def _slices() -> Iterator[tuple[int, int]]:
 
 def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: float) -> Rows:
     rows = simulation.advance(steps, command)
-    rows[:, CHANNELS.index("set_point_m")] = set_point_m
+    rows[:, SET_POINT] = set_point_m
     if not np.isfinite(rows).all():
         raise VehicleError(
             "The simulation broke down: the vehicle's state is no longer a number.",
@@ -203,5 +203,5 @@ def _refusal(value: float | None) -> str | None:
     if value is None:
         return "is missing"
     if not INT32_MIN <= value <= INT32_MAX:
-        return f"must be a number that 32 bits hold, got {value:g}"
+        return f"must be a number that 32 bits hold, got {shortened(value)}"
     return None if value == int(value) else f"must be a whole number of counts, got {value:g}"

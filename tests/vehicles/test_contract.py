@@ -63,6 +63,7 @@ def test_gains_outside_the_experiments_bounds_can_be_staged(kind: str, vehicle: 
         ({"kp": 283.5, "ki": 13, "kd": 82}, "gains.kp"),
         ({"kp": 283, "ki": float("nan"), "kd": 82}, "gains.ki"),
         ({"kp": 2**31, "ki": 13, "kd": 82}, "gains.kp"),
+        ({"kp": 10**400, "ki": 13, "kd": 82}, "gains.kp"),
         ({"kp": 283, "ki": 13, "kd": 82, "kx": 1}, "gains.kx"),
     ],
 )
