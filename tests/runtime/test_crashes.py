@@ -1,0 +1,167 @@
+"""What is left after a process was killed with SIGKILL, at the worst moments."""
+
+import os
+import signal
+import sqlite3
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.runtime.processes import Serving, is_alive, stream, wait_for
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Serving]:
+    with Serving(tmp_path / "data") as one:
+        yield one
+
+
+def children(pid: int) -> list[int]:
+    """The processes that a process has started, the multiprocessing helper apart."""
+    listed = Path(f"/proc/{pid}/task").glob("*/children")
+    found = [int(child) for task in listed for child in task.read_text().split()]
+    return [child for child in found if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+def in_the_air(serving: Serving, campaign_id: int, *, speed: float) -> int:
+    """A trial that has lifted off."""
+    with stream(serving.url) as events:
+        trial_id = serving.fly(campaign_id, speed=speed)
+        for name, _, data in events:
+            if name == "telemetry" and data["time_s"] > 0.2:
+                return trial_id
+    raise AssertionError("the stream ended")
+
+
+def require_sound_database(data_dir: Path) -> None:
+    connection = sqlite3.connect(data_dir / "gainline.sqlite3")
+    try:
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
+    finally:
+        connection.close()
+
+
+def test_a_worker_killed_in_mid_flight_leaves_a_lost_trial_and_a_free_vehicle(serving: Serving) -> None:
+    campaign_id = serving.campaign()
+    first = serving.worker_pid()
+    trial_id = in_the_air(serving, campaign_id, speed=1.0)
+    crew = children(first)
+    os.kill(first, signal.SIGKILL)
+    lost = serving.trial(trial_id, "lost")
+    assert lost["reason"] == "the worker ended while it flew"
+    assert lost["flight"]["state"] == "lost"
+    assert serving.worker_pid() != first
+    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in crew))
+    again = serving.trial(serving.fly(campaign_id), "valid")
+    assert again["number"] == lost["number"] + 1
+    vehicle = serving.get(f"/campaigns/{campaign_id}")["vehicle"]
+    assert vehicle["state"] == "ready"
+    ledger = serving.get(f"/vehicles/{vehicle['id']}/ledger")["items"]
+    assert sorted(line["trial_id"] for line in ledger) == [trial_id, again["id"]], "the lost trial flew once only"
+    assert serving.trial(trial_id, "lost")["record"] is None
+    require_sound_database(serving.data_dir)
+
+
+def test_a_flight_whose_own_process_is_killed_is_lost_and_the_worker_goes_on(serving: Serving) -> None:
+    campaign_id = serving.campaign(kind="jsbsim")
+    worker = serving.worker_pid()
+    trial_id = in_the_air(serving, campaign_id, speed=1.0)
+    for pid in children(worker):
+        os.kill(pid, signal.SIGKILL)
+    assert "exit code -9" in serving.trial(trial_id, "lost")["reason"]
+    serving.trial(serving.fly(campaign_id), "valid")
+    assert serving.worker_pid() == worker
+
+
+def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> None:
+    first = Serving(tmp_path / "data")
+    campaign_id = first.campaign()
+    worker = first.worker_pid()
+    trial_id = in_the_air(first, campaign_id, speed=10.0)
+    os.kill(first.process.pid, signal.SIGKILL)
+    assert first.stop() == -signal.SIGKILL
+    with Serving(tmp_path / "data") as second:
+        assert is_alive(worker), "it finishes its flight"
+        assert second.worker_pid() == worker, "and is heard by the new web process meanwhile"
+        flown = second.trial(trial_id, "valid")
+        assert flown["record"]["duration_s"] > 32.6
+        wait_for("the old worker's end", lambda: not is_alive(worker))
+        wait_for("the new worker", lambda: second.worker_pid() != worker)
+        second.trial(second.fly(campaign_id), "valid")
+        require_sound_database(second.data_dir)
+
+
+@pytest.mark.slow
+def test_a_flight_that_outlived_its_web_process_can_still_be_aborted(tmp_path: Path) -> None:
+    first = Serving(tmp_path / "data")
+    trial_id = in_the_air(first, first.campaign(), speed=1.0)
+    os.kill(first.process.pid, signal.SIGKILL)
+    first.stop()
+    with Serving(tmp_path / "data") as second:
+        second.worker_pid()
+        assert second.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
+        assert second.trial(trial_id, "aborted")["reason"] == "enough"
+
+
+def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(serving: Serving) -> None:
+    undisturbed = serving.proposal(serving.campaign())
+    worker = serving.worker_pid()
+    crew = children(worker)
+    for pid in crew:
+        os.kill(pid, signal.SIGSTOP)  # the computation now takes as long as the test wants
+    created = serving.post(
+        "/campaigns",
+        {"name": "Again", "vehicle": {"kind": "twin"}, "definition": {"stop": {"kind": "budget", "max_flights": 7}}},
+    )
+    job = wait_for(
+        "the job to run",
+        lambda: next(
+            (job for job in serving.get(f"/jobs?campaign_id={created['id']}")["items"] if job["state"] == "running"),
+            None,
+        ),
+    )
+    os.kill(worker, signal.SIGKILL)
+    for pid in crew:
+        os.kill(pid, signal.SIGCONT)
+    proposal = serving.proposal(created["id"])
+    for what in ("kind", "gains", "predicted_error", "explanation", "history_digest"):
+        assert proposal[what] == undisturbed[what], what
+    done = serving.get(f"/jobs/{job['id']}")
+    assert (done["state"], done["attempts"]) == ("done", 2)
+    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in crew))
+
+
+def test_stopping_the_server_in_mid_flight_lands_and_records_it(tmp_path: Path) -> None:
+    serving = Serving(tmp_path / "data")
+    worker = serving.worker_pid()
+    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
+    assert serving.stop() == 0
+    assert not is_alive(worker)
+    with Serving(tmp_path / "data") as again:
+        trial = again.trial(trial_id, "aborted")
+        assert trial["reason"] == "the worker was stopped (SIGTERM)"
+        assert trial["record"]["samples"] > 0
+
+
+@pytest.mark.slow
+def test_a_worker_killed_at_random_moments_never_leaves_a_false_state(serving: Serving) -> None:
+    campaign_id = serving.campaign(max_flights=200)
+    for number in range(12):
+        wait_for("the vehicle", lambda: serving.get(f"/campaigns/{campaign_id}")["vehicle"]["state"] == "ready")
+        worker = serving.worker_pid()
+        trial_id = serving.fly(campaign_id, speed=200.0)
+        time.sleep(0.02 * number)
+        os.kill(worker, signal.SIGKILL)
+        wait_for("the flight's end", lambda: not under_way(serving, trial_id))  # noqa: B023 - called at once
+        trial = serving.trial(trial_id, "valid", "lost", "planned")
+        assert (trial["record"] is not None) == (trial["error"] is not None) == (trial["state"] == "valid")
+        assert (trial["flown_at"] is None) == (trial["state"] == "planned")
+    require_sound_database(serving.data_dir)
+
+
+def under_way(serving: Serving, trial_id: int) -> bool:
+    flight = serving.get(f"/trials/{trial_id}")["flight"]
+    return flight["state"] in {"requested", "running"}
