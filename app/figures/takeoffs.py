@@ -13,7 +13,7 @@ CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
 """Room above the set point, as a multiple of it, for the flight that is still to come."""
-ALIKE: Final = {"earlier": "Earlier flights", "invalid": "Not counted"}
+ALIKE: Final = {"earlier": "Earlier", "invalid": "Not counted"}
 """Standings whose flights look alike and share an entry of the legend."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
@@ -157,7 +157,7 @@ class TakeoffsFigure:
         text = f"Flight {proposal.number}, predicted"
         return [
             _trace(
-                text,
+                "Predicted",
                 proposal.curve,
                 CURVE_POINTS,
                 line=theme.line(palette.prediction, 2.25, "dash"),

@@ -70,7 +70,7 @@ def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard) 
     dashboard.open_campaign(campaign_id)
     predicted = dashboard.trace("takeoffs", "prediction")
     assert predicted is not None
-    assert (predicted["name"], predicted["dash"]) == ("Flight 2, predicted", "dash")
+    assert (predicted["meta"]["trial"], predicted["dash"]) == (2, "dash")
     assert max(predicted["y"]) > 2.5
     proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
     card = dashboard.panel("Next flight: 2")

@@ -40,13 +40,14 @@ def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
         history(*(flight(number, 0.4 - 0.01 * number) for number in range(1, 6)), flight(6, None, outcome="aborted"))
     ).compute()
     entries = [one["name"] for one in traces(card) if one.get("showlegend", True)]
-    assert entries == ["Set point", "Reference", "Flight 5 · best", "Earlier flights", "Not counted"]
+    assert entries == ["Set point", "Reference", "Flight 5 · best", "Earlier", "Not counted"]
 
 
 def test_the_prediction_is_dashed_and_named_after_the_next_flight() -> None:
     drawn = trace(TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute(), "prediction")
     assert drawn["line"]["dash"] == "dash"
-    assert drawn["name"] == "Flight 2, predicted"
+    assert drawn["name"] == "Predicted"
+    assert "Flight 2, predicted" in drawn["hovertemplate"]
 
 
 def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others() -> None:

@@ -20,6 +20,7 @@ export const CONFIG = {
   showSendToCloud: false,
   plotlyServerURL: "",
   doubleClick: "reset",
+  showTips: false,
   modeBarButtons: [["toImage", "resetScale2d"]],
 } as const;
 

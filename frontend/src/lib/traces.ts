@@ -57,7 +57,7 @@ export function clickedTrial(traces: readonly Trace[], curveNumber: number): num
 }
 
 const LETTER_PX = 5.8;
-const WIDEST_PX = 104;
+const WIDEST_PX = 92;
 
 /** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
 export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {
