@@ -1,0 +1,107 @@
+"""How long it takes from a campaign's stored history to the stored next proposal, as the worker does it.
+
+    ./dev exec python -m bench.proposal
+
+A real database, simulated flights stored as a worker stores them, and the job carried out by the worker's own desk: the
+history is read and unpacked, sent to a process of the pool, the proposal computed there, judged and stored. Times every
+proposal of a campaign of seven flights, for each start and option, the pool warm as it is in a running worker, and once
+from a cold start of everything. Prints the best of three rounds of each and exits 1 when one is above a second.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Final
+
+from app.campaigns import service as campaigns
+from app.campaigns.schemas import Definition, NewCampaign, StopRule
+from app.campaigns.tasks import ProposalDesk, prepare
+from app.db.migrate import migrate
+from app.db.session import Database
+from app.fleet.schemas import VehicleChoice
+from app.pool import Pool
+from app.trials import flights
+from app.trials import service as trials
+from app.trials.schemas import FlightOrder, NewTrial
+from app.vehicles.base import FlightOrder as Order
+from app.vehicles.open import open_vehicle
+
+LIMIT_S: Final = 1.0
+WORKER: Final = "bench"
+FLIGHTS: Final = 7
+ROUNDS: Final = 3
+CASES: Final[dict[str, dict[str, object]]] = {
+    "gradient, scaled": {},
+    "gradient, raw": {"options": {"scaled": False}},
+    "gradient from the simplex start": {"start": {"kind": "simplex"}},
+    "simplex": {"strategy": "simplex"},
+}
+
+
+def propose(desk: ProposalDesk) -> float:
+    """Carry out the waiting job; from its claim to the stored row, s."""
+    start = time.perf_counter()
+    job = desk.claim()
+    assert job is not None
+    desk.carry_out(job)
+    return time.perf_counter() - start
+
+
+def fly(database: Database, campaign_id: int) -> bool:
+    """Fly what is proposed; false when the campaign is over."""
+    with database.write() as session:
+        following = campaigns.next_flight(session, campaign_id).proposal
+        if following is None or "plan" not in campaigns.get_campaign(session, campaign_id).actions:
+            return False
+        trials.create_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
+        task = flights.claim_flight(session, WORKER)
+    assert task is not None
+    with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
+        read_back = vehicle.stage(task.gains)
+        record = vehicle.fly(Order(seed=task.seed), on_sample=lambda _: None, should_abort=lambda: None)
+    with database.write() as session:
+        flights.record_staged(session, task.flight_id, read_back)
+        flights.record_lift_off(session, task.flight_id)
+        flights.record_landing(session, task.flight_id, record)
+    return True
+
+
+def one_campaign(database: Database, desk: ProposalDesk, fields: dict[str, object]) -> list[float]:
+    """The time of each proposal of a campaign, s."""
+    definition = Definition.model_validate({"stop": StopRule(kind="budget", max_flights=FLIGHTS), **fields})
+    with database.write() as session:
+        created = campaigns.create_campaign(
+            session, NewCampaign(name="bench", vehicle=VehicleChoice(kind="jsbsim"), definition=definition)
+        )
+    times = [propose(desk)]
+    while fly(database, created.id):
+        times.append(propose(desk))
+    return times
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "gainline.sqlite3"
+        migrate(file)
+        database = Database(file)
+        cold = time.perf_counter()
+        with Pool(1, prepare=prepare) as pool:
+            desk = ProposalDesk(database, pool, worker=WORKER, lease_s=30.0)
+            first = one_campaign(database, desk, {"stop": StopRule(kind="budget", max_flights=1)})
+            print(
+                f"cold, the start of the process included: {time.perf_counter() - cold:.2f} s ({first[0]:.2f} s first)"
+            )
+            slowest = 0.0
+            for name, fields in CASES.items():
+                rounds = [one_campaign(database, desk, fields) for _ in range(ROUNDS)]
+                times = [min(each) for each in zip(*rounds, strict=True)]
+                slowest = max(slowest, *times)
+                print(f"{name:32}", " ".join(f"{each * 1e3:4.0f}" for each in times), "ms")
+        database.close()
+    print(f"slowest warm proposal: {slowest * 1e3:.0f} ms (limit {LIMIT_S * 1e3:.0f} ms)")
+    return 0 if slowest <= LIMIT_S else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
