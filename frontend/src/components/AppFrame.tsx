@@ -4,23 +4,33 @@ import { Link, Outlet, useMatch } from "react-router";
 import { followEvents } from "../api/events";
 import { useAbort, useFlying } from "../api/flying";
 import { useCampaign } from "../api/queries";
-import { abortTargets, isWriting } from "../lib/abort";
+import { abortTargets, type Flying } from "../lib/abort";
+import { liveFlightsNow } from "../live/store";
 import { ConnectionNotice, ConnectionState } from "./ConnectionState";
 import { FlyingBar } from "./FlyingBar";
 import classes from "./Frame.module.css";
 import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleBadge } from "./VehicleBadge";
 
-/** Space ends the flight, whatever has the focus, unless somebody is writing. */
-function useSpaceAborts(targets: readonly number[], press: (trialIds: readonly number[]) => void): void {
-  const latest = useRef({ targets, press });
-  latest.current = { targets, press };
+/**
+ * Space ends the flight, whatever has the focus, a text too: losing a blank is cheaper.
+ * What flies is known from the stream before it is known from the list, so both count.
+ */
+function useSpaceAborts(
+  listed: readonly Flying[],
+  campaignId: number | null,
+  press: (trialIds: readonly number[]) => void,
+): void {
+  const latest = useRef({ listed, campaignId, press });
+  latest.current = { listed, campaignId, press };
   useEffect(() => {
     function onKey(event: KeyboardEvent): void {
-      if (event.code !== "Space" || isWriting(event.target) || latest.current.targets.length === 0) return;
+      const { listed, campaignId, press } = latest.current;
+      const targets = abortTargets([...listed, ...liveFlightsNow()], campaignId);
+      if (event.code !== "Space" || targets.length === 0) return;
       event.preventDefault();
       event.stopPropagation();
-      if (!event.repeat && event.type === "keydown") latest.current.press(latest.current.targets);
+      if (!event.repeat && event.type === "keydown") press([...new Set(targets.map(({ trialId }) => trialId))]);
     }
     // A button acts on the release of Space, so that must not get through either.
     document.addEventListener("keydown", onKey, { capture: true });
@@ -50,10 +60,7 @@ export function AppFrame() {
   const flying = useFlying();
   const abort = useAbort(flying);
   useEventStream(flying.length > 0);
-  useSpaceAborts(
-    abortTargets(flying, campaignId).map(({ trialId }) => trialId),
-    abort.press,
-  );
+  useSpaceAborts(flying, campaignId, abort.press);
   return (
     <>
       <a href="#main" className={classes["skip"]}>

@@ -1,4 +1,4 @@
-/** Who the Space key aborts, and when it must not. */
+/** Whom the Space key aborts. */
 
 export interface Flying {
   campaignId: number;
@@ -9,13 +9,4 @@ export interface Flying {
 export function abortTargets(flying: readonly Flying[], campaignOnPage: number | null): Flying[] {
   const here = flying.filter((flight) => flight.campaignId === campaignOnPage);
   return here.length > 0 ? here : [...flying];
-}
-
-const TEXT_INPUTS = new Set(["text", "search", "number", "email", "url", "tel", "password"]);
-
-/** Whether a key press belongs to somebody who is writing. */
-export function isWriting(target: EventTarget | null): boolean {
-  if (!(target instanceof HTMLElement)) return false;
-  if (target instanceof HTMLTextAreaElement || target.isContentEditable) return true;
-  return target instanceof HTMLInputElement && TEXT_INPUTS.has(target.type);
 }

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { begun, extended, type LiveFlight, telemetryFrom, withFlight } from "./live";
+import { begun, extended, type LiveFlight, telemetryFrom, underWay, withFlight } from "./live";
 
 const line = JSON.stringify({
   type: "telemetry",
@@ -34,6 +34,12 @@ test("flights of long ago are forgotten, those under way are not", () => {
     flights = withFlight(withFlight(flights, begun(1, trial)), begun(1, 99));
   }
   expect([...flights.keys()]).toEqual([14, 15, 16, 17, 18, 19, 20, 99]);
+});
+
+test("what has landed or ended is not under way", () => {
+  const phases = ["staging", "flying", "landed", "ended"];
+  const flights = new Map(phases.map((phase, trialId) => [trialId, { ...begun(1, trialId), phase }]));
+  expect(underWay(flights).map(({ phase }) => phase)).toEqual(["staging", "flying"]);
 });
 
 test("a line that is no telemetry is left alone", () => {

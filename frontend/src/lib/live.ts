@@ -53,6 +53,13 @@ export function extended(flight: LiveFlight, news: Telemetry): LiveFlight {
   };
 }
 
+const OVER = new Set(["landed", "ended"]);
+
+/** The flights that the stream last spoke of as under way. */
+export function underWay(flights: ReadonlyMap<number, LiveFlight>): LiveFlight[] {
+  return [...flights.values()].filter(({ phase }) => !OVER.has(phase));
+}
+
 const KEPT = 8;
 
 /** The flights with this one put in; of many, only those that were heard of last are kept. */

@@ -1,7 +1,7 @@
 /** What the event stream says, kept outside of React: the state of the connection and the flights under way. */
 
 import { useSyncExternalStore } from "react";
-import { begun, extended, type LiveFlight, type Telemetry, withFlight } from "../lib/live";
+import { begun, extended, type LiveFlight, type Telemetry, underWay, withFlight } from "../lib/live";
 
 export interface Connection {
   state: "connecting" | "live" | "away";
@@ -60,6 +60,10 @@ export function useLiveFlight(trialId: number | null): LiveFlight | null {
 
 export function liveNow(trialId: number | null): LiveFlight | null {
   return trialId === null ? null : (flights.get().get(trialId) ?? null);
+}
+
+export function liveFlightsNow(): LiveFlight[] {
+  return underWay(flights.get());
 }
 
 /** For drawing outside of React: called on every message, returns the function that ends it. */
