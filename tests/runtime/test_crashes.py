@@ -19,7 +19,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
 
 
 def children(pid: int) -> list[int]:
-    """The processes that a process has started, the multiprocessing helper apart."""
+    """The processes that a process has started, multiprocessing's resource tracker apart."""
     listed = Path(f"/proc/{pid}/task").glob("*/children")
     found = [int(child) for task in listed for child in task.read_text().split()]
     return [child for child in found if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()]
