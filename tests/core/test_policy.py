@@ -23,6 +23,10 @@ GOOD = {"kp": 283, "ki": 13, "kd": 82}
             {"gains.kp": "must be a finite number, got nan", "gains.ki": "must be a finite number, got inf"},
         ),
         (
+            {"kp": 10**400, "ki": 13, "kd": 82},
+            {"gains.kp": f"must be a finite number, got 1{'0' * 36}…"},
+        ),
+        (
             {"kp": "283", "ki": True, "kd": None},
             {"gains.kp": "must be a number", "gains.ki": "must be a number", "gains.kd": "must be a number"},
         ),
