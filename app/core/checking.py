@@ -7,11 +7,15 @@ from typing import Final
 from app.core.definition import Definition, StopRule
 from app.core.errors import InputError, Problem
 from app.core.experiments import EXPERIMENTS
+from app.core.options import problems_of_options
 from app.core.policy import PolicySpace
 from app.core.strategies import STRATEGIES
 
 MAX_FLIGHTS: Final = 200
 MAX_IMPROVEMENT: Final = 0.5
+MIN_CEILING_M: Final = 3.2
+MAX_CEILING_M: Final = 100.0
+MIN_CONFIDENCE: Final = 0.5
 
 
 def check_definition(definition: Definition) -> None:
@@ -29,6 +33,7 @@ def problems_of(definition: Definition) -> tuple[Problem, ...]:
     return (
         *_names(definition),
         *_options(definition),
+        *_fit(definition),
         *_policy(definition),
         *_fractions(definition),
         *_stop(definition.stop),
@@ -44,16 +49,22 @@ def _names(definition: Definition) -> Iterator[Problem]:
 
 
 def _options(definition: Definition) -> Iterator[Problem]:
-    if definition.strategy not in STRATEGIES:
+    if definition.strategy in STRATEGIES:
+        strategy = STRATEGIES[definition.strategy]
+        yield from problems_of_options(definition.options, strategy.options, field="options", owner=strategy.name)
+    if definition.experiment in EXPERIMENTS:
+        experiment = EXPERIMENTS[definition.experiment]
+        yield from problems_of_options(
+            definition.experiment_options, experiment.options, field="experiment_options", owner=experiment.name
+        )
+
+
+def _fit(definition: Definition) -> Iterator[Problem]:
+    if definition.strategy not in STRATEGIES or definition.experiment not in EXPERIMENTS:
         return
-    known = {option.name: option for option in STRATEGIES[definition.strategy].options}
-    for name, value in definition.options.items():
-        if name not in known:
-            offered = ", ".join(known) or "none"
-            yield Problem(f"options.{name}", f"is not an option of {definition.strategy} (it has: {offered})")
-        elif not any(value == choice and type(value) is type(choice) for choice in known[name].choices):
-            choices = ", ".join(str(choice).lower() for choice in known[name].choices)
-            yield Problem(f"options.{name}", f"must be one of {choices}, got {value!r}")
+    fits = STRATEGIES[definition.strategy].experiments
+    if fits and definition.experiment not in fits:
+        yield Problem("strategy", f"{definition.strategy!r} works with {', '.join(fits)} only")
 
 
 def _policy(definition: Definition) -> tuple[Problem, ...]:
@@ -69,9 +80,14 @@ def _policy(definition: Definition) -> tuple[Problem, ...]:
 
 def _check_start(definition: Definition, space: PolicySpace) -> None:
     start = definition.start
-    if (start.kind == "given") != (start.gains is not None):
-        reason = "are needed with start.kind 'given'" if start.gains is None else "go only with start.kind 'given'"
+    brings_gains = start.kind in {"given", "campaign"}
+    if brings_gains != (start.gains is not None):
+        needed = f"are needed with start.kind {start.kind!r}"
+        reason = needed if start.gains is None else f"do not go with start.kind {start.kind!r}"
         raise InputError("The start cannot be used.", hint="", problems=(Problem("start.gains", reason),))
+    if (start.kind == "campaign") != (start.donor is not None):
+        reason = "is needed with start.kind 'campaign', and goes with no other"
+        raise InputError("The start cannot be used.", hint="", problems=(Problem("start.donor", reason),))
     if start.kind != "simplex":
         space.check(start.gains or space.mapping(space.default), field="start.gains")
 
@@ -81,6 +97,8 @@ def _fractions(definition: Definition) -> Iterator[Problem]:
         value = getattr(definition, name)
         if not 0.0 < value <= 1.0:
             yield Problem(name, f"must be above 0 and at most 1, got {value:g}")
+    if not (math.isfinite(definition.ceiling_m) and MIN_CEILING_M <= definition.ceiling_m <= MAX_CEILING_M):
+        yield Problem("ceiling_m", f"must lie in {MIN_CEILING_M:g} … {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}")
 
 
 def _stop(rule: StopRule) -> Iterator[Problem]:
@@ -88,6 +106,10 @@ def _stop(rule: StopRule) -> Iterator[Problem]:
         yield Problem("stop.max_flights", f"must lie in 1 … {MAX_FLIGHTS}, got {rule.max_flights}")
     if not (math.isfinite(rule.improvement) and 0.0 <= rule.improvement <= MAX_IMPROVEMENT):
         yield Problem("stop.improvement", f"must lie in 0 … {MAX_IMPROVEMENT:g}, got {rule.improvement:g}")
+    if not MIN_CONFIDENCE <= rule.confidence < 1.0:
+        yield Problem("stop.confidence", f"must be at least {MIN_CONFIDENCE:g} and below 1, got {rule.confidence:g}")
+    if rule.min_battery_v is not None and not (math.isfinite(rule.min_battery_v) and rule.min_battery_v > 0.0):
+        yield Problem("stop.min_battery_v", f"must be above 0 V, got {rule.min_battery_v:g}")
 
 
 def _seed(seed: int) -> Iterator[Problem]:

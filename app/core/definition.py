@@ -14,36 +14,55 @@ OptionValue = bool | int | float | str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
-    """Where the first flight's gains come from; `gains` only with kind `given`."""
+class Donor:
+    """The flight of another campaign that a warm start comes from: its best, with the checksum of its record."""
 
-    kind: Literal["default", "simplex", "given"] = "default"
+    campaign_id: int
+    trial_number: int
+    checksum: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """Where the first flight's gains come from; `gains` only with kinds `given` and `campaign`, `donor` only with
+    `campaign`: the best of another campaign, copied when this one was defined."""
+
+    kind: Literal["default", "simplex", "given", "campaign"] = "default"
     gains: dict[str, float] | None = None
+    donor: Donor | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopRule:
     """`paper`: two flights in a row without `improvement` (a fraction of the best) on the best so far, or the budget;
-    `budget`: only the number of flights ends the campaign."""
+    `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
+    the baseline; `budget`: only the number of flights ends the campaign.
 
-    kind: Literal["paper", "budget"] = "paper"
+    With every kind a flight that ends below `min_battery_v` (V) ends the campaign.
+    """
+
+    kind: Literal["paper", "noise", "budget"] = "paper"
     max_flights: int = 7
     improvement: float = 0.05
+    confidence: float = 0.9
+    min_battery_v: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Definition:
     """Everything a proposal depends on, beside the flights. `bounds` narrow the experiment's own;
     `first_step_fraction` and `step_fraction` limit a gain's change as shares of its range, before and after the first
-    valid flight."""
+    valid flight; `ceiling_m` is the highest altitude that the gate lets a model run reach."""
 
     experiment: str = "takeoff"
+    experiment_options: dict[str, OptionValue] = field(default_factory=dict)
     strategy: str = "gradient"
     options: dict[str, OptionValue] = field(default_factory=dict)
     start: Start = field(default_factory=Start)
     bounds: dict[str, tuple[float, float]] = field(default_factory=dict)
     first_step_fraction: float = 0.25
     step_fraction: float = 1.0
+    ceiling_m: float = 4.5
     stop: StopRule = field(default_factory=StopRule)
     seed: int = 1
 
@@ -53,10 +72,20 @@ class Definition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """What was expected of a flight before it: its error, and the 90 % interval where there was one."""
+
+    error: float
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Flight:
     """A finished trial as a strategy sees it: single-precision trajectory, error in the experiment's unit.
 
     `outcome` is `valid` or `aborted`; invalid and lost flights are not history. An aborted flight has no error.
+    `predicted` is None for gains that no proposal had.
     """
 
     number: int
@@ -64,6 +93,7 @@ class Flight:
     trajectory: Trajectory
     error: float | None
     outcome: Literal["valid", "aborted"]
+    predicted: Prediction | None = None
 
 
 def flight_seed(seed: int, number: int) -> int:

@@ -6,15 +6,19 @@ GainlineError
     └── TrajectoryError   a recorded flight that cannot be scored
 """
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One refused field: its name as the caller wrote it (dotted, `gains.kp`), and why it was refused."""
+    """One refused field: its name as the caller wrote it (dotted, `gains.kp`), and why it was refused; `offer` holds
+    values of gains that would pass, by name, where any are known."""
 
     field: str
     reason: str
+    offer: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 class GainlineError(Exception):
@@ -27,7 +31,9 @@ class GainlineError(Exception):
         self.problems = problems
 
     def __str__(self) -> str:
-        return " ".join((self.message, *(f"{p.field}: {p.reason}." for p in self.problems), self.hint))
+        return " ".join(
+            (self.message, *(f"{p.field}: {p.reason.removesuffix('.')}." for p in self.problems), self.hint)
+        )
 
 
 class InputError(GainlineError):

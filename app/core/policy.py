@@ -49,17 +49,23 @@ class Gain:
         """Width of the range; zero for a gain that its bounds pin."""
         return self.upper - self.lower
 
-    def refusal(self, value: object) -> str | None:
-        """Why `value` cannot be flown as this gain, or None when it can."""
+    def impossible(self, value: object) -> str | None:
+        """Why no controller can hold `value` as this gain, whatever the bounds, or None when it can."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             return "must be a number"
         if not is_finite(value):
             return f"must be a finite number, got {shortened(value)}"
         if self.integer and value != int(value):
             return f"must be a whole number of counts, got {value:g}"
-        if not self.lower <= value <= self.upper:
-            return f"must lie in {self.lower:g} … {self.upper:g} {self.unit}, got {value:g}"
+        if self.integer and not -(2**31) <= value < 2**31:
+            return f"must be a number that 32 bits hold, got {shortened(value)}"
         return None
+
+    def outside(self, value: float) -> str | None:
+        """Why the bounds refuse a number, or None when they do not."""
+        if self.lower <= value <= self.upper:
+            return None
+        return f"must lie in {self.lower:g} … {self.upper:g} {self.unit}, got {value:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +99,21 @@ class PolicySpace:
 
         Raises GainsError naming every missing, unknown, non-finite, fractional or out-of-bounds gain.
         """
+        complete = self.complete(gains, field=field)
+        refused = [
+            Problem(f"{field}.{gain.name}", reason)
+            for gain in self.gains
+            if (reason := gain.outside(complete[gain.name])) is not None
+        ]
+        if refused:
+            raise GainsError("These gains cannot be flown.", hint=_HINT, problems=tuple(refused))
+        return complete
+
+    def complete(self, gains: Mapping[str, object], *, field: str = "gains") -> dict[str, float]:
+        """The same gains in order, inside the bounds or not.
+
+        Raises GainsError naming every missing or unknown gain, and every one that no controller can hold.
+        """
         unknown = [
             Problem(f"{field}.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
             for name in gains
@@ -102,7 +123,7 @@ class PolicySpace:
         refused = [
             Problem(f"{field}.{gain.name}", reason)
             for gain in self.gains
-            if gain.name in gains and (reason := gain.refusal(gains[gain.name])) is not None
+            if gain.name in gains and (reason := gain.impossible(gains[gain.name])) is not None
         ]
         if problems := (*unknown, *missing, *refused):
             raise GainsError("These gains cannot be flown.", hint=_HINT, problems=problems)
@@ -125,7 +146,9 @@ class PolicySpace:
         return np.clip(rounded, self.lower, self.upper)
 
     def reachable(self, base: Vector, fraction: float) -> tuple[Vector, Vector]:
-        """Lowest and highest flyable vectors within `fraction` of each range around `base`, inside the bounds."""
+        """Lowest and highest flyable vectors within `fraction` of each range around `base`, inside the bounds; around
+        the nearest point inside them where `base` lies outside."""
+        base = np.clip(base, self.lower, self.upper)
         reach = fraction * (self.upper - self.lower) + _ROUNDING
         integer = [gain.integer for gain in self.gains]
         low = np.where(integer, np.ceil(base - reach), base - reach)

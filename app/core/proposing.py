@@ -1,44 +1,104 @@
 """From a campaign's frozen definition and its flights to the next gain set: a pure function."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from app.core.confirming import confirm, standing
 from app.core.definition import Definition, Flight
-from app.core.experiments import get_experiment
+from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.policy import PolicySpace
+from app.core.predictions import expected, expected_again, track_record
 from app.core.starting import start_gains
+from app.core.statistics import groups_of, pooled
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Explanation, Proposal
-from app.core.strategies.bias import nominal
+from app.core.strategies.bias import corrected_by, nominal
 from app.core.strategies.history import describe
+from app.core.transfer import Transfer, transfer
 
 _ORIGIN = {
     "default": "the experiment's default gains",
     "simplex": "the nominal model's optimum, found by Nelder–Mead from the default gains",
     "given": "the gains given in the campaign's definition",
+    "campaign": "the best gains of the campaign that this one starts from",
 }
 
 
-def next_proposal(definition: Definition, flights: Sequence[Flight]) -> Proposal:
+def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flight | None = None) -> Proposal:
     """The same definition and flights give the same proposal, bit for bit on one machine.
 
     `definition` must be free of problems (`app.core.checking`). Flights are the valid and aborted ones, in their order;
     their trajectories count as stored, in single precision. Without a valid flight the start gains are proposed.
+    `donor` is the flight that `definition.start.donor` names; only with start kind `campaign`, and then needed.
+
+    Every proposal that predicts an error has an interval and a band. Under the stop rule `noise` it may be a flight of
+    the winner or of the first gains again, or kind `none`, once nothing is left to be told from noise.
     """
-    experiment = get_experiment(definition.experiment)
+    experiment = experiment_of(definition)
     space = experiment.space.narrowed(definition.bounds)
+    warm = None if donor is None else transfer(definition, experiment, flights, donor)
+    if warm is not None:
+        experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
     if not any(flight.outcome == "valid" for flight in flights):
-        return _start(definition, experiment, space)
-    return STRATEGIES[definition.strategy].propose(definition, experiment, space, flights)
+        return _start(definition, experiment, space, flights, donor)
+    scatter = pooled(groups_of(flights), experiment.scatter)
+    strategy = STRATEGIES[definition.strategy]
+    proposal = strategy.propose(definition, experiment, space, flights)
+    number = proposal.explanation.base_flight if strategy.learns else None
+    base = next((flight for flight in flights if flight.number == number), None)
+    proposal = expected(experiment, space, flights, proposal, scatter, base=base)
+    if definition.stop.kind == "noise":
+        proposal = _told_from_noise(definition, experiment, flights, proposal)
+    return _with_notes(proposal, flights, warm)
 
 
-def _start(definition: Definition, experiment: Experiment, space: PolicySpace) -> Proposal:
+def _start(
+    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], donor: Flight | None
+) -> Proposal:
     gains = start_gains(definition, experiment, space)
-    trajectory, error = nominal(experiment).predict(space.vector(gains))
+    model = nominal(experiment) if donor is None else corrected_by(experiment, donor)
+    trajectory, error = model.predict(space.vector(gains))
+    teller = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     summary = (
-        f"The first flight uses {_ORIGIN[definition.start.kind]} ({describe(gains)}); the nominal model, not yet "
-        f"corrected by any flight, predicts {error:.4f} {experiment.error_unit}."
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({describe(gains)}); {teller} "
+        f"predicts {error:.4f} {experiment.error_unit}."
     )
-    return Proposal(
-        kind="start", gains=gains, predicted=trajectory, predicted_error=error, explanation=Explanation(summary=summary)
+    lesson = "How far this vehicle is from the model." if donor is None else "Whether the two vehicles are alike."
+    start = Proposal(
+        kind="start",
+        gains=gains,
+        predicted=trajectory,
+        predicted_error=error,
+        explanation=Explanation(summary=summary, lesson=lesson),
     )
+    return expected(experiment, space, flights, start, pooled((), experiment.scatter), base=None)
+
+
+def _told_from_noise(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
+) -> Proposal:
+    """The strategy's proposal where a step is still worth a flight, else the flight that the noise asks for."""
+    wanted, now = confirm(definition, experiment, flights, proposal), standing(definition, experiment, flights)
+    assert now is not None
+    why = replace(proposal.explanation, notes=(*proposal.explanation.notes, *filter(None, (wanted.why,))))
+    match wanted.phase:
+        case "step":
+            return replace(proposal, explanation=why)
+        case "decided":
+            return expected_again(experiment, flights, now.winner, now.scatter, "none", Explanation(summary=wanted.why))
+        case "repeat" | "baseline" as kind:
+            group = now.winner if kind == "repeat" else now.baseline
+            lesson = "Whether the winner is better than the first gains."
+            explanation = Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson)
+            return expected_again(experiment, flights, group, now.scatter, kind, explanation)
+
+
+def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:
+    record = track_record(flights)
+    notes = (
+        *proposal.explanation.notes,
+        *((warm.sentence,) if warm is not None and warm.sentence else ()),
+        *((record.sentence,) if record.of or record.agreeing or record.disagreeing else ()),
+    )
+    return replace(proposal, explanation=replace(proposal.explanation, notes=notes))

@@ -7,8 +7,9 @@ from app.core.strategies.simplex import model_optimum
 
 
 def start_gains(definition: Definition, experiment: Experiment, space: PolicySpace) -> dict[str, float]:
-    """The experiment's default gains, the given ones, or the nominal model's optimum searched from the default."""
-    if definition.start.kind == "given" and definition.start.gains is not None:
+    """The experiment's default gains, those of the definition (given, or the best of another campaign), or the nominal
+    model's optimum searched from the default."""
+    if definition.start.gains is not None:
         return space.check(definition.start.gains, field="start.gains")
     if definition.start.kind == "simplex":
         return space.mapping(model_optimum(experiment, space, space.nearest(space.default)).gains)

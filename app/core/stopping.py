@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from app.core.definition import StopRule
-from app.core.strategies.base import Kind
+from app.core.definition import Definition, Flight, StopRule
+from app.core.strategies.base import Kind, Proposal
+from app.core.trajectory import Trajectory
 
-Reason = Literal["not improving", "flight budget", "nothing better on the line"]
+Reason = Literal["not improving", "flight budget", "nothing better", "told from noise", "battery low"]
 
 FAILURES_ALLOWED: Final = 2
 
@@ -24,13 +25,38 @@ class StopVerdict:
     threshold: float | None
 
 
-def verdict(rule: StopRule, errors: Sequence[float | None], proposal_kind: Kind | None = None) -> StopVerdict:
+def judge(definition: Definition, flights: Sequence[Flight], proposal: Proposal) -> StopVerdict:
+    """The campaign's own rule on its flights and on the proposal computed from them."""
+    return verdict(
+        definition.stop,
+        [flight.error for flight in flights],
+        proposal.kind,
+        battery_v=landing_battery_v(flights[-1].trajectory) if flights else None,
+        because=proposal.explanation.summary,
+    )
+
+
+def landing_battery_v(record: Trajectory) -> float | None:
+    """The battery's voltage at the end of a flight, V; None where it was not recorded."""
+    recorded = record.channels.get("battery_v")
+    return float(recorded[-1]) if recorded is not None and len(recorded) else None
+
+
+def verdict(
+    rule: StopRule,
+    errors: Sequence[float | None],
+    proposal_kind: Kind | None = None,
+    *,
+    battery_v: float | None = None,
+    because: str = "",
+) -> StopVerdict:
     """Judge the flights so far, in their order; None stands for a flight without an error (aborted): it uses up
-    budget, and says nothing about improvement.
+    budget, and says nothing about improvement. `battery_v` is the voltage at which the last one ended.
 
     The paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the best so
     far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error improves on
-    nothing and fails nothing. `budget` counts flights only.
+    nothing and fails nothing. `noise` never stops on errors: the proposals do the flying that decides, and kind `none`
+    ends it, `because` of what its explanation says. `budget` counts flights only.
     """
     best: float | None = None
     failures = 0
@@ -40,37 +66,46 @@ def verdict(rule: StopRule, errors: Sequence[float | None], proposal_kind: Kind 
         improves = best is None or error < (1.0 - rule.improvement) * best
         failures = 0 if improves else failures + 1
         best = error if best is None else min(error, best)
-    threshold = None if best is None else (1.0 - rule.improvement) * best
-    reason = _reason(rule, len(errors), failures, proposal_kind)
+    threshold = None if best is None or rule.kind == "noise" else (1.0 - rule.improvement) * best
+    reason = _reason(rule, len(errors), failures, proposal_kind, battery_v)
     return StopVerdict(
         stop=reason is not None,
         reason=reason,
-        why=_sentence(rule, reason, len(errors), failures),
+        why=_sentence(rule, reason, len(errors), failures, battery_v, because),
         failures=failures,
         threshold=threshold,
     )
 
 
-def _reason(rule: StopRule, flights: int, failures: int, proposal_kind: Kind | None) -> Reason | None:
+def _reason(
+    rule: StopRule, flights: int, failures: int, proposal_kind: Kind | None, battery_v: float | None
+) -> Reason | None:
+    if rule.kind == "noise" and proposal_kind == "none" and flights < rule.max_flights:
+        return "told from noise"
     if flights >= rule.max_flights:
         return "flight budget"
     if rule.kind == "paper" and failures >= FAILURES_ALLOWED:
         return "not improving"
     if rule.kind == "paper" and proposal_kind == "none":
-        return "nothing better on the line"
+        return "nothing better"
+    if rule.min_battery_v is not None and battery_v is not None and battery_v < rule.min_battery_v:
+        return "battery low"
     return None
 
 
-def _sentence(rule: StopRule, reason: Reason | None, flights: int, failures: int) -> str:
+def _sentence(
+    rule: StopRule, reason: Reason | None, flights: int, failures: int, battery_v: float | None, because: str
+) -> str:
     by = f"more than {rule.improvement:.0%}"
-    match reason:
-        case "flight budget":
-            return f"All {rule.max_flights} flights of the budget are flown."
-        case "not improving":
-            return f"The last {failures} flights in a row did not improve by {by} on the best before them."
-        case "nothing better on the line":
-            return "The corrected model finds nothing better along the line from the best flight."
-        case None if rule.kind == "paper" and failures:
-            return f"The last flight did not improve by {by} on the best before it; one more such flight ends it."
-        case None:
-            return f"{rule.max_flights - flights} of {rule.max_flights} flights are left."
+    if reason is None and rule.kind == "paper" and failures:
+        return f"The last flight did not improve by {by} on the best before it; one more such flight ends it."
+    if reason is None:
+        return f"{rule.max_flights - flights} of {rule.max_flights} flights are left."
+    sentences: dict[Reason, str] = {
+        "flight budget": f"All {rule.max_flights} flights of the budget are flown.",
+        "not improving": f"The last {failures} flights in a row did not improve by {by} on the best before them.",
+        "nothing better": "The model finds nothing better than the best flight.",
+        "told from noise": "",
+        "battery low": f"The last flight ended at {battery_v or 0.0:.2f} V; {rule.min_battery_v} V is the least.",
+    }
+    return f"{sentences[reason]} {because if rule.kind == 'noise' else ''}".strip()

@@ -13,6 +13,9 @@ Samples = NDArray[np.float64]
 CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "altitude_m": "m",
+        "altitude_2_m": "m",
+        "altitude_m_lower": "m",
+        "altitude_m_upper": "m",
         "climb_rate_m_s": "m/s",
         "set_point_m": "m",
         "reference_m": "m",
@@ -20,9 +23,22 @@ CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
         "feed_forward": "1",
         "feedback": "1",
         "battery_v": "V",
+        "pitch_error_rad": "rad",
+        "pitch_error_rad_lower": "rad",
+        "pitch_error_rad_upper": "rad",
+        "pitch_reference_rad": "rad",
+        "pitch_rad": "rad",
+        "pitch_rate_rad_s": "rad/s",
+        "angle_of_attack_rad": "rad",
+        "altitude_change_m": "m",
+        "speed_change_m_s": "m/s",
+        "thrust_change_n": "N",
+        "elevator_rad": "rad",
     }
 )
-"""Known channels. Thrust and its two parts are shares of full command (the autopilot's 9600 counts)."""
+"""Known channels. Thrust and its two parts are shares of full command (the autopilot's 9600 counts).
+Those of an aircraft in flight (angle of attack, altitude and speed change, pitch, thrust change, elevator) are
+deviations from its trimmed flight."""
 
 
 @dataclass(frozen=True, slots=True)

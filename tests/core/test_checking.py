@@ -20,9 +20,13 @@ def test_the_default_definition_has_no_problems() -> None:
 @pytest.mark.parametrize(
     ("definition", "field", "reason"),
     [
-        (replace(GOOD, experiment="landing"), "experiment", "must be one of takeoff, got 'landing'"),
-        (replace(GOOD, strategy="luck"), "strategy", "must be one of gradient, simplex, manual, got 'luck'"),
-        (replace(GOOD, options={"raw": True}), "options.raw", "is not an option of gradient (it has: scaled)"),
+        (replace(GOOD, experiment="landing"), "experiment", "must be one of takeoff, pitch-tracking, got 'landing'"),
+        (
+            replace(GOOD, strategy="luck"),
+            "strategy",
+            "must be one of calibrated, gradient, identified, simplex, manual, got 'luck'",
+        ),
+        (replace(GOOD, options={"raw": True}), "options.raw", "is not an option of gradient (it has: scaled, bias)"),
         (
             replace(GOOD, strategy="manual", options={"raw": 1}),
             "options.raw",
@@ -39,7 +43,7 @@ def test_the_default_definition_has_no_problems() -> None:
         (replace(GOOD, bounds={"ki": (0.5, 99)}), "bounds.ki", "must be whole numbers, got 0.5 … 99"),
         (replace(GOOD, bounds={"kp": (500, 600)}), "start.gains.kp", "must lie in 500 … 600 counts, got 283"),
         (replace(GOOD, start=Start(kind="given")), "start.gains", "are needed with start.kind 'given'"),
-        (replace(GOOD, start=Start(gains={"kp": 1})), "start.gains", "go only with start.kind 'given'"),
+        (replace(GOOD, start=Start(gains={"kp": 1})), "start.gains", "do not go with start.kind 'default'"),
         (
             replace(GOOD, start=Start(kind="given", gains={"kp": 1, "ki": 2.5, "kd": 3})),
             "start.gains.ki",

@@ -12,7 +12,7 @@ from app.core import kernels
 ROLLOUT = """
 import numpy as np
 from app.core.experiments.takeoff import Takeoff
-run = Takeoff().simulate(np.array([1600.0, 1023.0, 127.0]), np.array([0.61, 0.3, 0.05, 0.02]))
+run = Takeoff().simulate(np.array([1600.0, 1023.0, 127.0]), np.array([0.61, 0.3, 0.05, 0.02, 0.1, 0.1, 0.01, 0.01]))
 print(run["altitude_m"].tobytes().hex()[-4000:])
 """
 

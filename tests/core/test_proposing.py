@@ -72,6 +72,7 @@ def test_on_the_twin_the_models_optimum_is_a_good_start() -> None:
     assert min(errors(flights)) <= 0.1250
 
 
+@pytest.mark.timeout(600)
 @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(DEFINITIONS)
 def test_every_proposal_is_recomputed_bit_for_bit_and_passes_the_gate(definition: Definition) -> None:
@@ -82,7 +83,7 @@ def test_every_proposal_is_recomputed_bit_for_bit_and_passes_the_gate(definition
     for number, proposal in enumerate(proposals):
         history = copy.deepcopy(flights[:number])
         assert same(proposal, next_proposal(copy.deepcopy(definition), history))
-        assert check_policy(definition, TAKEOFF, space, proposal.gains, history).passed
+        assert check_policy(definition, TAKEOFF, space, proposal.gains, history, start=proposals[0].gains).passed
         assert space.check(proposal.gains) == proposal.gains
 
 
@@ -116,6 +117,18 @@ def test_the_simplex_strategy_searches_from_given_start_gains() -> None:
     flights, proposals = campaign(definition)
     assert [proposal.kind for proposal in proposals] == ["start", "step", "none"]
     assert errors(flights)[1] < errors(flights)[0]
+
+
+def test_under_the_rule_noise_the_winner_and_the_first_gains_are_flown_again() -> None:
+    definition = Definition(stop=StopRule(kind="noise", max_flights=9))
+    flights, proposals = campaign(definition, TWIN)
+    kinds = [proposal.kind for proposal in proposals]
+    assert kinds[0] == "start"
+    assert kinds[-3:] == ["repeat", "baseline", "none"]
+    assert set(kinds[1:-3]) <= {"step", "shorter step"}
+    assert proposals[-3].gains == proposals[-1].gains == min(flights, key=lambda flight: flight.error or 1.0).gains
+    assert proposals[-2].gains == flights[0].gains
+    assert proposals[-1].explanation.summary.startswith("Better with more than 99.9 % confidence")
 
 
 def test_a_recorded_flight_of_the_real_autopilot_can_be_told() -> None:

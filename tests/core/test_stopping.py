@@ -1,7 +1,13 @@
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
 import pytest
 
-from app.core.definition import StopRule
-from app.core.stopping import verdict
+from app.core.definition import Definition, StopRule
+from app.core.stopping import judge, landing_battery_v, verdict
+from app.core.strategies.base import Explanation, Proposal
+from tests.core.bowl import fly
 
 PAPER = StopRule()
 
@@ -52,7 +58,7 @@ def test_an_aborted_flight_neither_improves_nor_fails_but_uses_up_budget() -> No
 
 
 def test_a_line_without_anything_better_ends_the_paper_rule_only() -> None:
-    assert verdict(PAPER, [0.5], "none").reason == "nothing better on the line"
+    assert verdict(PAPER, [0.5], "none").reason == "nothing better"
     assert verdict(PAPER, [0.5], "manual").reason is None
     assert verdict(StopRule(kind="budget"), [0.5], "none").reason is None
 
@@ -63,3 +69,39 @@ def test_the_budget_rule_counts_flights_only() -> None:
     assert verdict(rule, [0.5, 0.5, 0.5]).why == "1 of 4 flights are left."
     assert verdict(rule, [0.5] * 4).reason == "flight budget"
     assert "All 4 flights" in verdict(rule, [0.5] * 4).why
+
+
+def test_the_noise_rule_never_stops_on_errors_but_when_nothing_is_left_to_tell() -> None:
+    rule = StopRule(kind="noise", max_flights=4)
+    same = [0.5, 0.5, 0.5]
+    assert verdict(rule, same, "step").reason is None
+    assert verdict(rule, same, "step").threshold is None
+    judged = verdict(rule, same, "none", because="Better.")
+    assert (judged.reason, judged.why) == ("told from noise", "Better.")
+    spent = verdict(rule, [*same, 0.5], "none", because="Unresolved.")
+    assert (spent.reason, spent.why) == ("flight budget", "All 4 flights of the budget are flown. Unresolved.")
+
+
+@pytest.mark.parametrize("kind", ["paper", "noise", "budget"])
+def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "noise", "budget"]) -> None:
+    rule = StopRule(kind=kind, min_battery_v=10.5)
+    assert verdict(rule, [0.5], "step", battery_v=10.5).reason is None
+    assert verdict(rule, [0.5], "step").reason is None
+    low = verdict(rule, [0.5], "step", battery_v=10.42, because="A step.")
+    assert low.reason == "battery low"
+    assert low.why.startswith("The last flight ended at 10.42 V; 10.5 V is the least.")
+
+
+def test_the_battery_is_read_at_the_end_of_the_last_flight() -> None:
+    flight = fly(1, 30, 40)
+    proposal = Proposal(
+        kind="step", gains={}, predicted=None, predicted_error=None, explanation=Explanation(summary="A step.")
+    )
+    definition = Definition(stop=StopRule(min_battery_v=10.5))
+    assert landing_battery_v(flight.trajectory) is None
+    assert judge(definition, [flight], proposal).reason is None
+    channels = {**flight.trajectory.channels, "battery_v": np.linspace(11.1, 10.4, len(flight.trajectory))}
+    sagging = replace(flight, trajectory=replace(flight.trajectory, channels=channels))
+    assert landing_battery_v(sagging.trajectory) == pytest.approx(10.4)
+    assert judge(definition, [sagging], proposal).reason == "battery low"
+    assert judge(definition, [], proposal).reason is None

@@ -41,8 +41,8 @@ class Replay:
         return self.first_different_row is None
 
 
-def replay_trace(trace: LoopTrace) -> Replay:
-    """Start the replica at the first row's z and zd, step it once per row, and compare every output of every row."""
+def replayed(trace: LoopTrace) -> NDArray[np.int64]:
+    """The replica's own outputs, shape (n, 7): started at the first row's z and zd, stepped once per row."""
     loop = VerticalLoop()
     computed = np.empty_like(trace.outputs)
     rows = trace.inputs.tolist()
@@ -50,6 +50,16 @@ def replay_trace(trace: LoopTrace) -> Replay:
     for row, (mode, target, kp, ki, kd, z, zd, r33, in_flight) in enumerate(rows):
         thrust = loop.step(mode, target, kp, ki, kd, z, zd, r33, bool(in_flight))
         computed[row] = (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err, loop.ff_cmd, loop.fb_cmd, thrust)
+    return computed
+
+
+def replay_trace(trace: LoopTrace) -> Replay:
+    """Compare every output of every row with the replica's."""
+    return compared(trace, replayed(trace))
+
+
+def compared(trace: LoopTrace, computed: NDArray[np.int64]) -> Replay:
+    """How far `computed`, shape (n, 7), is from what the trace recorded."""
     difference = np.abs(computed - trace.outputs)
     different = np.flatnonzero(difference.any(axis=1))
     return Replay(

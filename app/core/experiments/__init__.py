@@ -4,21 +4,28 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from app.core.definition import Definition, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
+from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
 
-_ALL: Final[tuple[Experiment, ...]] = (Takeoff(),)
+_ALL: Final[tuple[Experiment, ...]] = (Takeoff(), PitchTracking())
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType({experiment.name: experiment for experiment in _ALL})
 
 
-def get_experiment(name: str) -> Experiment:
-    """Raises InputError when there is no experiment of that name."""
+def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) -> Experiment:
+    """The experiment with its settings, which must be free of problems. Raises InputError for an unknown name."""
     if name not in EXPERIMENTS:
         raise InputError(
             "There is no such experiment.",
             hint=f"Choose one of: {', '.join(EXPERIMENTS)}.",
             problems=(Problem("experiment", f"unknown name {name!r}"),),
         )
-    return EXPERIMENTS[name]
+    return EXPERIMENTS[name].configured(options) if options else EXPERIMENTS[name]
+
+
+def experiment_of(definition: Definition) -> Experiment:
+    """The experiment of a definition, as it is configured there."""
+    return get_experiment(definition.experiment, definition.experiment_options)

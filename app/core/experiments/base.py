@@ -1,12 +1,17 @@
 """What an experiment offers to strategies, figures and pages. A new one is one file and one line in the registry."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.checks import Check, Envelope
+from app.core.definition import OptionValue
+from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
+from app.core.spread import Spread
 from app.core.trajectory import Samples, Trajectory
 
 Matrix = NDArray[np.float64]
@@ -14,7 +19,12 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ModelParameter:
-    """One number of the simple model that a fit may move: its nominal value and the spread expected around it."""
+    """One number of the simple model that a fit may move: its nominal value, and the standard deviation of the truth
+    around it, as a fit takes it; `known_within` is how far the gate lets it be off before a flight has shown more.
+
+    `expected` is where a fit takes the truth to lie, where the data sheet's figure is the edge of what is possible (no
+    motor is without lag); `flight_sd` how much it differs from one flight to the next.
+    """
 
     name: str
     title: str
@@ -23,6 +33,79 @@ class ModelParameter:
     lower: float
     upper: float
     prior_sd: float
+    known_within: float
+    expected: float | None = None
+    flight_sd: float = 0.0
+
+    @property
+    def prior_mean(self) -> float:
+        return self.nominal if self.expected is None else self.expected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedParameter:
+    """A number of the model as the flights have it, with its standard error; `nominal` and `prior_sd` are what was
+    known before them."""
+
+    name: str
+    title: str
+    unit: str
+    value: float
+    standard_error: float
+    nominal: float
+    prior_sd: float
+
+
+def fitted_parameters(
+    parameters: Sequence[ModelParameter], values: Vector, covariance: Matrix
+) -> tuple[FittedParameter, ...]:
+    """Values of shape (m,) with their standard errors from a covariance (m, m), beside what was known before."""
+    errors = np.sqrt(np.diag(covariance))
+    return tuple(
+        FittedParameter(
+            name=parameter.name,
+            title=parameter.title,
+            unit=parameter.unit,
+            value=float(value),
+            standard_error=float(error),
+            nominal=parameter.prior_mean,
+            prior_sd=parameter.prior_sd,
+        )
+        for parameter, value, error in zip(parameters, values, errors, strict=True)
+    )
+
+
+def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: Vector) -> tuple[ModelParameter, ...]:
+    """The same parameters known better: `mean` and `sd`, shape (m,), take the place of the data sheet."""
+    return tuple(
+        replace(
+            parameter, nominal=float(value), prior_sd=float(spread), known_within=2.0 * float(spread), expected=None
+        )
+        for parameter, value, spread in zip(parameters, mean, sd, strict=True)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """How much errors of repeated flights scatter, as known before any: a standard deviation in the error's unit, worth
+    as much as `degrees_of_freedom` repeats."""
+
+    sd: float
+    degrees_of_freedom: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimplexSearch:
+    """How Nelder–Mead searches this experiment's model: the first step of a gain is `of_gain` of its value plus
+    `of_scale` of its scale plus `constant`; it ends after so many evaluations of the model, or iterations. Without
+    `bounded` the simplex may leave the bounds, and only the gains of each run are held inside."""
+
+    of_gain: float = 0.0
+    of_scale: float = 0.0
+    constant: float = 0.0
+    evaluations: int | None = None
+    iterations: int | None = None
+    bounded: bool = True
 
 
 class Experiment(Protocol):
@@ -33,6 +116,19 @@ class Experiment(Protocol):
     @property
     def title(self) -> str: ...
     @property
+    def options(self) -> tuple[Option, ...]:
+        """Settings of the experiment itself, of its model for instance."""
+        ...
+
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """The experiment with these settings, the others at their defaults; they must be free of problems."""
+        ...
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        """The experiment with another vehicle's fitted model as its nominal one: both of shape (m,)."""
+        ...
+
+    @property
     def space(self) -> PolicySpace: ...
     @property
     def model_parameters(self) -> tuple[ModelParameter, ...]: ...
@@ -42,8 +138,22 @@ class Experiment(Protocol):
         ...
 
     @property
+    def scatter(self) -> Scatter: ...
+    @property
+    def search(self) -> SimplexSearch: ...
+    @property
+    def difference(self) -> float:
+        """Step of the gradient's differences, as a share of each gain's scale."""
+        ...
+
+    @property
     def output(self) -> str:
         """The channel that is scored, e.g. `altitude_m`."""
+        ...
+
+    @property
+    def integrates(self) -> bool:
+        """Whether the error is the integral of the absolute deviation over time, rather than its mean."""
         ...
 
     @property
@@ -61,8 +171,23 @@ class Experiment(Protocol):
         """One model run with every channel the model knows."""
         ...
 
-    def outputs(self, gains: Matrix, model: Vector) -> Matrix:
-        """Scored output of many policies on one model: gains (k, g) → (k, n) on `grid_s`, one compiled call."""
+    def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
+        """Scored output of many policies, each on its own model or all on one: gains (k, g), model (k, m) or (m,)
+        → (k, n) on `grid_s`, one compiled call."""
+        ...
+
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
+        """What the state did in every recorded step beyond the model's step from the recorded state and command, in the
+        experiment's own layout for `disturbed_outputs`. None where the record does not hold what it takes."""
+        ...
+
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+        """`outputs` of the model with these added to its state at the same instants, inside the control loop."""
+        ...
+
+    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+        """What could go wrong in a flight with these gains, inside the bounds or not, on vehicles as `spread` has them:
+        the checks of the gate that only the experiment can make. Pure; a tenth of a second at most."""
         ...
 
     def errors(self, outputs: Matrix) -> Vector:

@@ -1,20 +1,37 @@
 """The paper's takeoff: from the ground to 3 m under the autopilot's vertical loop, scored by its altitude error."""
 
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final, Self
 
 import numpy as np
 
+from app.core.checks import Check, Envelope
 from app.core.control.fixed_point import fix
 from app.core.control.vertical_loop import POSITION_BITS, RATE_HZ
-from app.core.experiments.base import Matrix, ModelParameter
+from app.core.definition import OptionValue
+from app.core.experiments.base import Matrix, ModelParameter, Scatter, SimplexSearch, informed_parameters
+from app.core.hazards.flights import MODELS, check_flights
+from app.core.hazards.wrapping import check_wrapping
 from app.core.metrics import mean_absolute_error, require_scorable
+from app.core.options import Option
 from app.core.plants.vertical import CHANNELS, Counts, fly, fly_batch
+from app.core.plants.vertical_disturbed import fly_batch as fly_disturbed
+from app.core.plants.vertical_disturbed import observe
 from app.core.policy import Gain, PolicySpace, Vector
+from app.core.spread import Spread
 from app.core.trajectory import Samples, Trajectory
 
 TARGET_M: Final = 3.0
 WINDOW_S: Final = 32.6
 
+SETTLED_S: Final = 5.0
+"""From then on a takeoff should be near its target."""
+
+_SKETCH_EVERY: Final = 4
+_SKETCH_END_S: Final = 2.0
+_STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
 _TARGET: Final = fix(TARGET_M, POSITION_BITS)
 _SAMPLES: Final = int(np.ceil(WINDOW_S * RATE_HZ)) + 1
 
@@ -23,12 +40,53 @@ def _gain(name: str, title: str, upper: int, default: int) -> Gain:
     return Gain(name, title, "counts", lower=0, upper=upper, scale=upper / 10, default=default, integer=True)
 
 
+def _known(
+    name: str,
+    title: str,
+    unit: str,
+    upper: float,
+    prior_sd: float,
+    within: float,
+    *,
+    nominal: float = 0.0,
+    lower: float = 0.0,
+    expected: float | None = None,
+    flight_sd: float = 0.0,
+) -> ModelParameter:
+    return ModelParameter(name, title, unit, nominal, lower, upper, prior_sd, within, expected, flight_sd)
+
+
+MODEL_PARAMETERS: Final = (
+    _known("hover_throttle", "Hover throttle", "of full", 0.95, 0.09, 0.05, nominal=0.63, lower=0.3, flight_sd=0.002),
+    _known("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
+    _known("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
+    _known("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
+    _known("quadratic_share", "Quadratic share of thrust", "1", 1.0, 0.5, 0.3),
+    _known("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
+    _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
+    _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
+)
+"""The data sheet has mass and thrust only: every other nominal value is zero. What is expected of the rest is what
+small multicopters have; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sketches:
+    """Takeoffs of c policies on k models, cut short; all of shape (c, k). The error takes what the last two seconds
+    deviate for what the rest of the flight would; `lowest_m` is from 5 s after the command on."""
+
+    errors: Matrix
+    highest_m: Matrix
+    lowest_m: Matrix
+
+
 class Takeoff:
     """Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits."""
 
     name: Final = "takeoff"
     title: Final = "Takeoff to 3 m"
     output: Final = "altitude_m"
+    integrates: Final = False
     error_unit: Final = "m"
     space: Final = PolicySpace(
         (
@@ -37,16 +95,25 @@ class Takeoff:
             _gain("kd", "Derivative gain", 409, 82),
         )
     )
-    model_parameters: Final = (
-        ModelParameter("hover_throttle", "Hover throttle", "of full", 0.63, lower=0.3, upper=0.95, prior_sd=0.05),
-        ModelParameter("start_latency_s", "Start latency", "s", 0.0, lower=0.0, upper=1.0, prior_sd=0.15),
-        ModelParameter("motor_lag_s", "Motor lag", "s", 0.0, lower=0.0, upper=0.3, prior_sd=0.05),
-        ModelParameter("drag_1_s", "Drag", "1/s", 0.0, lower=0.0, upper=1.0, prior_sd=0.1),
-    )
+    options: Final[tuple[Option, ...]] = ()
+    scatter: Final = Scatter(sd=0.0105, degrees_of_freedom=4.0)
+    search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
+    difference: Final = 0.1
+
+    def __init__(self, model_parameters: tuple[ModelParameter, ...] = MODEL_PARAMETERS) -> None:
+        self.model_parameters: Final = model_parameters
+
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:  # noqa: ARG002 - there are none
+        """The experiment itself: it has no settings."""
+        return self
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        """The takeoff whose model is known as another vehicle's fit has it: both of shape (m,)."""
+        return type(self)(informed_parameters(self.model_parameters, mean, sd))
 
     @property
     def nominal_model(self) -> Vector:
-        """What the data sheet gives: mass and thrust, and nothing of the rest."""
+        """What is known before the first flight; from the data sheet, mass and thrust and nothing of the rest."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
 
     @property
@@ -60,14 +127,53 @@ class Takeoff:
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any whole gains, inside the bounds or not."""
-        channels, _ = fly(_counts(gains), model, _TARGET, _SAMPLES)
+        parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
+        channels, _ = fly(_counts(gains), parameters, _TARGET, _SAMPLES)
         time_s = self.grid_s
         named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
         return Trajectory(time_s, named, "model", "simulation")
 
-    def outputs(self, gains: Matrix, model: Vector) -> Matrix:
-        """Altitude of many policies on one model: gains (k, 3) → (k, 16693)."""
-        return fly_batch(_counts(gains), np.tile(model, (len(gains), 1)), _TARGET, _SAMPLES)
+    def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
+        """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, 16693)."""
+        return fly_batch(_counts(gains), self._models(model, len(gains)), _TARGET, _SAMPLES)
+
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
+        """What altitude and climb rate did beyond the model in every step of a flight, shape (16693, 3). None where the
+        record lacks the climb rate or the thrust command."""
+        if any(name not in trajectory.channels for name in _STATE_AND_COMMAND):
+            return None
+        altitude, climb_rate, thrust = (
+            np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in _STATE_AND_COMMAND
+        )
+        return observe(altitude, climb_rate, thrust, self._models(model, 1)[0])
+
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+        """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, 16693)."""
+        return fly_disturbed(_counts(gains), self._models(model, len(gains)), _TARGET, disturbances)
+
+    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+        """Products that can wrap, exactly; altitude, divergence, oscillation and aborts of simulated takeoffs.
+
+        Takes a tenth of a second, and nothing for a question asked before.
+        """
+        safe_gains = self.space.vector(envelope.safe_gains)
+        return _hazards(
+            tuple(gains.tolist()), tuple(safe_gains.tolist()), envelope.ceiling_m, spread, self.model_parameters
+        )
+
+    def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
+        """Every policy on every model, flown only until `until_s`, past 5 s: gains (c, 3), models (k, m)."""
+        samples = round(until_s * RATE_HZ)
+        runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
+        altitude = fly_batch(*runs, _TARGET, samples)[:, ::_SKETCH_EVERY]
+        rate_hz = RATE_HZ / _SKETCH_EVERY
+        deviations = np.abs(TARGET_M - altitude)
+        end = deviations[:, -round(_SKETCH_END_S * rate_hz) :].mean(axis=1) * (WINDOW_S - until_s)
+        return Sketches(
+            errors=_by_policy((deviations.sum(axis=1) / rate_hz + end) / WINDOW_S, gains),
+            highest_m=_by_policy(altitude.max(axis=1), gains),
+            lowest_m=_by_policy(altitude[:, round(SETTLED_S * rate_hz) :].min(axis=1), gains),
+        )
 
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute altitude error, m, over 32.6 s: (k, 16693) → (k,)."""
@@ -78,6 +184,31 @@ class Takeoff:
         """The same of a recorded flight. Raises TrajectoryError when it has gaps or does not cover the window."""
         require_scorable(trajectory, self.output, 0.0, WINDOW_S, accept_gaps=accept_gaps)
         return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, WINDOW_S)
+
+    def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
+        return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
+
+
+def _by_policy(runs: Vector, gains: Matrix) -> Matrix:
+    return runs.reshape(len(gains), -1)
+
+
+@lru_cache(maxsize=64)
+def _hazards(
+    gains: tuple[float, ...],
+    safe_gains: tuple[float, ...],
+    ceiling_m: float,
+    spread: Spread,
+    parameters: tuple[ModelParameter, ...],
+) -> tuple[Check, ...]:
+    takeoff = Takeoff(parameters)
+    counts, safe_counts = _counts(np.array(gains)), _counts(np.array(safe_gains))
+    models = spread.samples(takeoff, MODELS)
+    baseline = gains == tuple(takeoff.space.default.tolist())
+    return (
+        *check_wrapping(counts, models[0], _TARGET),
+        *check_flights(counts, safe_counts, baseline, parameters, models, ceiling_m, _TARGET, _SAMPLES),
+    )
 
 
 def _counts(gains: Vector) -> Counts:

@@ -1,14 +1,17 @@
 """The simple vertical model of a multicopter, and its takeoff under the autopilot's vertical loop.
 
-Force, mass, gravity (the paper's eq. 7), with three refinements that are zero in the nominal model:
+Force, mass, gravity (the paper's eq. 7), with refinements that are zero in the nominal model:
 
-    z̈ = g·(thrust/hover − 1) − drag·ż,   thrust a first-order lag behind the command,
+    z̈ = g·(T/W − 1) − drag·ż,   T/W = ((1 − q)·u + q·u²) / ((1 − q)·h + q·h²) · (1 + e·exp(−z/0.4 m)) · (1 − s·t/33 s),
 
-altitude z up from the ground at 0, explicit Euler at 512 Hz. The loop is entered a latency after the command, from rest
-on the ground. Until then nothing moves, so a latency shifts the whole run in time, by any fraction of a step: the
-outputs depend on it continuously, as a fit needs.
+u the share of full thrust commanded, after a first-order lag; h the hover throttle, q the quadratic share of thrust, e
+the ground effect, s the battery's sag; altitude z up from the ground at 0, explicit Euler at 512 Hz. The loop senses
+altitude and climb rate a measurement delay late, which is also what is recorded and scored. It is entered a latency
+after the command, from rest on the ground; until then nothing moves, so a latency shifts the whole run in time. Both
+delays are interpolated to any fraction of a step: the outputs depend on them continuously, as a fit needs.
 """
 
+import math
 from typing import Final
 
 import numpy as np
@@ -42,7 +45,15 @@ HOVER_THROTTLE: Final = 0
 START_LATENCY_S: Final = 1
 MOTOR_LAG_S: Final = 2
 DRAG_1_S: Final = 3
+QUADRATIC_SHARE: Final = 4
+GROUND_EFFECT: Final = 5
+MEASUREMENT_DELAY_S: Final = 6
+BATTERY_SAG: Final = 7
 """Places in a model vector."""
+
+GROUND_EFFECT_HEIGHT_M: Final = 0.4
+BATTERY_SAG_S: Final = 33.0
+"""How long a flight takes to lose the whole sag."""
 
 CHANNELS: Final = ("altitude_m", "climb_rate_m_s", "reference_m", "thrust", "feed_forward", "feedback")
 
@@ -61,9 +72,32 @@ def _delay(signal: Samples, steps: float) -> None:
 
 
 @kernel
-def _advance(altitude: float, climb: float, thrust: float, hover: float, drag: float) -> tuple[float, float]:
+def sensed(history: Samples, step: int, delay_steps: float) -> float:
+    """A signal as it was a fractional number of steps before `step`, at rest at 0 before its first; `history` holds its
+    last values in turns."""
+    whole = int(delay_steps)
+    part = delay_steps - whole
+    size = len(history)
+    late = history[(step - whole) % size] if step >= whole else 0.0
+    later = history[(step - whole - 1) % size] if step > whole else 0.0
+    return (1.0 - part) * late + part * later
+
+
+@kernel
+def thrust_to_weight(thrust: float, altitude: float, seconds: float, model: Samples, hover_force: float) -> float:
+    """Acceleration of the rotors in g; `hover_force` is the force of the hover throttle, a share of the full one."""
+    share, ground = model[QUADRATIC_SHARE], model[GROUND_EFFECT]
+    ratio = ((1.0 - share) * thrust + share * thrust * thrust) / hover_force
+    if ground > 0.0:
+        ratio *= 1.0 + ground * math.exp(-altitude / GROUND_EFFECT_HEIGHT_M)
+    sagged: float = ratio * (1.0 - model[BATTERY_SAG] * seconds / BATTERY_SAG_S)
+    return sagged
+
+
+@kernel
+def advance(altitude: float, climb: float, thrust_to_weight: float, drag: float) -> tuple[float, float]:
     """One explicit Euler step; the ground at 0 stops a descent."""
-    acceleration = GRAVITY_M_S2 * (thrust / hover - 1.0) - drag * climb
+    acceleration = GRAVITY_M_S2 * (thrust_to_weight - 1.0) - drag * climb
     altitude += climb * STEP_S
     climb += acceleration * STEP_S
     if altitude <= 0.0:
@@ -72,51 +106,60 @@ def _advance(altitude: float, climb: float, thrust: float, hover: float, drag: f
 
 
 @kernel
+def _write_detail(detail: Samples, i: int, climb: float, command: int, state: State) -> None:
+    detail[0, i] = climb
+    detail[1, i] = -state[Z_REF] / (1 << POSITION_BITS)
+    detail[2, i] = command / FULL_THRUST
+    detail[3, i] = state[FF_CMD] / FULL_THRUST
+    detail[4, i] = state[FB_CMD] / FULL_THRUST
+
+
+@kernel
 def rollout(gains: Counts, model: Samples, target: int, state: State, altitude: Samples, detail: Samples) -> int:
     """Fly one takeoff to `target` (8 fractional bits) and return the largest |product| met in the loop.
 
-    `gains` holds kp, ki, kd; `model` the four parameters. Writes `altitude`, shape (n,), every 1/512 s from the command
-    on, and the other `CHANNELS` to `detail`, shape (5, n) or (5, 0) when they are not wanted. `state` is scratch.
+    `gains` holds kp, ki, kd; `model` the eight parameters. Writes `altitude`, shape (n,), every 1/512 s from the
+    command on, and the other `CHANNELS` to `detail`, shape (5, n), or (5, 0) when they are not wanted. `state` is
+    scratch.
     """
     kp, ki, kd = gains[0], gains[1], gains[2]
-    hover, drag, lag = model[HOVER_THROTTLE], model[DRAG_1_S], model[MOTOR_LAG_S]
+    share, hover, lag, latency = (
+        model[QUADRATIC_SHARE],
+        model[HOVER_THROTTLE],
+        model[MOTOR_LAG_S],
+        model[START_LATENCY_S],
+    )
+    hover_force = (1.0 - share) * hover + share * hover * hover
     response = STEP_S / lag if lag > STEP_S else 1.0
+    delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
+    heights = np.zeros(int(delay) + 2 if delay > 0.0 else 0)
+    climbs = np.zeros_like(heights)
     height, climb, thrust, command = 0.0, 0.0, 0.0, 0
-    wants_detail = detail.shape[1] > 0
     start(state, 0, 0)
     for i in range(len(altitude)):
+        sensed_height, sensed_climb = height, climb
+        if delay > 0.0:
+            heights[i % len(heights)], climbs[i % len(heights)] = height, climb
+            sensed_height, sensed_climb = sensed(heights, i, delay), sensed(climbs, i, delay)
         in_flight = detect_flight(state, command)
-        command = step(
-            state,
-            ALT,
-            target,
-            kp,
-            ki,
-            kd,
-            measured(-height, POSITION_BITS),
-            measured(-climb, SPEED_BITS),
-            LEVEL,
-            in_flight,
-        )
-        altitude[i] = height
-        if wants_detail:
-            detail[0, i] = climb
-            detail[1, i] = -state[Z_REF] / (1 << POSITION_BITS)
-            detail[2, i] = command / FULL_THRUST
-            detail[3, i] = state[FF_CMD] / FULL_THRUST
-            detail[4, i] = state[FB_CMD] / FULL_THRUST
+        z, zd = measured(-sensed_height, POSITION_BITS), measured(-sensed_climb, SPEED_BITS)
+        command = step(state, ALT, target, kp, ki, kd, z, zd, LEVEL, in_flight)
+        altitude[i] = sensed_height
+        if detail.shape[1] > 0:
+            _write_detail(detail, i, sensed_climb, command, state)
         thrust += response * (command / FULL_THRUST - thrust)
-        height, climb = _advance(height, climb, thrust, hover, drag)
-    if model[START_LATENCY_S] > 0.0:
-        _delay(altitude, model[START_LATENCY_S] * RATE_HZ)
-        for channel in range(detail.shape[0] if wants_detail else 0):
-            _delay(detail[channel], model[START_LATENCY_S] * RATE_HZ)
+        lift = thrust_to_weight(thrust, height, i * STEP_S + latency, model, hover_force)
+        height, climb = advance(height, climb, lift, model[DRAG_1_S])
+    if latency > 0.0:
+        _delay(altitude, latency * RATE_HZ)
+        for channel in range(detail.shape[0] if detail.shape[1] > 0 else 0):
+            _delay(detail[channel], latency * RATE_HZ)
     return int(state[LARGEST_PRODUCT])
 
 
 @kernel
 def rollouts(gains: Counts, models: Samples, target: int, state: State, altitude: Samples, no_detail: Samples) -> None:
-    """Fly k takeoffs: gains (k, 3), models (k, 4), altitude out (k, n); `no_detail` has shape (5, 0)."""
+    """Fly k takeoffs: gains (k, 3), models (k, 8), altitude out (k, n); `no_detail` has shape (5, 0)."""
     for run in range(len(gains)):
         rollout(gains[run], models[run], target, state, altitude[run], no_detail)
 
@@ -129,7 +172,7 @@ def fly(gains: Counts, model: Samples, target: int, samples: int) -> tuple[Sampl
 
 
 def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samples:
-    """Many takeoffs in one compiled call: gains (k, 3), models (k, 4) → altitude (k, samples)."""
+    """Many takeoffs in one compiled call: gains (k, 3), models (k, 8) → altitude (k, samples)."""
     altitude = np.empty((len(gains), samples))
     no_detail = np.empty((len(CHANNELS) - 1, 0))
     rollouts(gains, models, target, np.empty(STATE_SIZE, dtype=np.int64), altitude, no_detail)

@@ -4,12 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from app.core.definition import Definition, Flight, OptionValue
-from app.core.experiments.base import Experiment
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment, FittedParameter
+from app.core.options import Option
 from app.core.policy import PolicySpace
+from app.core.spread import Spread
 from app.core.trajectory import Trajectory
 
-Kind = Literal["start", "step", "shorter step", "manual", "none"]
+Kind = Literal["start", "step", "shorter step", "repeat", "baseline", "manual", "none"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,8 +26,24 @@ class LadderStep:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """Where the error is expected, with probability `confidence`."""
+
+    lower: float
+    upper: float
+    confidence: float = 0.9
+
+    def __contains__(self, error: float) -> bool:
+        return self.lower <= error <= self.upper
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """Why these gains: sentences for a person, and the numbers behind them."""
+    """Why these gains: sentences for a person, and the numbers behind them.
+
+    `lesson` says what the flight is expected to teach; `fitted` is empty for strategies that fit nothing;
+    `trust_fraction` is the share of each gain's range that the step was allowed, None without a trust region.
+    """
 
     summary: str
     base_flight: int | None = None
@@ -35,6 +53,9 @@ class Explanation:
     chosen_length: float | None = None
     clipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    lesson: str = ""
+    fitted: tuple[FittedParameter, ...] = ()
+    trust_fraction: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +63,10 @@ class Proposal:
     """The next gain set. Kind `none` means that the strategy has nothing better to offer, `manual` that the operator
     chooses; `gains` is then the best flown.
 
-    `predicted` is the corrected model's output for these gains on the experiment's grid.
+    `spread` is what is known of the vehicle, where the strategy has found it out; it is costly to find again.
+    `predicted` is the corrected model's output for these gains on the experiment's grid; where a band is known, it has
+    two more channels, named by `band_channels`. `interval` is where the flight's error is expected, its scatter
+    included.
     """
 
     kind: Kind
@@ -50,24 +74,27 @@ class Proposal:
     predicted: Trajectory | None
     predicted_error: float | None
     explanation: Explanation
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Option:
-    """One setting of a strategy."""
-
-    name: str
-    title: str
-    default: OptionValue
-    choices: tuple[OptionValue, ...] = ()
+    interval: Interval | None = None
+    spread: Spread | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strategy:
-    """A registered strategy: `propose(definition, experiment, space, flights)`, with at least one valid flight."""
+    """A registered strategy: `propose(definition, experiment, space, flights)`, with at least one valid flight.
+
+    `experiments` names those it works with; empty: with all. `learns`: whether its predictions are corrected by the
+    flight that its explanation names as the base.
+    """
 
     name: str
     title: str
     line: str
     options: tuple[Option, ...]
     propose: Callable[[Definition, Experiment, PolicySpace, Sequence[Flight]], Proposal]
+    experiments: tuple[str, ...] = ()
+    learns: bool = True
+
+
+def band_channels(output: str) -> tuple[str, str]:
+    """Names of the channels that hold the lower and the upper edge of a predicted output's band."""
+    return f"{output}_lower", f"{output}_upper"

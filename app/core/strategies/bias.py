@@ -7,6 +7,7 @@ import numpy as np
 from app.core.definition import Flight
 from app.core.experiments.base import Experiment, Matrix
 from app.core.policy import Vector
+from app.core.recorded import on_grid
 from app.core.trajectory import Samples, Trajectory
 
 
@@ -36,19 +37,35 @@ class CorrectedModel:
         return trajectory, float(self.experiment.errors(outputs)[0])
 
 
+@dataclass(frozen=True, slots=True)
+class DisturbedModel(CorrectedModel):
+    """The model with what a flight did beyond it in every step added to its state at the same instants, inside the
+    control loop (Abbeel et al. 2006, the paper's step 4); `bias` is zero."""
+
+    disturbances: Matrix
+
+    def outputs(self, gains: Matrix) -> Matrix:
+        """Gains (k, g) → predicted outputs (k, n)."""
+        return self.experiment.disturbed_outputs(gains, self.model, self.disturbances)
+
+
 def nominal(experiment: Experiment) -> CorrectedModel:
     """What is known before the first flight: no correction."""
     return CorrectedModel(experiment, experiment.nominal_model, np.zeros_like(experiment.grid_s))
 
 
 def corrected_by(experiment: Experiment, flight: Flight) -> CorrectedModel:
-    """b(t) = measured(t) − model(t; flown gains), the measured flight taken as the database keeps it.
+    """b(t) = measured(t) − model(t; flown gains)."""
+    flown = experiment.outputs(experiment.space.vector(flight.gains)[np.newaxis], experiment.nominal_model)[0]
+    return CorrectedModel(experiment, experiment.nominal_model, on_grid(experiment, flight) - flown)
 
-    Beyond the flight's samples its nearest one holds.
-    """
-    measured = flight.trajectory.as_stored()
-    on_grid = np.interp(experiment.grid_s, measured.time_s, measured[experiment.output])
-    flown = experiment.space.vector(flight.gains)[np.newaxis]
-    return CorrectedModel(
-        experiment, experiment.nominal_model, on_grid - experiment.outputs(flown, experiment.nominal_model)[0]
+
+def corrected_inside_by(experiment: Experiment, flight: Flight) -> DisturbedModel | None:
+    """The nominal model with the flight's disturbances inside the loop, the flight taken as the database keeps it; None
+    where its record lacks a state or the command."""
+    disturbances = experiment.disturbances(
+        flight.trajectory.as_stored(), experiment.space.vector(flight.gains), experiment.nominal_model
     )
+    if disturbances is None:
+        return None
+    return DisturbedModel(experiment, experiment.nominal_model, np.zeros_like(experiment.grid_s), disturbances)

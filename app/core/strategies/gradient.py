@@ -1,28 +1,36 @@
 """The paper's strategy: descend the corrected model's error along its gradient.
 
-The base is the best flight so far. The model, corrected by it outside the loop, gives the gradient (central
-differences) and the error at every step of a geometric ladder along its negative; the best step is flown. A flight that
-does not improve leaves the base, and with it the line, where it was: the next one goes half as far along it.
+The base is the best flight so far. The model, corrected by it outside the loop (or inside, as an option), gives the
+gradient (central differences) and the error at every step of a geometric ladder along its negative; the best step is
+flown. A flight that does not improve leaves the base, and with it the line, where it was: the next one goes half as far
+along it. So does a step that the gate would refuse.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from app.core.calibration import known
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
+from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
-from app.core.strategies.base import Explanation, LadderStep, Option, Proposal, Strategy
-from app.core.strategies.bias import CorrectedModel, corrected_by
+from app.core.strategies.base import Explanation, LadderStep, Proposal, Strategy
+from app.core.strategies.bias import CorrectedModel, corrected_by, corrected_inside_by
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.line_search import Line, try_lengths
+from app.core.strategies.passing import may_fly
 
 SCALED_LADDER: Final = tuple(2.0**power for power in range(3, -13, -1))
 RAW_LADDER: Final = tuple(10.0 ** (tenths / 10) for tenths in range(30, -1, -1))
+"""Where gains are whole counts."""
+RAW_REAL_LADDER: Final = SCALED_LADDER
+"""Where all are real: a step of 1 may be far too long."""
 MIN_DIFFERENCE: Final = 2.0
 _HALVINGS: Final = 24
+_OUTSIDE: Final = "The correction is added outside the control loop, as a bias over time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +42,11 @@ class _Metric:
 
 
 def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vector) -> Vector:
-    """∂error/∂gain at `base`, shape (n,): central differences over a tenth of the scale to each side, at least 2 counts
-    for integer gains, cut off at the bounds; zero where the bounds pin a gain."""
+    """∂error/∂gain at `base`, shape (n,): central differences over the experiment's share of `scale` to each side, at
+    least 2 counts for integer gains, cut off at the bounds; zero where the bounds pin a gain."""
     integer = np.array([gain.integer for gain in space.gains])
-    steps = np.where(integer, np.maximum(np.rint(scale / 10), MIN_DIFFERENCE), scale / 10)
+    wanted = model.experiment.difference * scale
+    steps = np.where(integer, np.maximum(np.rint(wanted), MIN_DIFFERENCE), wanted)
     above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
     ups = np.where(np.eye(len(base), dtype=bool), above, base)
     downs = np.where(np.eye(len(base), dtype=bool), below, base)
@@ -46,16 +55,17 @@ def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vec
     return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
 
 
+def _raw_metric(space: PolicySpace) -> _Metric:
+    whole = any(gain.integer for gain in space.gains)
+    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER)
+
+
 def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
     """The next gains on the line from the best flight. At least one flight must be valid."""
-    metric = (
-        _Metric(space.scale, SCALED_LADDER)
-        if definition.options.get("scaled", True)
-        else _Metric(np.ones(len(space.gains)), RAW_LADDER)
-    )
+    metric = _Metric(space.scale, SCALED_LADDER) if definition.options.get("scaled", True) else _raw_metric(space)
     base = best_flight(flights)
-    base_gains = space.vector(base.gains)
-    model = corrected_by(experiment, base)
+    base_gains = space.nearest(space.vector(base.gains))
+    model, correction = _corrected(definition, experiment, base)
     slopes = gradient(model, space, base_gains, metric.scale)
     steepness = float(np.linalg.norm(slopes * metric.scale))
     direction = -slopes * metric.scale**2 / (steepness or 1.0)
@@ -63,50 +73,58 @@ def propose(definition: Definition, experiment: Experiment, space: PolicySpace, 
     ladder = try_lengths(line, metric.ladder, model)
     best = min(ladder, key=lambda step: step.predicted_error)
     now = float(model.errors(base_gains[np.newaxis])[0])
-    chosen = _first_not_flown(line, best, base, flights, model) if best.predicted_error < now else None
+    spread = known(experiment, flights)
+
+    def passes(gains: Vector) -> bool:
+        return may_fly(definition, experiment, gains, spread)
+
+    chosen, refused = _first_to_fly(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
     explanation = Explanation(
-        summary=_summary(experiment, base, best, chosen, len(ladder)),
+        summary=_summary(experiment, base, best, chosen, len(ladder), refused),
         base_flight=base.number,
         gradient=_named(space, slopes),
         direction=_named(space, direction),
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
-        notes=_notes(chosen),
+        notes=(correction, *_notes(chosen, refused)),
     )
-    if chosen is None:
-        trajectory, error = model.predict(base_gains)
-        return Proposal(
-            kind="none",
-            gains=space.mapping(base_gains),
-            predicted=trajectory,
-            predicted_error=error,
-            explanation=explanation,
-        )
-    trajectory, error = model.predict(space.vector(chosen.gains))
+    gains = space.mapping(base_gains) if chosen is None else chosen.gains
+    trajectory, error = model.predict(space.vector(gains))
     return Proposal(
-        kind="step" if chosen is best else "shorter step",
-        gains=chosen.gains,
+        kind="none" if chosen is None else "step" if chosen is best else "shorter step",
+        gains=gains,
         predicted=trajectory,
         predicted_error=error,
         explanation=explanation,
+        spread=spread,
     )
 
 
-def _first_not_flown(
-    line: Line, best: LadderStep, base: Flight, flights: Sequence[Flight], model: CorrectedModel
-) -> LadderStep | None:
-    """The best step, or half of it, or half of that …: the first whose gains were not flown yet.
+def _first_to_fly(
+    line: Line,
+    best: LadderStep,
+    flights: Sequence[Flight],
+    model: CorrectedModel,
+    passes: Callable[[Vector], bool],
+) -> tuple[LadderStep | None, tuple[LadderStep, ...]]:
+    """The best step, or half of it, or half of that …: the first that was not flown yet and passes the gate; and those
+    that did not pass.
 
     What was flown did not improve on the base, which is the best of all flights. None once a step rounds to the base.
     """
+    refused: list[LadderStep] = []
     for length in _halvings(best.length):
-        gains = line.space.mapping(line.at(length))
-        if gains == dict(base.gains):
-            return None
-        if not was_flown(gains, flights):
-            return best if length == best.length else try_lengths(line, (length,), model)[0]
-    return None
+        gains = line.at(length)
+        if np.array_equal(gains, line.base):
+            break
+        if was_flown(line.space.mapping(gains), flights):
+            continue
+        step = best if length == best.length else try_lengths(line, (length,), model)[0]
+        if passes(gains):
+            return step, tuple(refused)
+        refused.append(step)
+    return None, tuple(refused)
 
 
 def _halvings(length: float) -> Iterator[float]:
@@ -117,27 +135,45 @@ def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
     return {name: float(value) for name, value in zip(space.names, values, strict=True)}
 
 
-def _summary(experiment: Experiment, base: Flight, best: LadderStep, chosen: LadderStep | None, tried: int) -> str:
+def _summary(
+    experiment: Experiment,
+    base: Flight,
+    best: LadderStep,
+    chosen: LadderStep | None,
+    tried: int,
+    refused: Sequence[LadderStep],
+) -> str:
     unit = experiment.error_unit
     origin = f"The best flight so far is {base.number} ({describe(base.gains)}), error {base.error:.4f} {unit}."
     if chosen is None:
-        return f"{origin} Along its gradient the corrected model finds nothing better that was not flown yet."
+        may = " and may be flown" if refused else ""
+        return f"{origin} Along its gradient the corrected model finds nothing better that was not flown yet{may}."
     if chosen is best:
         return (
             f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
             f"{chosen.length:.4g} promises most: {chosen.predicted_error:.4f} {unit}."
         )
+    why = "is refused by the gate" if refused else "did not improve on it"
     return (
-        f"{origin} The longer step along the same line did not improve on it, so the next one goes less far, "
+        f"{origin} The longer step along the same line {why}, so the next one goes less far, "
         f"{chosen.length:.4g} instead of {best.length:.4g}; predicted {chosen.predicted_error:.4f} {unit}."
     )
 
 
-def _notes(chosen: LadderStep | None) -> tuple[str, ...]:
-    outside = "The correction is added outside the control loop, as a bias over time."
-    if chosen and chosen.clipped:
-        return (outside, f"A bound or the step limit stopped {', '.join(chosen.clipped)}.")
-    return (outside,)
+def _corrected(definition: Definition, experiment: Experiment, base: Flight) -> tuple[CorrectedModel, str]:
+    """The corrected model, and how it is corrected."""
+    if definition.options.get("bias") != "inside":
+        return corrected_by(experiment, base), f"{_OUTSIDE}."
+    if (inside := corrected_inside_by(experiment, base)) is not None:
+        return inside, "The correction is added to the state in every step, inside the control loop."
+    missing = f"flight {base.number} was recorded without all of its state and its command"
+    return corrected_by(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
+
+
+def _notes(chosen: LadderStep | None, refused: Sequence[LadderStep]) -> tuple[str, ...]:
+    stopped = f"A bound or the step limit stopped {', '.join(chosen.clipped)}." if chosen and chosen.clipped else ""
+    shortened = f"The gate refuses {'; '.join(describe(step.gains) for step in refused)}." if refused else ""
+    return tuple(filter(None, (stopped, shortened)))
 
 
 GRADIENT: Final = Strategy(
@@ -150,6 +186,12 @@ GRADIENT: Final = Strategy(
             title="Measure each gain in its own scale (off: raw counts, as the paper)",
             default=True,
             choices=(True, False),
+        ),
+        Option(
+            name="bias",
+            title="Where the flight corrects the model: outside the control loop, or inside where its command is known",
+            default="outside",
+            choices=("outside", "inside"),
         ),
     ),
     propose=propose,

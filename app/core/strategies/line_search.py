@@ -27,7 +27,8 @@ class Line:
     def clipped(self, length: float) -> tuple[str, ...]:
         """The gains that a bound or step limit stops at this length."""
         wanted = self.base + length * self.direction
-        stopped = (np.rint(wanted) < self.low) | (np.rint(wanted) > self.high)
+        wanted = np.where([gain.integer for gain in self.space.gains], np.rint(wanted), wanted)
+        stopped = (wanted < self.low) | (wanted > self.high)
         return tuple(name for name, is_stopped in zip(self.space.names, stopped, strict=True) if is_stopped)
 
 

@@ -12,16 +12,18 @@ from app.core.strategies.history import best_flight, describe
 
 
 def propose(_definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
-    """The best flown gains, for the operator to change. At least one flight must be valid."""
+    """The best flown gains, or the nearest inside the bounds, for the operator to change. At least one flight must be
+    valid."""
     best = best_flight(flights)
-    trajectory, error = corrected_by(experiment, best).predict(space.vector(best.gains))
+    gains = space.nearest(space.vector(best.gains))
+    trajectory, error = corrected_by(experiment, best).predict(gains)
     summary = (
         f"You choose the next gains. The best so far are those of flight {best.number} ({describe(best.gains)}), "
         f"error {best.error:.4f} {experiment.error_unit}."
     )
     return Proposal(
         kind="manual",
-        gains=dict(best.gains),
+        gains=space.mapping(gains),
         predicted=trajectory,
         predicted_error=error,
         explanation=Explanation(summary=summary, base_flight=best.number),

@@ -5,51 +5,65 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import Experiment, SimplexSearch
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import Explanation, Proposal, Strategy
 from app.core.strategies.bias import nominal
 from app.core.strategies.history import best_flight, describe, was_flown
 
-EVALUATIONS: Final = 300
+_UNLIMITED: Final = 1_000_000
 
 
-def _first_steps(space: PolicySpace, start: Vector) -> Vector:
-    """0.3·gain + 20 upward, or downward where the bounds leave more room there."""
-    step = 0.3 * start + 20.0
+def _first_steps(search: SimplexSearch, space: PolicySpace, start: Vector) -> Vector:
+    """The search's own steps upward, or downward where the bounds leave more room there."""
+    step = search.of_gain * start + search.of_scale * space.scale + search.constant
     up, down = np.minimum(step, space.upper - start), np.minimum(step, start - space.lower)
     return np.where(up >= down, up, -down)
 
 
 @dataclass(frozen=True, slots=True)
 class Optimum:
-    """Where the search on the model ended: gains of shape (n,), the model's error there, evaluations spent."""
+    """Where the search on the model ended: gains of shape (n,), the model's error there, evaluations spent; `course` is
+    the lowest error after each iteration."""
 
     gains: Vector
     error: float
     evaluations: int
+    course: tuple[float, ...] = ()
 
 
 def model_optimum(experiment: Experiment, space: PolicySpace, start: Vector) -> Optimum:
     """Nelder–Mead within the bounds, with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's own),
-    first steps 0.3·gain + 20, 300 evaluations; gains are rounded before each run of the model."""
-    model = nominal(experiment)
+    first steps and budget the experiment's own; gains are rounded before each run of the model."""
+    model, search = nominal(experiment), experiment.search
 
     def error(gains: Vector) -> float:
         return float(model.errors(space.nearest(gains)[np.newaxis])[0])
 
-    simplex = np.vstack((start, start + np.diag(_first_steps(space, start))))
+    course: list[float] = []
+
+    def follow(intermediate_result: OptimizeResult) -> None:
+        course.append(float(intermediate_result.fun))
+
+    simplex = np.vstack((start, start + np.diag(_first_steps(search, space, start))))
     found = minimize(
         error,
         start,
         method="Nelder-Mead",
-        bounds=list(zip(space.lower, space.upper, strict=True)),
-        options={"initial_simplex": simplex, "maxfev": EVALUATIONS, "xatol": 0.0, "fatol": 0.0},
+        callback=follow,
+        bounds=list(zip(space.lower, space.upper, strict=True)) if search.bounded else None,
+        options={
+            "initial_simplex": simplex,
+            "maxfev": search.evaluations or _UNLIMITED,
+            "maxiter": search.iterations or _UNLIMITED,
+            "xatol": 0.0,
+            "fatol": 0.0,
+        },
     )
-    return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev))
+    return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev), tuple(course))
 
 
 def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
@@ -61,7 +75,7 @@ def propose(definition: Definition, experiment: Experiment, space: PolicySpace, 
     low, high = space.reachable(space.vector(base.gains), definition.step_fraction)
     target = np.clip(optimum.gains, low, high)
     is_flown = was_flown(space.mapping(target), flights)
-    gains = space.vector(base.gains) if is_flown else target
+    gains = space.nearest(space.vector(base.gains)) if is_flown else target
     trajectory, error = nominal(experiment).predict(gains)
     stopped = tuple(name for name, is_stopped in zip(space.names, target != optimum.gains, strict=True) if is_stopped)
     found = (
@@ -89,4 +103,5 @@ SIMPLEX: Final = Strategy(
     line="Nelder–Mead on the nominal model alone, then that one set is flown.",
     options=(),
     propose=propose,
+    learns=False,
 )

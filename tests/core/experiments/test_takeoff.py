@@ -15,7 +15,7 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
 
 TAKEOFF = Takeoff()
-TWIN_MODEL = np.array([0.61, 0.3, 0.05, 0.0])
+TWIN_MODEL = np.array([0.61, 0.3, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 JSBSIM = [
     ((283, 13, 82), 0.3267),
@@ -44,6 +44,12 @@ PAPARAZZI = [("283_13_82", 0.3297), ("1624_1356_195", 0.0987)]
 
 def gains(*values: float) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
     return np.array(values, dtype=np.float64)
+
+
+def with_parameters(**changed: float) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
+    """The twin's model with some of its parameters changed."""
+    names = [parameter.name for parameter in TAKEOFF.model_parameters]
+    return np.array([changed.get(name, value) for name, value in zip(names, TWIN_MODEL, strict=True)])
 
 
 @pytest.mark.parametrize(("flown", "measured"), JSBSIM)
@@ -104,12 +110,59 @@ def test_a_run_has_every_channel_on_the_grid_and_stays_above_ground() -> None:
 def test_a_latency_shifts_the_whole_run_continuously() -> None:
     """Half a step of latency lies half-way between none and one step, so a fit can feel a latency."""
     steps = [0.0, 0.5, 1.0, 153.6]
-    runs = [TAKEOFF.simulate(gains(283, 13, 82), np.array([0.61, shift / 512, 0.05, 0.0])) for shift in steps]
+    runs = [TAKEOFF.simulate(gains(283, 13, 82), with_parameters(start_latency_s=shift / 512)) for shift in steps]
     none, half, one, later = (run["altitude_m"] for run in runs)
     assert half == pytest.approx((none + one) / 2, abs=1e-12)
     assert one[1:] == pytest.approx(none[:-1], abs=1e-12)
     assert later[154:] == pytest.approx(0.4 * none[1:-153] + 0.6 * none[:-154], abs=1e-9)
     assert not later[:154].any()
+
+
+def test_a_measurement_delay_records_what_was_and_acts_continuously() -> None:
+    """Without feedback the record is the undelayed one, later; half a step lies half-way between none and one."""
+    steps = [0.0, 0.5, 1.0, 20.25]
+    runs = [TAKEOFF.simulate(gains(0, 0, 0), with_parameters(measurement_delay_s=delay / 512)) for delay in steps]
+    none, half, one, later = (run["altitude_m"] for run in runs)
+    assert none.max() > 1.0
+    assert half == pytest.approx((none + one) / 2, abs=1e-12)
+    assert one[1:] == pytest.approx(none[:-1], abs=1e-12)
+    assert later[21:] == pytest.approx(0.75 * none[1:-20] + 0.25 * none[:-21], abs=1e-12)
+    assert runs[3]["climb_rate_m_s"][21:] == pytest.approx(
+        0.75 * runs[0]["climb_rate_m_s"][1:-20] + 0.25 * runs[0]["climb_rate_m_s"][:-21], abs=1e-12
+    )
+
+
+def test_a_delayed_loop_swings_more() -> None:
+    flown = gains(3000, 500, 80)
+    prompt, late = (
+        TAKEOFF.simulate(flown, with_parameters(measurement_delay_s=delay))["climb_rate_m_s"] for delay in (0.0, 0.04)
+    )
+    assert np.abs(late[5120:]).max() > 2.0 * np.abs(prompt[5120:]).max()
+
+
+def test_thrust_in_proportion_to_the_square_of_the_command_still_hovers_at_the_hover_throttle() -> None:
+    """After half a minute at rest the thrust is the hover throttle for any share."""
+    for share in (0.0, 0.5, 1.0):
+        run = TAKEOFF.simulate(gains(1600, 1023, 127), with_parameters(quadratic_share=share))
+        assert run["thrust"][-512:].mean() == pytest.approx(0.61, abs=0.002)
+
+
+def test_the_ground_effect_lifts_near_the_ground_only_and_a_sag_asks_for_more_throttle_at_the_end() -> None:
+    """Ground effect e at 3 m is e·exp(−7.5) = 0.0006·e; sag s at 32.6 s asks for h / (1 − s·32.6/33)."""
+    plain, helped, sagging = (
+        TAKEOFF.simulate(gains(1600, 1023, 127), with_parameters(**changed))
+        for changed in ({}, {"ground_effect": 0.25}, {"battery_sag": 0.03})
+    )
+    low = plain["altitude_m"] < 0.3
+    assert (helped["altitude_m"] >= plain["altitude_m"])[low].all()
+    assert helped["altitude_m"].max() > plain["altitude_m"].max()
+    assert helped["thrust"][-512:].mean() == pytest.approx(0.61, abs=0.002)
+    assert sagging["thrust"][-256:].mean() == pytest.approx(0.61 / (1.0 - 0.03 * 32.35 / 33.0), abs=0.002)
+
+
+def test_a_model_of_another_length_is_refused() -> None:
+    with pytest.raises(ValueError, match="broadcast"):
+        TAKEOFF.simulate(gains(283, 13, 82), TWIN_MODEL[:4])
 
 
 def test_stored_flights_score_as_fresh_ones() -> None:
@@ -136,6 +189,10 @@ def test_bounds_defaults_and_scales_are_those_of_the_method() -> None:
         "start_latency_s",
         "motor_lag_s",
         "drag_1_s",
+        "quadratic_share",
+        "ground_effect",
+        "measurement_delay_s",
+        "battery_sag",
     ]
 
 

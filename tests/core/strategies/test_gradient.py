@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.core.checks import Check, Envelope
 from app.core.definition import Definition
+from app.core.policy import Vector
+from app.core.spread import Spread
 from app.core.strategies.bias import corrected_by
 from app.core.strategies.gradient import RAW_LADDER, SCALED_LADDER, gradient, propose
 from tests.core.bowl import Bowl, fly
@@ -141,3 +144,17 @@ def test_with_every_gain_pinned_there_is_nothing_better() -> None:
     bounds = {"a": (50.0, 50.0), "b": (70.0, 70.0)}
     proposal = propose(Definition(bounds=bounds), BOWL, SPACE.narrowed(bounds), [fly(1, 50.0, 70)])
     assert (proposal.kind, proposal.gains) == ("none", {"a": 50.0, "b": 70})
+
+
+def test_a_step_that_the_gate_refuses_is_halved_until_it_passes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """4 units from (50, 70) lead to a = 18; the experiment sees a hazard below a = 30, so 2 units it is."""
+
+    def hazards(_bowl: Bowl, gains: Vector, _spread: Spread, _envelope: Envelope) -> tuple[Check, ...]:
+        return (Check("altitude", bool(gains[0] >= 30.0), "too high", worst=30.0, limit=30.0),)
+
+    monkeypatch.setattr(Bowl, "hazards", hazards)
+    proposal = propose(Definition(), BOWL, SPACE, [fly(1, 50.0, 70)])
+    assert proposal.kind == "shorter step"
+    assert proposal.gains == pytest.approx({"a": 34.0, "b": 64})
+    assert proposal.explanation.notes[-1] == "The gate refuses a 18, b 58."
+    assert "is refused by the gate, so the next one goes less far" in proposal.explanation.summary

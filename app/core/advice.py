@@ -1,0 +1,49 @@
+"""The one recommended next action, beside the strategy's proposal."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from app.core.confirming import Confirmation, confirm, standing
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment
+from app.core.stopping import StopVerdict
+from app.core.strategies.base import Kind, Proposal
+
+AdviceKind = Literal["step", "repeat", "baseline", "stop"]
+
+_FLOWN_ANYWAY: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Advice:
+    """What to do next, with which gains, and why. Kind `baseline` is the first flight, or its gains once more."""
+
+    kind: AdviceKind
+    gains: dict[str, float]
+    why: str
+
+
+def advise(
+    definition: Definition,
+    experiment: Experiment,
+    flights: Sequence[Flight],
+    proposal: Proposal,
+    said: StopVerdict,
+) -> Advice:
+    """Under the rule `noise` the proposal holds the advice already; under the others it is a recommendation only, and a
+    step that flights cannot tell from noise is advised against."""
+    now = standing(definition, experiment, flights)
+    if said.stop:
+        return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=said.why)
+    if now is None or definition.stop.kind == "noise":
+        kind = _FLOWN_ANYWAY.get(proposal.kind, "step")
+        return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)
+    confirmation = confirm(definition, experiment, flights, proposal)
+    kind = _kind(confirmation)
+    chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}
+    return Advice(kind=kind, gains=dict(chosen.get(kind, now.winner.gains)), why=confirmation.why)
+
+
+def _kind(confirmation: Confirmation) -> AdviceKind:
+    return "stop" if confirmation.phase == "decided" else confirmation.phase

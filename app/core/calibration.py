@@ -1,0 +1,251 @@
+"""The model as the flights have it: least squares on their trajectories, with what was known before as priors.
+
+Minimised over the parameters p and what is each flight's own, δ (in standard deviations `flight_sd`):
+
+    Σ_flights |W·(y − ŷ(gains; p + δ))|² + Σ ((p − expected)/prior_sd)² + Σ δ²,
+
+y and ŷ ten times a second. Deviations of a flight hang together in time (a gust swings for seconds), so W whitens
+them: an autoregression of fourth order, fitted to what the first pass leaves over, takes out what the samples before
+foretold, and the second pass minimises what is new in each. That makes the standard errors honest, and a short event
+that no gust could make, the lift-off above all, counts for more than a long swing.
+
+Results are rounded to six digits of their standard errors, so that the last bits of a machine's linear algebra decide
+nothing that follows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.linalg import hadamard, solve_toeplitz
+from scipy.optimize import least_squares
+
+from app.core.definition import Flight
+from app.core.experiments.base import Experiment, FittedParameter, Matrix, fitted_parameters
+from app.core.policy import Vector
+from app.core.recorded import on_grid
+from app.core.spread import Spread, before_flight
+from app.core.trajectory import Samples
+
+EXPERIMENTS: Final = frozenset({"takeoff"})
+"""Those whose model parameters can be told from one flight."""
+MOST_FLIGHTS: Final = 4
+"""The best and the latest of the valid flights are fitted, so many in all: enough, and the time stays bounded."""
+
+_RATE_HZ: Final = 10.0
+_ORDER: Final = 4
+_FIRST_SCALE: Final = 3.0
+_FLOOR: Final = 0.4
+"""Standard deviation of what the first pass takes for noise, and the least that is always assumed: both in units of the
+experiment's scatter."""
+_DIFFERENCE: Final = 0.1
+"""Steps of the difference quotients, in prior standard deviations: well above the steps of the loop's integers."""
+_STARTS: Final = 32
+_WIDEST_OWN: Final = 4.0
+_UNMODELLED: Final = 0.05
+"""What no fit can rule out, in prior standard deviations."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibration:
+    """The fitted model, shape (m,), its covariance (m, m), and the standard deviation of what is left over (`noise`, in
+    the output's unit). `own_models` are the flights' own, (k, m), in the order of `numbers`; `residual` is what the
+    best flight did beyond its own, on the grid."""
+
+    experiment: Experiment
+    model: Vector
+    covariance: Matrix
+    noise: float
+    numbers: tuple[int, ...]
+    own_models: Matrix
+    residual: Samples
+
+    def spread(self) -> Spread:
+        """What is known of the vehicle now, as a distribution."""
+        known = np.diag(self.covariance) + (_UNMODELLED * _prior_sd(self.experiment)) ** 2
+        covariance = self.covariance + np.diag(known - np.diag(self.covariance))
+        flights = f"{len(self.numbers)} flight{'s' if len(self.numbers) > 1 else ''}"
+        return Spread(
+            mean=tuple(self.model.tolist()),
+            covariance=tuple(tuple(row) for row in covariance.tolist()),
+            origin=f"the calibration on {flights}",
+        )
+
+    def plausible(self, *, runs: int, width: float = 1.0, next_flight: bool = False) -> Matrix:
+        """So many models (a power of two), `width` standard deviations about the fitted one in orthogonal directions:
+        shape (runs, m). With fewer runs than parameters + 1 the last parameters stay as fitted. `next_flight`: with
+        what differs between flights."""
+        covariance = self.covariance
+        if next_flight:
+            covariance = covariance + np.diag(_flight_sd(self.experiment) ** 2)
+        m = len(self.model)
+        shifts = np.zeros((runs, m))
+        used = min(runs - 1, m)
+        shifts[:, :used] = width * hadamard(runs)[:, 1 : used + 1]
+        return _clipped(self.experiment, self.model + shifts @ np.linalg.cholesky(covariance).T)
+
+    @property
+    def fitted(self) -> tuple[FittedParameter, ...]:
+        return fitted_parameters(self.experiment.model_parameters, self.model, self.covariance)
+
+
+def calibrate(experiment: Experiment, flights: Sequence[Flight]) -> Calibration:
+    """The model by the best and the latest valid flights, of which there must be one; the others are passed over."""
+    valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
+    best = min(valid, key=lambda flight: (flight.error, flight.number))
+    fitted = [flight for flight in valid[-MOST_FLIGHTS:] if flight is not best][1 - MOST_FLIGHTS :]
+    fitted = sorted((best, *fitted), key=lambda flight: flight.number)
+    numbers = tuple(flight.number for flight in fitted)
+    fit = _Fit(experiment, fitted)
+    start = fit.start()
+    for _ in range(2):
+        start = fit.minimum(start)
+        fit.learn_noise(start)
+    m = len(experiment.model_parameters)
+    slopes = fit.slopes(start)
+    covariance: Matrix = np.linalg.inv(slopes.T @ slopes)[:m, :m].astype(np.float64)
+    sd = np.sqrt(np.diag(covariance))
+    model = np.clip(np.rint(start[:m] / sd * 1e6) * sd.round(12) / 1e6, fit.lower, fit.upper)
+    own_models = fit.models(start)
+    place = numbers.index(best.number)
+    flown = experiment.outputs(fit.gains[place : place + 1], own_models[place])[0]
+    return Calibration(
+        experiment=experiment,
+        model=model,
+        covariance=_rounded(covariance, sd),
+        noise=float(fit.noise[0]),
+        numbers=numbers,
+        own_models=own_models,
+        residual=on_grid(experiment, best) - flown,
+    )
+
+
+def known(experiment: Experiment, flights: Sequence[Flight]) -> Spread:
+    """What is known of the vehicle: the data sheet's spread before the first valid flight, the calibrated one after it;
+    always the data sheet's for experiments without a calibration."""
+    if experiment.name not in EXPERIMENTS or all(flight.error is None for flight in flights):
+        return before_flight(experiment)
+    return calibrate(experiment, flights).spread()
+
+
+def _rounded(covariance: Matrix, sd: Vector) -> Matrix:
+    correlation = np.round(covariance / np.outer(sd, sd), 6)
+    rounded = np.array([float(f"{value:.6g}") for value in sd])
+    return np.asarray((correlation + correlation.T) / 2.0 * np.outer(rounded, rounded))
+
+
+def _prior_sd(experiment: Experiment) -> Vector:
+    return np.array([parameter.prior_sd for parameter in experiment.model_parameters])
+
+
+def _flight_sd(experiment: Experiment) -> Vector:
+    return np.array([parameter.flight_sd for parameter in experiment.model_parameters])
+
+
+def _clipped(experiment: Experiment, models: Matrix) -> Matrix:
+    lower = [parameter.lower for parameter in experiment.model_parameters]
+    upper = [parameter.upper for parameter in experiment.model_parameters]
+    return np.asarray(np.clip(models, lower, upper))
+
+
+class _Fit:
+    """The residuals of k flights and their derivatives, in unknowns of shape (m + k·q,): the parameters, then what is
+    each flight's own of the q that differ between flights."""
+
+    def __init__(self, experiment: Experiment, flights: Sequence[Flight]) -> None:
+        parameters = experiment.model_parameters
+        self.experiment = experiment
+        self.mean = np.array([parameter.prior_mean for parameter in parameters])
+        self.sd = _prior_sd(experiment)
+        self.lower = np.array([parameter.lower for parameter in parameters])
+        self.upper = np.array([parameter.upper for parameter in parameters])
+        self.flight_sd = _flight_sd(experiment)
+        self.own = np.flatnonzero(self.flight_sd)
+        self.gains = np.array([experiment.space.vector(flight.gains) for flight in flights])
+        self.every = max(round(1.0 / _RATE_HZ / float(experiment.grid_s[1] - experiment.grid_s[0])), 1)
+        self.measured = np.array([on_grid(experiment, flight) for flight in flights])[:, :: self.every]
+        self.memory = np.zeros(0)
+        self.noise = np.full(2, _FIRST_SCALE * experiment.scatter.sd)
+
+    def models(self, unknowns: Vector) -> Matrix:
+        """Each flight's own model: (k, m)."""
+        models = np.tile(unknowns[: len(self.mean)], (len(self.gains), 1))
+        deviations = unknowns[len(self.mean) :].reshape(len(self.gains), len(self.own))
+        models[:, self.own] += deviations * self.flight_sd[self.own]
+        return np.asarray(np.clip(models, self.lower, self.upper))
+
+    def start(self) -> Vector:
+        """The best of a few likely models by the first flight."""
+        prior = Spread(
+            mean=tuple(self.mean.tolist()),
+            covariance=tuple(tuple(row) for row in np.diag(self.sd**2).tolist()),
+            origin="",
+        )
+        likely = prior.samples(self.experiment, _STARTS)
+        misses = (self._outputs(np.tile(self.gains[0], (_STARTS, 1)), likely) - self.measured[0]) / self.noise[1]
+        cost = np.sum(misses**2, axis=1) + np.sum(((likely - self.mean) / self.sd) ** 2, axis=1)
+        return np.concatenate((likely[np.argmin(cost)], np.zeros(len(self.gains) * len(self.own))))
+
+    def minimum(self, start: Vector) -> Vector:
+        others = len(start) - len(self.mean)
+        lower = np.concatenate((self.lower, np.full(others, -_WIDEST_OWN)))
+        upper = np.concatenate((self.upper, np.full(others, _WIDEST_OWN)))
+        inset = 1e-4 * (upper - lower)
+        found = least_squares(
+            self.misses,
+            np.clip(start, lower + inset, upper - inset),
+            self.slopes,
+            bounds=(lower, upper),
+            x_scale=np.concatenate((self.sd, np.ones(others))),
+            ftol=1e-3,
+            xtol=1e-4,
+            max_nfev=20,
+        )
+        return np.asarray(found.x)
+
+    def misses(self, unknowns: Vector) -> Vector:
+        """Whitened deviations of the model from the flights, then those of the unknowns from what was known."""
+        deviations = self._outputs(self.gains, self.models(unknowns)) - self.measured
+        m = len(self.mean)
+        return np.concatenate((self._whitened(deviations).ravel(), (unknowns[:m] - self.mean) / self.sd, unknowns[m:]))
+
+    def slopes(self, unknowns: Vector) -> Matrix:
+        """∂misses/∂unknowns by one-sided differences, all in one compiled call."""
+        models = self.models(unknowns)
+        k, m = models.shape
+        step = np.where(models + _DIFFERENCE * self.sd > self.upper, -_DIFFERENCE, _DIFFERENCE) * self.sd
+        moved = np.repeat(models[:, np.newaxis], m + 1, axis=1)
+        moved[:, 1:] += np.eye(m) * step[:, :, np.newaxis]
+        outputs = self._outputs(np.repeat(self.gains, m + 1, axis=0), moved.reshape(-1, m)).reshape(k, m + 1, -1)
+        of_model = self._whitened((outputs[:, 1:] - outputs[:, :1]) / step[:, :, np.newaxis])
+        samples, q = of_model.shape[2], len(self.own)
+        slopes = np.zeros((k * samples + len(unknowns), len(unknowns)))
+        for flight in range(k):
+            rows, own = slice(flight * samples, (flight + 1) * samples), m + flight * q
+            slopes[rows, :m] = of_model[flight].T
+            slopes[rows, own : own + q] = of_model[flight, self.own].T * self.flight_sd[self.own]
+        slopes[k * samples :] = np.diag(np.concatenate((1.0 / self.sd, np.ones(k * q))))
+        return slopes
+
+    def learn_noise(self, unknowns: Vector) -> None:
+        """Fit the autoregression to what is left over (Yule–Walker), white noise of the assumed floor added."""
+        left = self._outputs(self.gains, self.models(unknowns)) - self.measured
+        samples = left.shape[1]
+        lags = [float(np.sum(left[:, lag:] * left[:, : samples - lag])) / left.size for lag in range(_ORDER + 1)]
+        lags[0] += (_FLOOR * self.experiment.scatter.sd) ** 2
+        self.memory = np.asarray(solve_toeplitz(lags[:-1], lags[1:]))
+        self.noise = np.sqrt([lags[0], lags[0] - float(self.memory @ lags[1:])])
+
+    def _outputs(self, gains: Matrix, models: Matrix) -> Matrix:
+        return self.experiment.outputs(gains, models)[:, :: self.every]
+
+    def _whitened(self, deviations: Samples) -> Samples:
+        """What is new in each sample, in its own standard deviations; the first few are taken as they are."""
+        order = len(self.memory)
+        new = deviations.copy()
+        for lag, share in enumerate(self.memory, start=1):
+            new[..., order:] -= share * deviations[..., order - lag : deviations.shape[-1] - lag]
+        new[..., :order] /= self.noise[0]
+        new[..., order:] /= self.noise[1]
+        return new

@@ -1,0 +1,173 @@
+"""Is there anything left that flights could tell from noise, and is the winner really better than the first gains?
+
+Two phases. *Steps* are worth flying while the proposal promises more than the flights that are left could tell from
+noise. After that the winner and the baseline (the first flight's gains) are flown again in turn, until the difference
+is decided; the confidence allows for the number of policies among which the winner was found, and for every look.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment
+from app.core.statistics import Comparison, Group, Pooled, compare, groups_of, pooled, smallest_difference, winner_of
+from app.core.strategies.base import Proposal
+from app.core.strategies.history import describe
+
+_RESERVED: Final = 2
+"""Flights kept back for flying the winner and the baseline again."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """What the flights say at present; at least one is valid. `baseline` holds the first valid flight, `winner` is the
+    best policy; `comparison` of the two is None while they are the same."""
+
+    groups: tuple[Group, ...]
+    scatter: Pooled
+    baseline: Group
+    winner: Group
+    comparison: Comparison | None
+
+    @property
+    def looks(self) -> int:
+        """How often the two have been compared since both were flown again; 0 before."""
+        if min(self.winner.size, self.baseline.size) < 2:
+            return 0
+        return self.winner.size + self.baseline.size - 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Confirmation:
+    """What to fly next: the strategy's step, the winner again, the baseline again, or nothing more, and why."""
+
+    phase: Literal["step", "repeat", "baseline", "decided"]
+    why: str
+
+
+def standing(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Standing | None:
+    """Groups, scatter and winner; None before the first valid flight. Under the rule `noise` the comparison allows for
+    its repetition, under the others, which do not decide by it, for the choice among the policies only."""
+    groups = groups_of(flights)
+    if not groups:
+        return None
+    scatter = pooled(groups, experiment.scatter)
+    baseline, winner = groups[0], winner_of(groups, scatter)
+    bare = Standing(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=None)
+    if winner is baseline:
+        return bare
+    comparison = compare(
+        winner,
+        baseline,
+        scatter,
+        definition.stop.confidence,
+        candidates=len(groups) - 1,
+        looks=bare.looks if definition.stop.kind == "noise" else 0,
+    )
+    return Standing(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=comparison)
+
+
+def confirm(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
+) -> Confirmation:
+    """The next flight as far as noise is concerned. At least one flight must be valid.
+
+    A proposal of kind `manual` promises nothing and is the operator's own business until the flights run short.
+    """
+    now = standing(definition, experiment, flights)
+    assert now is not None
+    left = definition.stop.max_flights - len(flights)
+    if now.winner is now.baseline:
+        return _unbeaten(definition, experiment, now, left, proposal)
+    if left <= 0:
+        return Confirmation(phase="decided", why=verdict_sentence(experiment, now))
+    if now.winner.size < 2 and left > _RESERVED and _is_worth_a_step(definition, now, left, proposal):
+        return Confirmation(phase="step", why=_promise(definition, experiment, now, left, proposal))
+    return _flown_again(experiment, now)
+
+
+def verdict_sentence(experiment: Experiment, now: Standing) -> str:
+    """The winner against the first gains, in a sentence."""
+    if now.comparison is None:
+        return f"The first flight's gains ({describe(now.baseline.gains)}) are the best flown."
+    unit, said = experiment.error_unit, now.comparison
+    amount = f"{abs(said.difference):.4f} ± {said.standard_error:.4f} {unit}"
+    pair = f"{describe(now.winner.gains)} against the first flight's {describe(now.baseline.gains)}"
+    if said.verdict == "unresolved":
+        return f"Unresolved: {pair}, {amount} {_direction(said)}, {said.confidence:.0%} confidence. {_deciding(said)}"
+    return (
+        f"{said.verdict.capitalize()} with {_percent(said.confidence)} confidence: {pair}, {amount} {_direction(said)}."
+    )
+
+
+def _unbeaten(
+    definition: Definition, experiment: Experiment, now: Standing, left: int, proposal: Proposal
+) -> Confirmation:
+    if left > 0 and _is_worth_a_step(definition, now, left, proposal):
+        return Confirmation(phase="step", why=_promise(definition, experiment, now, left, proposal))
+    tried = len(now.groups) - 1
+    found = f"None of the other sets flown, {tried}, is better." if tried else "No other set was flown."
+    promise = _promise(definition, experiment, now, left, proposal)
+    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {promise}".strip())
+
+
+def _flown_again(experiment: Experiment, now: Standing) -> Confirmation:
+    said = now.comparison
+    assert said is not None
+    sentence = verdict_sentence(experiment, now)
+    if now.looks and said.verdict != "unresolved":
+        return Confirmation(phase="decided", why=sentence)
+    if now.winner.size <= now.baseline.size:
+        why = f"The winner, {describe(now.winner.gains)}, is flown again, to see whether it is better or was lucky."
+        return Confirmation(phase="repeat", why=f"{why} {sentence}")
+    why = f"The first flight's gains, {describe(now.baseline.gains)}, are flown again under the winner's conditions."
+    return Confirmation(phase="baseline", why=f"{why} {sentence}")
+
+
+def _is_worth_a_step(definition: Definition, now: Standing, left: int, proposal: Proposal) -> bool:
+    if proposal.kind == "manual":
+        return True
+    return proposal.kind != "none" and _promised(now, proposal) >= _tellable(definition, now, left)
+
+
+def _promised(now: Standing, proposal: Proposal) -> float:
+    return 0.0 if proposal.predicted_error is None else now.winner.mean - proposal.predicted_error
+
+
+def _tellable(definition: Definition, now: Standing, left: int) -> float:
+    return smallest_difference(now.scatter, now.winner.size, left, definition.stop.confidence)
+
+
+def _promise(definition: Definition, experiment: Experiment, now: Standing, left: int, proposal: Proposal) -> str:
+    unit = experiment.error_unit
+    if proposal.kind in {"none", "manual"} or left <= 0:
+        return "The strategy offers nothing more." if proposal.kind == "none" else ""
+    told = _tellable(definition, now, left)
+    promised = _promised(now, proposal)
+    relation = "at least" if promised >= told else "below"
+    return (
+        f"The next step promises {promised:.4f} {unit} less, {relation} the {told:.4f} {unit} that "
+        f"{_flights(left)} could tell from noise with {definition.stop.confidence:.0%} confidence."
+    )
+
+
+def _direction(said: Comparison) -> str:
+    return "lower" if said.difference < 0.0 else "higher"
+
+
+def _percent(confidence: float) -> str:
+    return "more than 99.9 %" if confidence > 0.999 else f"{100 * confidence:.1f} %"
+
+
+def _deciding(said: Comparison) -> str:
+    if said.further is None:
+        return "Not even 100 further flights would decide it."
+    return (
+        f"If the difference stays, {_flights(said.further.total)} more would decide it: {said.further.first} of the "
+        f"winner, {said.further.second} of the first gains."
+    )
+
+
+def _flights(count: int) -> str:
+    return f"{count} flight" if count == 1 else f"{count} flights"

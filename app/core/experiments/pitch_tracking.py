@@ -1,0 +1,211 @@
+"""The paper's F-16: tracking a sine in pitch for a minute on a model whose every number is off, scored by its error."""
+
+from collections.abc import Mapping
+from typing import Final, Self
+
+import numpy as np
+
+from app.core.checks import Check, Envelope
+from app.core.definition import OptionValue
+from app.core.experiments.base import Matrix, ModelParameter, Scatter, SimplexSearch, informed_parameters
+from app.core.metrics import mean_absolute_error, require_scorable
+from app.core.options import Option, with_defaults
+from app.core.plants.f16 import ELEMENTS, perturbed
+from app.core.plants.pitch import (
+    ALTITUDE,
+    ANGLE_OF_ATTACK,
+    ELEVATOR,
+    LARGEST_ERROR_RAD,
+    PITCH,
+    PITCH_RATE,
+    REFERENCE,
+    SPEED,
+    STATES,
+    STEP_S,
+    THRUST,
+    track,
+    track_batch,
+    transitions,
+)
+from app.core.policy import Gain, PolicySpace, Vector
+from app.core.spread import Spread
+from app.core.trajectory import Samples, Trajectory
+
+WINDOW_S: Final = 60.0
+OUTPUT: Final = "pitch_error_rad"
+PRIOR_SD: Final = 0.35
+
+_SAMPLES: Final = round(WINDOW_S / STEP_S) + 1
+_M_PER_FT: Final = 0.3048
+_N_PER_LB: Final = 4.4482216152605
+
+DETAIL_CHANNELS: Final[Mapping[str, tuple[int, float]]] = {
+    "altitude_change_m": (ALTITUDE, _M_PER_FT),
+    "pitch_rad": (PITCH, 1.0),
+    "speed_change_m_s": (SPEED, _M_PER_FT),
+    "angle_of_attack_rad": (ANGLE_OF_ATTACK, 1.0),
+    "pitch_rate_rad_s": (PITCH_RATE, 1.0),
+    "pitch_reference_rad": (REFERENCE, 1.0),
+    "thrust_change_n": (THRUST, _N_PER_LB),
+    "elevator_rad": (ELEVATOR, np.pi / 180.0),
+}
+"""Channels of a record beside the output: the column of a run's detail, and its unit in SI. Deviations from trim."""
+
+_ROWS: Final = ("h", "Θ", "V", "α", "q")
+_COLUMNS: Final = (*_ROWS, "F_T", "δ")
+
+
+def _gain(name: str, title: str, unit: str, lower: float, upper: float, scale: float, default: float) -> Gain:
+    return Gain(name, title, unit, lower=lower, upper=upper, scale=scale, default=default, integer=False)
+
+
+def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
+    return tuple(
+        ModelParameter(
+            f"ln_{'a' if column < STATES else 'b'}{row + 1}{column + 1 if column < STATES else column + 1 - STATES}",
+            f"{'A' if column < STATES else 'B'}({_ROWS[row]}, {_COLUMNS[column]}) against the model",
+            "ln ×",
+            nominal=0.0,
+            lower=-2.5,
+            upper=2.5,
+            prior_sd=PRIOR_SD,
+            known_within=perturbation,
+        )
+        for row, column in zip(*ELEMENTS, strict=True)
+    )
+
+
+class PitchTracking:
+    """The model is the truth with every element of A and B off by up to `perturbation`, drawn by `model_seed`; its
+    parameters are the logarithms of what these elements are to be multiplied by."""
+
+    name: Final = "pitch-tracking"
+    title: Final = "Pitch tracking of an F-16"
+    output: Final = OUTPUT
+    integrates: Final = True
+    error_unit: Final = "rad·s"
+    scatter: Final = Scatter(sd=0.001, degrees_of_freedom=4.0)
+    search: Final = SimplexSearch(of_scale=0.5, iterations=300, bounded=False)
+    difference: Final = 0.001
+    space: Final = PolicySpace(
+        (
+            _gain("theta_1", "Thrust per speed", "lb·s/ft", -200.0, -20.0, 50.0, -50.0),
+            _gain("theta_2", "Thrust offset", "lb", -50.0, 50.0, 100.0, 0.0),
+            _gain("theta_3", "Elevator per pitch error", "deg/rad", -57.3, 0.0, 20.0, -15.0),
+            _gain("theta_4", "Elevator per angle of attack", "deg/rad", -57.3, 57.3, 20.0, 0.0),
+            _gain("theta_5", "Elevator per pitch rate", "deg·s/rad", -57.3, 57.3, 10.0, 10.0),
+            _gain("theta_6", "Elevator offset", "deg", -5.0, 5.0, 1.0, 0.0),
+        )
+    )
+    options: Final = (
+        Option(
+            name="perturbation",
+            title="How far every element of the model may be off, as a share of it",
+            default=0.45,
+            lower=0.0,
+            upper=0.8,
+        ),
+        Option(
+            name="model_seed",
+            title="Which of the inaccurate models is used (seed of the draw)",
+            default=0,
+            lower=0,
+            upper=2**32 - 1,
+        ),
+    )
+
+    def __init__(
+        self, options: Mapping[str, OptionValue] | None = None, parameters: tuple[ModelParameter, ...] | None = None
+    ) -> None:
+        """`options` must be free of problems."""
+        self._options: Final = with_defaults(options or {}, self.options)
+        perturbation = float(self._options["perturbation"])
+        self._system: Final = perturbed(perturbation, int(self._options["model_seed"]))
+        self.model_parameters: Final = _parameters(perturbation) if parameters is None else parameters
+
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """The experiment with another inaccurate model; what is not among `options` has its default."""
+        return type(self)(options)
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        """The experiment whose model is known as another aircraft's fit has it: both of shape (19,)."""
+        return type(self)(self._options, informed_parameters(self.model_parameters, mean, sd))
+
+    @property
+    def nominal_model(self) -> Vector:
+        """Shape (19,): nothing is multiplied, until another aircraft's fit says more."""
+        return np.array([parameter.nominal for parameter in self.model_parameters])
+
+    @property
+    def grid_s(self) -> Samples:
+        """Every 0.02 s for a minute: shape (3001,)."""
+        return np.arange(_SAMPLES, dtype=np.float64) * STEP_S
+
+    def set_point(self, time_s: Samples) -> Samples:
+        """No error at any time."""
+        return np.zeros_like(time_s)
+
+    def systems(self, model: Matrix | Vector) -> Matrix:
+        """[A | B] of model parameters (…, 19), in the source's units: shape (…, 5, 7)."""
+        multipliers = np.zeros((*model.shape[:-1], *self._system.shape))
+        rows, columns = ELEMENTS
+        multipliers[..., rows, columns] = model
+        return np.asarray(self._system * np.exp(multipliers))
+
+    def simulate(self, gains: Vector, model: Vector) -> Trajectory:
+        """One run of the model with every channel."""
+        errors, detail = track(gains, transitions(self.systems(model)), _SAMPLES)
+        return Trajectory(self.grid_s, named_channels(errors, detail), "model", "simulation")
+
+    def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
+        """Pitch error of many policies, each on its own model or all on one: gains (k, 6) → (k, 3001)."""
+        return track_batch(gains, transitions(self.systems(np.atleast_2d(model))), _SAMPLES)
+
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
+        """What every recorded step did beyond the model's, shape (3000, 5) in the source's units; zero once the run
+        has diverged. None where the record lacks a state or a command."""
+        flown = states_and_commands(trajectory, self.grid_s)
+        if flown is None:
+            return None
+        beyond: Matrix = flown[1:, :STATES] - flown[:-1] @ transitions(self.systems(model)).T
+        diverged = np.abs(np.interp(self.grid_s, trajectory.time_s, trajectory[OUTPUT])) >= LARGEST_ERROR_RAD
+        beyond[np.maximum.accumulate(diverged)[1:]] = 0.0
+        return np.concatenate((beyond, np.zeros((1, STATES))))
+
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+        """`outputs` with `disturbances` added to the states after each step."""
+        return track_batch(gains, transitions(self.systems(np.atleast_2d(model))), _SAMPLES, disturbances)
+
+    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:  # noqa: ARG002
+        """None that is known beside its bounds: it is flown in simulation only."""
+        return ()
+
+    def errors(self, outputs: Matrix) -> Vector:
+        """Integral of the absolute pitch error, rad·s, over a minute: (k, 3001) → (k,)."""
+        return np.asarray(np.trapezoid(_counted(outputs), dx=STEP_S, axis=-1), dtype=np.float64)
+
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
+        """The same of a recorded flight. Raises TrajectoryError when it has gaps or does not cover the minute."""
+        require_scorable(trajectory, OUTPUT, 0.0, WINDOW_S, accept_gaps=accept_gaps)
+        counted = _counted(trajectory[OUTPUT])
+        return WINDOW_S * mean_absolute_error(trajectory.time_s, counted, self.set_point, 0.0, WINDOW_S)
+
+
+def named_channels(errors: Samples, detail: Samples) -> dict[str, Samples]:
+    """The channels of a run: pitch errors (n,) and its detail (n, 8), in SI."""
+    named = {name: np.ascontiguousarray(detail[:, i]) * unit for name, (i, unit) in DETAIL_CHANNELS.items()}
+    return {OUTPUT: errors} | named
+
+
+def states_and_commands(trajectory: Trajectory, grid_s: Samples) -> Matrix | None:
+    """[x | u] at the instants of `grid_s`, shape (n, 7), in the source's units; None where a channel is missing."""
+    wanted = [(name, unit) for name, (i, unit) in DETAIL_CHANNELS.items() if i != REFERENCE]
+    if any(name not in trajectory.channels for name, _ in wanted):
+        return None
+    return np.stack([np.interp(grid_s, trajectory.time_s, trajectory[name]) / unit for name, unit in wanted], axis=-1)
+
+
+def _counted(errors: Matrix) -> Matrix:
+    """Absolute errors; one that has reached the largest counts as that from there on."""
+    size = np.abs(errors)
+    return np.where(np.maximum.accumulate(size >= LARGEST_ERROR_RAD, axis=-1), LARGEST_ERROR_RAD, size)

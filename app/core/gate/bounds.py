@@ -1,0 +1,77 @@
+"""Gains against limits: what a controller can hold, the campaign's bounds, and its step limit."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from app.core.checks import Check
+from app.core.policy import Gain, Gains, PolicySpace
+
+NUMBERS: Final = "numbers"
+"""The check that nobody can overrule."""
+
+
+def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
+    """A refusal for each gain that is no finite number, or no whole one of 32 bits where the controller takes those."""
+    return tuple(
+        Check(
+            NUMBERS, False, f"{gain.name} {reason}.", worst=_outside(gain, gains[gain.name]), limit=0.0, gain=gain.name
+        )
+        for gain in space.gains
+        if (reason := gain.impossible(gains[gain.name])) is not None
+    )
+
+
+def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
+    """A refusal for each gain out of its bounds, or the one answer that none is."""
+    refused = tuple(
+        Check(
+            "bounds",
+            False,
+            f"{gain.name} {reason}.",
+            worst=_outside(gain, gains[gain.name]),
+            limit=0.0,
+            gain=gain.name,
+            offer={gain.name: min(max(gains[gain.name], gain.lower), gain.upper)},
+        )
+        for gain in space.gains
+        if (reason := gain.outside(gains[gain.name])) is not None
+    )
+    return refused or (Check("bounds", True, "Every gain lies within its bounds.", worst=0.0, limit=0.0),)
+
+
+def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
+    """The largest change of a gain from the nearest of `references`, a share of its range, against `fraction`."""
+    nearest = min(references, key=lambda reference: max(space.change(gains, reference).values()))
+    name, worst = max(space.change(gains, nearest).items(), key=lambda item: item[1])
+    base = space.vector(nearest)
+    low, high = space.reachable(base, fraction)
+    vector = space.vector(gains)
+    passed = worst <= fraction or bool(((low <= vector) & (vector <= high)).all())
+    sentence = (
+        f"The largest change, of {name}, is {worst:.1%} of its range; "
+        f"{'at most' if passed else 'only'} {fraction:.0%} is allowed from {origin}."
+    )
+    beyond = {} if passed else space.mapping(space.nearest(vector.clip(low, high)))
+    offer = {gain: value for gain, value in beyond.items() if value != gains[gain]}
+    return Check("step", passed, sentence, worst=worst, limit=fraction, gain="" if passed else name, offer=offer)
+
+
+def jointly_offered(gains: Gains, checks: Sequence[Check]) -> tuple[Check, ...]:
+    """The same checks, each offer replaced by what passes all of them together.
+
+    Every offer is the asked value held within a limit; the one furthest from what was asked lies within all of them.
+    """
+    offers: dict[str, float] = {}
+    for name, value in (item for check in checks for item in check.offer.items()):
+        offers[name] = max(offers.get(name, gains[name]), value, key=lambda offer: abs(offer - gains[name]))
+    return tuple(replace(check, offer={name: offers[name] for name in check.offer}) for check in checks)
+
+
+def _outside(gain: Gain, value: float) -> float:
+    """How far beyond its bounds a gain lies, as a share of its range; infinite for one that is pinned or no number."""
+    beyond = max(gain.lower - value, value - gain.upper, 0.0)
+    if beyond == 0.0:
+        return 0.0
+    return beyond / gain.span if gain.span and math.isfinite(value) else math.inf

@@ -1,0 +1,101 @@
+"""The gate's word on one policy."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from app.core.calibration import known
+from app.core.checks import Check, Envelope
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment
+from app.core.gate.bounds import NUMBERS, check_bounds, check_numbers, check_step, jointly_offered
+from app.core.policy import Gains, PolicySpace
+from app.core.spread import Spread
+from app.core.starting import start_gains
+from app.core.strategies.history import was_flown
+
+BETTER_TOLD_BY_FLIGHT: Final = frozenset({"altitude", "divergence"})
+"""Checks of simulated takeoffs whose refusal does not hold for gains that have flown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """The verdict on one policy; each check with its worst number and the case that gave it."""
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        return all(check.passed for check in self.checks)
+
+    @property
+    def refusals(self) -> tuple[Check, ...]:
+        return tuple(check for check in self.checks if not check.passed)
+
+    @property
+    def overrulable(self) -> bool:
+        """Whether a controller could hold these gains at all."""
+        return not any(check.name == NUMBERS for check in self.checks)
+
+
+def check_policy(
+    definition: Definition,
+    experiment: Experiment,
+    space: PolicySpace,
+    gains: Gains,
+    flights: Sequence[Flight],
+    *,
+    start: Gains | None = None,
+    spread: Spread | None = None,
+    safe_gains: Gains | None = None,
+) -> Gate:
+    """Judge a complete set of gains (every name of `space`): its numbers, the campaign's bounds, its step limit, and
+    the experiment's hazards.
+    What a valid flight of this campaign has flown may fly again although simulated takeoffs go astray: the flight is
+    the better evidence.
+    Pure; a takeoff's takes a tenth of a second.
+
+    `space` is the experiment's, narrowed to the campaign's bounds. Before the first valid flight a gain may change by
+    `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from some valid flight.
+    `start`: the start gains where they are known; searching them on the model takes long. `spread`: what is known of
+    the vehicle, where `flights` come without their records. `safe_gains`: what an abort flies, by default the
+    experiment's default gains.
+    """
+    if numbers := check_numbers(space, gains):
+        return Gate(numbers)
+    hazards = experiment.hazards(
+        space.vector(gains),
+        known(experiment, flights) if spread is None else spread,
+        Envelope(
+            ceiling_m=definition.ceiling_m,
+            safe_gains=experiment.space.mapping(experiment.space.default) if safe_gains is None else safe_gains,
+        ),
+    )
+    if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
+        hazards = tuple(_flown_before(check) for check in hazards)
+    limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
+    return Gate(jointly_offered(gains, (*limits, *hazards)))
+
+
+def _flown_before(check: Check) -> Check:
+    """The check's answer for gains that a valid flight of the campaign has flown."""
+    if check.passed or check.name not in BETTER_TOLD_BY_FLIGHT:
+        return check
+    sentence = f"{check.sentence} But a flight of this campaign flew these gains to its end, so they may fly again."
+    return replace(check, passed=True, sentence=sentence)
+
+
+def _step(
+    definition: Definition,
+    experiment: Experiment,
+    space: PolicySpace,
+    gains: Gains,
+    flights: Sequence[Flight],
+    start: Gains | None,
+) -> Check:
+    flown = [flight.gains for flight in flights if flight.outcome == "valid"]
+    if flown:
+        return check_step(space, gains, flown, definition.step_fraction, "a flown set")
+    origin = start_gains(definition, experiment, space) if start is None else start
+    fraction = definition.first_step_fraction
+    return check_step(space, gains, [origin], fraction, "the start gains until a flight has shown more")

@@ -1,0 +1,200 @@
+"""Takeoffs with a gain set, on the exact replica, over what is known of the vehicle, with an abort at any instant.
+
+What is known is a spread of the model's parameters. Mass has no parameter of its own: it changes the ratio of thrust to
+weight, and so does the hover throttle, whose spread stands for both.
+
+A late release from the ground is no case here: it overshoots with any integrating gains, and the vehicle's own check of
+a lift-off in time is the guard against it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from app.core.checks import Check
+from app.core.control.vertical_loop import POSITION_BITS, RATE_HZ, STATE_SIZE, STEP_S
+from app.core.hazards.kernels import (
+    DISTANCE_LAST_M,
+    DISTANCE_MIDDLE_M,
+    FALLEN_STEP,
+    HIGHEST_M,
+    HIGHEST_STEP,
+    REPORT_SIZE,
+    SWING_LAST_M_S,
+    SWING_MIDDLE_M_S,
+    TOUCH_DOWN_M_S,
+    fly_all_with_aborts,
+)
+from app.core.plants.vertical import START_LATENCY_S, Counts
+from app.core.policy import Vector
+from app.core.trajectory import Samples
+
+if TYPE_CHECKING:  # experiments are what calls this
+    from app.core.experiments.base import Matrix, ModelParameter
+
+MODELS: Final = 32
+"""The likely vehicle, and so many quasi-random ones about it (less one)."""
+
+ABORTS_BETWEEN_S: Final = (0.3, 1.0, 1.7, 2.6, 4.0, 8.0, 32.0)
+"""Every takeoff is aborted once between each two of these, at another instant on every vehicle."""
+
+LARGEST_TOUCH_DOWN_M_S: Final = 2.5
+SMALLEST_SWING_M_S: Final = 0.1
+"""A climb rate that swings by less is at rest."""
+UNDAMPED: Final = 0.95
+"""An oscillation has to lose more than 5 % from the middle third of the flight to the last."""
+
+_GOLDEN: Final = 0.6180339887498949
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Takeoffs of one gain set: models (k, m), abort steps (k, a), and the kernels' reports (k, 7) and (k, a, 2)."""
+
+    models: "Matrix"
+    abort_steps: Counts
+    reports: "Matrix"
+    aborts: Samples
+
+
+def abort_steps(models: int) -> Counts:
+    """Shape (models, 6), rising in each row: instants that fill each interval evenly as the models go on."""
+    edges = np.array(ABORTS_BETWEEN_S)
+    shares = (np.arange(models)[:, np.newaxis] + 1.0) * _GOLDEN % 1.0
+    return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
+
+
+def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, target: int, steps: int) -> Runs:
+    """One takeoff to `target` (8 fractional bits) on each model, each aborted to `safe_gains` at its own instants."""
+    reports = np.empty((len(models), REPORT_SIZE))
+    aborts = np.empty((*aborts_at.shape, 2))
+    scratch, curves = np.empty((2, STATE_SIZE), dtype=np.int64), np.empty((4, steps))
+    fly_all_with_aborts(gains, models, target, safe_gains, aborts_at, scratch, curves, reports, aborts)
+    return Runs(models, aborts_at, reports, aborts)
+
+
+def check_flights(
+    gains: Counts,
+    safe_gains: Counts,
+    baseline: bool,
+    parameters: Sequence["ModelParameter"],
+    models: "Matrix",
+    ceiling_m: float,
+    target: int,
+    steps: int,
+) -> tuple[Check, ...]:
+    """Altitude, divergence, oscillation and aborts of one gain set over `models`, shape (k, m).
+
+    A `baseline` is never refused for its altitude. An abort hands over to the safe gains: what these would do on the
+    same vehicle whatever was flown before is no fault of the gains that are judged.
+    """
+    aborts_at = abort_steps(len(models))
+    runs = fly_runs(gains, safe_gains, models, aborts_at, target, steps)
+    own = runs
+    limits = np.array([ceiling_m, LARGEST_TOUCH_DOWN_M_S])
+    if (runs.aborts > limits).any() and not np.array_equal(gains, safe_gains):
+        own = fly_runs(safe_gains, safe_gains, models, aborts_at, target, steps)
+    return (
+        _altitude(runs, parameters, ceiling_m, baseline),
+        _divergence(runs, parameters, target / (1 << POSITION_BITS)),
+        _oscillation(runs, parameters),
+        _abort("abort altitude", "m", HIGHEST_M, runs, own, parameters, ceiling_m),
+        _abort("abort touch-down", "m/s", TOUCH_DOWN_M_S, runs, own, parameters, LARGEST_TOUCH_DOWN_M_S),
+    )
+
+
+def gone_astray(reports: "Matrix", set_point_m: float) -> Vector:
+    """How far from the set point each flight got that fell back to the ground or still moves away at its end; zero for
+    the others: (k, 7) → (k,)."""
+    middle, last = reports[:, DISTANCE_MIDDLE_M], reports[:, DISTANCE_LAST_M]
+    moves_away = (last > middle) & (last > 0.5 * set_point_m)
+    return np.where(reports[:, FALLEN_STEP] >= 0.0, set_point_m, np.where(moves_away, last, 0.0))
+
+
+def undamped_swing(reports: "Matrix") -> Vector:
+    """The swing of the climb rate in the last third of each flight, m/s, where it has not decayed since the middle
+    third; zero where it has, or is at rest: (k, 7) → (k,)."""
+    middle, last = reports[:, SWING_MIDDLE_M_S], reports[:, SWING_LAST_M_S]
+    return np.where((middle > 0.0) & (last >= UNDAMPED * middle), last, 0.0)
+
+
+def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: float, baseline: bool) -> Check:
+    worst = int(np.argmax(runs.reports[:, HIGHEST_M]))
+    highest_m = float(runs.reports[worst, HIGHEST_M])
+    case = _case(parameters, runs.models[worst], float(runs.reports[worst, HIGHEST_STEP]), "highest")
+    passed = baseline or highest_m <= ceiling_m
+    sentence = f"The highest of {len(runs.models)} simulated takeoffs rises to {highest_m:.2f} m, " + (
+        f"with {case}; at most {ceiling_m:g} m is allowed."
+        if not passed
+        else f"{ceiling_m:g} m is allowed."
+        if highest_m <= ceiling_m
+        else f"beyond {ceiling_m:g} m; these are the gains that every flight is compared with, and they may fly."
+    )
+    return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
+
+
+def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float) -> Check:
+    distances = gone_astray(runs.reports, set_point_m)
+    worst = int(np.argmax(distances))
+    distance_m, fallen_step = float(distances[worst]), float(runs.reports[worst, FALLEN_STEP])
+    if distance_m == 0.0:
+        sentence = "No simulated takeoff falls back to the ground or moves away from the set point at its end."
+        return Check("divergence", True, sentence, worst=0.0, limit=0.0)
+    fallen = fallen_step >= 0.0
+    case = _case(parameters, runs.models[worst], fallen_step, "on the ground again") if fallen else ""
+    case = case or _case(parameters, runs.models[worst])
+    did = "falls back to the ground" if fallen else f"is {distance_m:.2f} m from the set point and moves away"
+    return Check("divergence", False, f"A simulated takeoff {did}, with {case}.", distance_m, 0.0, case=case)
+
+
+def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
+    swings = undamped_swing(runs.reports)
+    worst = int(np.argmax(swings))
+    swing_m_s = float(swings[worst])
+    if swing_m_s <= SMALLEST_SWING_M_S:
+        sentence = "Every simulated takeoff comes to rest, or swings less and less."
+        return Check("oscillation", True, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S)
+    case = _case(parameters, runs.models[worst])
+    before_m_s = float(runs.reports[worst, SWING_MIDDLE_M_S])
+    sentence = (
+        f"The climb rate swings by {swing_m_s:.2f} m/s in the last third of a simulated takeoff, after "
+        f"{before_m_s:.2f} m/s in the third before: it does not decay, with {case}."
+    )
+    return Check("oscillation", False, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S, case=case)
+
+
+def _abort(
+    name: str, unit: str, place: int, runs: Runs, own: Runs, parameters: Sequence["ModelParameter"], limit: float
+) -> Check:
+    """The abort that goes furthest beyond `limit`, or beyond what the safe gains themselves do on the same vehicle."""
+    of_safe_gains = own.aborts[:, :, place].max(axis=1)
+    if place == HIGHEST_M:
+        of_safe_gains = np.maximum(of_safe_gains, own.reports[:, HIGHEST_M])
+    limits = np.maximum(limit, of_safe_gains)[:, np.newaxis]
+    values = runs.aborts[:, :, place]
+    excess = values - limits
+    run, instant = divmod(int(np.argmax(excess)), excess.shape[1])
+    value, allowed = float(values[run, instant]), float(limits[run, 0])
+    passed = bool(value <= allowed)
+    case = _case(parameters, runs.models[run], float(runs.abort_steps[run, instant]), "aborted")
+    what = "rises to" if place == HIGHEST_M else "meets the ground at"
+    why = "" if allowed == limit else ", which is what the safe gains themselves come to"
+    sentence = f"After an abort the vehicle {what} {value:.2f} {unit} in the worst case; {allowed:.2f} {unit} is "
+    sentence += f"allowed{why}." if passed else f"allowed{why}: {case}."
+    return Check(name, passed, sentence, worst=value, limit=allowed, case=case)
+
+
+def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
+    """The vehicle in words, and when it happened, counted from the command."""
+    return ", ".join(_words(parameters, model, step, event))
+
+
+def _words(parameters: Sequence["ModelParameter"], model: Vector, step: float | None, event: str) -> Iterator[str]:
+    for parameter, value in zip(parameters, model.tolist(), strict=True):
+        if value or parameter.nominal:
+            unit = f" {parameter.unit}" if parameter.unit in {"s", "1/s", "m"} else ""
+            yield f"{parameter.title.lower()} {value:.2g}{unit}"
+    if step is not None:
+        yield f"{event} at {model[START_LATENCY_S] + step * STEP_S:.1f} s"

@@ -1,0 +1,210 @@
+"""How far a prediction can be off: its interval and band before the flight, its record after it.
+
+A bias-corrected model ŷ = model(gains; p) + (measured − model(flown gains; p)) is run for a few likely parameter sets
+p (the priors that a fit takes), each with its own bias; mean and standard deviation of their errors are what the model
+knows and does not know. With the flight-to-flight scatter σ (`app.core.statistics`), which the new flight has and the n
+flights of the base have too,
+
+    interval = mean ± t(ν) · f · √(σ² (1 + 1/n) + sd²),    widened to hold the predicted error itself,
+
+and the band is the same at every instant, σ taken as an offset of the output that costs σ. f is experience:
+f² = (ν₀ + Σ z²)/(ν₀ + k), z being the k earlier misses in units of their own intervals, ν₀ = 4. A model that nothing
+corrects (first flight, simplex) has no base: the term 1/n and the bias fall away.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.special import ndtri, stdtrit
+
+from app.core.definition import Flight, Prediction
+from app.core.experiments.base import Experiment, Matrix
+from app.core.policy import PolicySpace, Vector
+from app.core.recorded import on_grid
+from app.core.spread import Spread
+from app.core.statistics import Group, Pooled, groups_of
+from app.core.strategies.base import Explanation, Interval, Kind, Proposal, band_channels
+from app.core.trajectory import Samples, Trajectory
+
+CONFIDENCE: Final = 0.9
+MODELS: Final = 16
+_TRUST_IN_THE_MODEL: Final = 4.0
+_DISAGREEMENTS: Final = 3
+_TINY: Final = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackRecord:
+    """How well earlier predictions held: `inside` of `of` flights lay in their interval; of the flights that were to
+    change the error, `agreeing` did so in the predicted direction and `disagreeing` in the other."""
+
+    inside: int
+    of: int
+    agreeing: int
+    disagreeing: int
+    trustworthy: bool
+    sentence: str
+
+    @property
+    def share(self) -> float | None:
+        """Of the flights inside; None before the first interval was put to the test."""
+        return self.inside / self.of if self.of else None
+
+
+def track_record(flights: Sequence[Flight]) -> TrackRecord:
+    """The record of the predictions that the flights carry.
+
+    The direction counts where new gains were to change the best error before them; flights of gains flown before
+    predict none. The predictions are not trustworthy once at least three flights went the other way and fewer went
+    theirs.
+    """
+    inside = of = agreeing = disagreeing = 0
+    best: float | None = None
+    seen: list[dict[str, float]] = []
+    for flight in flights:
+        if flight.outcome != "valid" or flight.error is None:
+            continue
+        told = flight.predicted
+        if told is not None and told.lower is not None and told.upper is not None:
+            of += 1
+            inside += told.lower <= flight.error <= told.upper
+        if told is not None and best is not None and dict(flight.gains) not in seen:
+            agreed = (told.error - best) * (flight.error - best)
+            agreeing += agreed > 0.0
+            disagreeing += agreed < 0.0
+        best = flight.error if best is None else min(best, flight.error)
+        seen.append(dict(flight.gains))
+    trustworthy = not (disagreeing >= _DISAGREEMENTS and disagreeing > agreeing)
+    return TrackRecord(
+        inside=inside,
+        of=of,
+        agreeing=agreeing,
+        disagreeing=disagreeing,
+        trustworthy=trustworthy,
+        sentence=_sentence(inside, of, agreeing, disagreeing, trustworthy),
+    )
+
+
+def prediction_of(proposal: Proposal) -> Prediction | None:
+    """What a flight of the proposal carries with it, to be held against."""
+    if proposal.predicted_error is None:
+        return None
+    interval = proposal.interval
+    return Prediction(
+        error=proposal.predicted_error,
+        lower=None if interval is None else interval.lower,
+        upper=None if interval is None else interval.upper,
+    )
+
+
+def expected(
+    experiment: Experiment,
+    space: PolicySpace,
+    flights: Sequence[Flight],
+    proposal: Proposal,
+    scatter: Pooled,
+    *,
+    base: Flight | None,
+) -> Proposal:
+    """The proposal with its interval and band; one that has an interval, or predicts nothing, as it is.
+
+    `base` is the flight whose bias the prediction carries, None for the bare model.
+    """
+    if proposal.interval is not None or proposal.predicted is None or proposal.predicted_error is None:
+        return proposal
+    outputs = _likely(experiment, space, space.vector(proposal.gains), base)
+    repeats = next((group.size for group in groups_of(flights) if base and base.number in group.numbers), 0)
+    noise = scatter.sigma**2 * (1.0 + (1.0 / repeats if repeats else 0.0))
+    reach = float(stdtrit(scatter.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * experience(flights)
+    errors, curve = experiment.errors(outputs), proposal.predicted[experiment.output]
+    half = reach * float(np.sqrt(noise + np.var(errors, ddof=1)))
+    offset = noise / cost_of_an_offset(experiment) ** 2
+    band = reach * np.sqrt(offset + np.var(outputs, axis=0, ddof=1))
+    middle = np.mean(outputs, axis=0)
+    edges = (np.minimum(curve, middle - band), np.maximum(curve, middle + band))
+    centre = float(np.mean(errors))
+    return replace(
+        proposal,
+        interval=_interval(min(proposal.predicted_error, centre - half), max(proposal.predicted_error, centre + half)),
+        predicted=_with_band(proposal.predicted, experiment.output, *edges),
+    )
+
+
+def expected_again(
+    experiment: Experiment, flights: Sequence[Flight], group: Group, scatter: Pooled, kind: Kind, why: Explanation
+) -> Proposal:
+    """The proposal to fly a policy again: the mean of its flights is expected, with the scatter around it."""
+    measured = np.array([on_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
+    half = scatter.half_width(1.0 + 1.0 / group.size, CONFIDENCE)
+    offset = half / cost_of_an_offset(experiment)
+    curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
+    return Proposal(
+        kind=kind,
+        gains=dict(group.gains),
+        predicted=_with_band(
+            curve, experiment.output, curve[experiment.output] - offset, curve[experiment.output] + offset
+        ),
+        predicted_error=group.mean,
+        explanation=why,
+        interval=_interval(group.mean - half, group.mean + half),
+    )
+
+
+def experience(flights: Sequence[Flight]) -> float:
+    """f: above 1 where earlier flights missed their predictions by more than their intervals, below where by less."""
+    squares = [
+        ((2.0 * flight.error - told.lower - told.upper) / max(told.upper - told.lower, _TINY) * _NORMAL) ** 2
+        for flight in flights
+        if flight.error is not None
+        and (told := flight.predicted) is not None
+        and told.lower is not None
+        and told.upper is not None
+    ]
+    return float(np.sqrt((_TRUST_IN_THE_MODEL + sum(squares)) / (_TRUST_IN_THE_MODEL + len(squares))))
+
+
+def _with_band(curve: Trajectory, output: str, lower: Samples, upper: Samples) -> Trajectory:
+    """A predicted curve with the two edges of its band as further channels."""
+    edges = dict(zip(band_channels(output), (lower, upper), strict=True))
+    return replace(curve, channels={**curve.channels, **edges})
+
+
+_NORMAL: Final = float(ndtri(0.5 + CONFIDENCE / 2))
+
+
+def _interval(lower: float, upper: float) -> Interval:
+    """An error is never below zero."""
+    return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
+
+
+def _likely(experiment: Experiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
+    """Outputs of these gains on a few likely models, shape (k, n), each with its own bias where there is a base."""
+    parameters = experiment.model_parameters
+    prior = Spread(
+        mean=tuple(parameter.prior_mean for parameter in parameters),
+        covariance=tuple(map(tuple, np.diag([parameter.prior_sd**2 for parameter in parameters]).tolist())),
+        origin="the priors of a fit",
+    )
+    models = prior.samples(experiment, MODELS)
+    proposed = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
+    if base is None:
+        return proposed
+    flown = experiment.outputs(np.tile(space.vector(base.gains), (MODELS, 1)), models)
+    return np.asarray(proposed - flown + on_grid(experiment, base))
+
+
+def cost_of_an_offset(experiment: Experiment) -> float:
+    """What a constant offset of one unit of the output costs in the error: 1 for a mean, the window for an integral."""
+    return float(experiment.errors(experiment.set_point(experiment.grid_s)[np.newaxis] + 1.0)[0])
+
+
+def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:
+    if not of and not agreeing + disagreeing:
+        return "No flight has put a prediction to the test yet."
+    parts = [f"{inside} of {of} flights lay in their predicted interval"] if of else []
+    if agreeing + disagreeing:
+        parts.append(f"{agreeing} of {agreeing + disagreeing} changed the error in the predicted direction")
+    ending = "" if trustworthy else "; the gradient is not trustworthy: flights keep going the other way"
+    return f"{', '.join(parts)}{ending}."

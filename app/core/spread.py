@@ -1,0 +1,58 @@
+"""What is known of a model's parameters: the likely values, and how far the truth may lie from them."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from app.core.policy import Vector
+
+if TYPE_CHECKING:  # experiments tell their hazards over a spread
+    from app.core.experiments.base import Experiment, Matrix
+
+WIDEST_SD: Final = 2.0
+"""Samples stay within so many standard deviations of the mean."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """A normal distribution over the model's parameters, in the order of `model_parameters`, cut off at two standard
+    deviations along its principal axes and at the parameters' own limits. `origin` says where it comes from."""
+
+    mean: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    origin: str
+
+    def samples(self, experiment: "Experiment", count: int) -> "Matrix":
+        """The mean, then `count` − 1 quasi-random models, shape (count, m); the same every time."""
+        unit = qmc.Halton(len(self.mean), scramble=False).random(count)[1:]
+        return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
+
+    def draws(self, experiment: "Experiment", count: int, seed: int) -> "Matrix":
+        """Random models of the same distribution, shape (count, m)."""
+        return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
+
+    def _models(self, experiment: "Experiment", unit: "Matrix") -> "Matrix":
+        """Models from numbers evenly spread over 0 … 1, shape (k, m)."""
+        variances, axes = np.linalg.eigh(np.array(self.covariance))
+        sd = np.sqrt(np.maximum(variances, 0.0))
+        edge = 0.5 - 0.5 * _PROBABILITY_WITHIN
+        normal = ndtri(edge + unit * _PROBABILITY_WITHIN)
+        lower = [parameter.lower for parameter in experiment.model_parameters]
+        upper = [parameter.upper for parameter in experiment.model_parameters]
+        return np.asarray(np.clip(np.array(self.mean) + (normal * sd) @ axes.T, lower, upper))
+
+
+_PROBABILITY_WITHIN: Final = 0.9544997361036416
+
+
+def before_flight(experiment: "Experiment") -> Spread:
+    """What the data sheet leaves open: each parameter within `known_within` of its nominal value."""
+    sd: Vector = np.array([parameter.known_within for parameter in experiment.model_parameters]) / WIDEST_SD
+    return Spread(
+        mean=tuple(float(value) for value in experiment.nominal_model),
+        covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()),
+        origin="the data sheet",
+    )

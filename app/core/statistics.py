@@ -1,0 +1,264 @@
+"""What repeated flights say: means with standard errors, comparisons that own up to the scatter, drift, trends.
+
+Errors of one policy are taken as normal around its true error with a scatter σ that all policies share. σ² has the
+experiment's prior scatter s₀ worth ν₀ degrees of freedom (a scaled inverse χ², Gelman et al., Bayesian Data Analysis,
+3rd ed., sections 2.6 and 3.3), so that with the repeats of all groups
+
+    σ̂² = (ν₀ s₀² + Σ (e − ē)²) / ν,    ν = ν₀ + Σ (n − 1),
+
+and the difference of two means is t-distributed with ν degrees of freedom around the observed one, with the standard
+error σ̂ √(1/n₁ + 1/n₂): the pooled t test where ν₀ = 0.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal
+
+import numpy as np
+from scipy.integrate import trapezoid
+from scipy.special import ndtr, stdtr, stdtrit
+
+from app.core.definition import Flight
+from app.core.experiments.base import Scatter
+from app.core.policy import Gains, Vector
+
+Word = Literal["better", "worse", "unresolved"]
+
+MOST_FURTHER_FLIGHTS: Final = 100
+_OPTIMISM_POINTS: Final = 2001
+_OPTIMISM_REACH: Final = 8.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pooled:
+    """The flight-to-flight scatter: a standard deviation in the error's unit, and how well it is known."""
+
+    sigma: float
+    degrees_of_freedom: float
+
+    def half_width(self, variance: float, confidence: float) -> float:
+        """Half of the two-sided interval of a number whose variance is `variance`·σ²."""
+        return float(stdtrit(self.degrees_of_freedom, 0.5 + confidence / 2)) * self.sigma * float(np.sqrt(variance))
+
+
+@dataclass(frozen=True)
+class Group:
+    """The valid flights of one policy, in their order."""
+
+    gains: Gains
+    numbers: tuple[int, ...]
+    errors: tuple[float, ...]
+
+    @property
+    def size(self) -> int:
+        return len(self.errors)
+
+    @cached_property
+    def mean(self) -> float:
+        return float(np.mean(self.errors))
+
+    @property
+    def squares(self) -> float:
+        """Σ (e − ē)², with size − 1 degrees of freedom."""
+        return float(np.sum((np.array(self.errors) - self.mean) ** 2))
+
+    def standard_error(self, scatter: Pooled) -> float:
+        return scatter.sigma / float(np.sqrt(self.size))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightsToDecide:
+    """Further flights of each of two policies after which the difference, if it stays, is no longer unresolved."""
+
+    first: int
+    second: int
+
+    @property
+    def total(self) -> int:
+        return self.first + self.second
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Whether the first of two policies is better (its error lower) than the second.
+
+    `difference` is first − second. `confidence` is that of the likelier of the two directions, with the allowance for
+    having chosen and for having looked before; `further` is None for a decided comparison, and for one that
+    100 flights would not decide.
+    """
+
+    verdict: Word
+    confidence: float
+    difference: float
+    standard_error: float
+    further: FlightsToDecide | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drift:
+    """The last flight of a policy against its first: `confidence` that the error has changed at all."""
+
+    first_number: int
+    last_number: int
+    difference: float
+    standard_error: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trend:
+    """error = level + slope·x, least squares; `lower` … `upper` is the slope's interval with `confidence`."""
+
+    slope: float
+    standard_error: float
+    lower: float
+    upper: float
+    confidence: float
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether the interval leaves out zero."""
+        return self.lower > 0.0 or self.upper < 0.0
+
+
+def groups_of(flights: Sequence[Flight]) -> tuple[Group, ...]:
+    """The valid flights by their gains, in the order of each policy's first flight."""
+    found: dict[tuple[tuple[str, float], ...], list[Flight]] = {}
+    for flight in flights:
+        if flight.outcome == "valid" and flight.error is not None:
+            found.setdefault(tuple(sorted(flight.gains.items())), []).append(flight)
+    return tuple(
+        Group(
+            gains=dict(same[0].gains),
+            numbers=tuple(flight.number for flight in same),
+            errors=tuple(flight.error for flight in same if flight.error is not None),
+        )
+        for same in found.values()
+    )
+
+
+def pooled(groups: Sequence[Group], prior: Scatter) -> Pooled:
+    """σ̂ and ν as above. `prior.degrees_of_freedom` must be above zero, or a policy have been repeated."""
+    freedom = prior.degrees_of_freedom + sum(group.size - 1 for group in groups)
+    squares = prior.degrees_of_freedom * prior.sd**2 + sum(group.squares for group in groups)
+    return Pooled(sigma=float(np.sqrt(squares / freedom)), degrees_of_freedom=freedom)
+
+
+def winner_of(groups: Sequence[Group], scatter: Pooled) -> Group:
+    """The policy with the lowest mean plus one standard error, the earliest of equals: a single lucky flight does not
+    overtake a policy that has shown the same twice. There must be a group."""
+    return min(groups, key=lambda group: (group.mean + group.standard_error(scatter), group.numbers[0]))
+
+
+def compare(
+    first: Group, second: Group, scatter: Pooled, confidence: float, *, candidates: int = 1, looks: int = 0
+) -> Comparison:
+    """Judge the difference of two means by Student's t.
+
+    `candidates`: among how many policies `first` was chosen for its low error; the chance of a mistake counts that many
+    times (Bonferroni), so that the best of N gets no credit for having been chosen. `looks`: at the k-th of several
+    looks at growing data the chance of a mistake counts k(k + 1) times; as Σ 1/(k(k + 1)) = 1, however often one looks
+    the chance of ever being misled stays below 1 − confidence.
+    """
+    allowance = candidates * max(looks * (looks + 1), 1)
+    difference = first.mean - second.mean
+    certainty = _certainty(difference, scatter, (first.size, second.size), allowance)
+    verdict: Word = "unresolved" if certainty < confidence else "better" if difference < 0.0 else "worse"
+    return Comparison(
+        verdict=verdict,
+        confidence=certainty,
+        difference=difference,
+        standard_error=_standard_error(scatter, (first.size, second.size)),
+        further=_further(first, second, scatter, confidence, candidates, looks) if verdict == "unresolved" else None,
+    )
+
+
+def optimism(means: Sequence[float], standard_errors: Sequence[float]) -> float:
+    """By how much the best of several noisy means is expected to look better than it is: E[true − observed] of the
+    lowest, were the observed means the true ones and were they observed again with these (positive) standard errors.
+
+    For N equal means it is the expected minimum of N normal errors, 0.56 σ for two and 1.16 σ for five; means far above
+    the lowest add nothing. Numerical integral, to 1e-6 of the largest standard error.
+    """
+    centre, sd = np.array(means), np.array(standard_errors)
+    if not (sd > 0.0).all():
+        return 0.0
+    low, high = centre.min() - _OPTIMISM_REACH * sd.max(), centre.min() + _OPTIMISM_REACH * sd.max()
+    observed = np.linspace(low, high, _OPTIMISM_POINTS)
+    away = (observed - centre[:, np.newaxis]) / sd[:, np.newaxis]
+    above = ndtr(-away)
+    density = np.exp(-0.5 * away**2) / np.sqrt(2.0 * np.pi) / sd[:, np.newaxis]
+    total = 0.0
+    for chosen in range(len(centre)):
+        others_above = np.prod(np.delete(above, chosen, axis=0), axis=0)
+        total += float(trapezoid((centre[chosen] - observed) * density[chosen] * others_above, observed))
+    return total
+
+
+def drift_of(group: Group, scatter: Pooled) -> Drift | None:
+    """The last against the first flight of a policy; None unless it was repeated. Two-sided."""
+    if group.size < 2:
+        return None
+    difference = group.errors[-1] - group.errors[0]
+    return Drift(
+        first_number=group.numbers[0],
+        last_number=group.numbers[-1],
+        difference=difference,
+        standard_error=_standard_error(scatter, (1, 1)),
+        confidence=_certainty(difference, scatter, (1, 1), 2),
+    )
+
+
+def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.9) -> Trend | None:
+    """Least squares line through at least three points with the t interval of its slope, n − 2 degrees of freedom (the
+    paper's Fig. 12: error against battery voltage). None when there are fewer, or x does not vary."""
+    along, measured = np.array(x, dtype=np.float64), np.array(errors, dtype=np.float64)
+    if len(along) < 3 or np.ptp(along) == 0.0:
+        return None
+    centred: Vector = along - along.mean()
+    spread = float(centred @ centred)
+    slope = float(centred @ measured) / spread
+    residual = measured - measured.mean() - slope * centred
+    freedom = len(along) - 2
+    standard_error = float(np.sqrt(residual @ residual / freedom / spread))
+    half = float(stdtrit(freedom, 0.5 + confidence / 2)) * standard_error
+    return Trend(
+        slope=slope, standard_error=standard_error, lower=slope - half, upper=slope + half, confidence=confidence
+    )
+
+
+def smallest_difference(scatter: Pooled, flown: int, left: int, confidence: float) -> float:
+    """The least difference that `left` flights, split at best between a policy flown `flown` times already and a new
+    one, tell from noise with `confidence`. Infinite without a flight left."""
+    freedom = scatter.degrees_of_freedom + max(left - 1, 0)
+    errors = [np.sqrt(1.0 / (flown + left - new) + 1.0 / new) for new in range(1, left + 1)]
+    return float(stdtrit(freedom, confidence)) * scatter.sigma * float(min(errors, default=np.inf))
+
+
+def _standard_error(scatter: Pooled, sizes: tuple[int, int]) -> float:
+    return scatter.sigma * float(np.sqrt(1.0 / sizes[0] + 1.0 / sizes[1]))
+
+
+def _certainty(difference: float, scatter: Pooled, sizes: tuple[int, int], allowance: float) -> float:
+    """1 − allowance·P(t ≥ |difference|/standard error), not below zero."""
+    standard_error = _standard_error(scatter, sizes)
+    if standard_error == 0.0:
+        return 1.0 if difference else 0.0
+    tail = float(stdtr(scatter.degrees_of_freedom, -abs(difference) / standard_error))
+    return max(1.0 - allowance * tail, 0.0)
+
+
+def _further(
+    first: Group, second: Group, scatter: Pooled, confidence: float, candidates: int, looks: int
+) -> FlightsToDecide | None:
+    """Always the policy with fewer flights next, the first of equals, until the same difference would decide."""
+    sizes = [first.size, second.size]
+    for count in range(1, MOST_FURTHER_FLIGHTS + 1):
+        sizes[0 if sizes[0] <= sizes[1] else 1] += 1
+        known = Pooled(sigma=scatter.sigma, degrees_of_freedom=scatter.degrees_of_freedom + count)
+        look = looks + count if looks else 0
+        allowance = candidates * max(look * (look + 1), 1)
+        if _certainty(first.mean - second.mean, known, (sizes[0], sizes[1]), allowance) >= confidence:
+            return FlightsToDecide(first=sizes[0] - first.size, second=sizes[1] - second.size)
+    return None

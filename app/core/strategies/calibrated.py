@@ -1,0 +1,177 @@
+"""Fit the model to all flights, then choose the gains that fly best on it.
+
+The choice is a hedge over a few plausible models (`hedging`), inside a trust region around the best flight (`trust`).
+What the gate would refuse is not proposed: such a step is halved until it passes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from app.core.calibration import Calibration, calibrate
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment, Matrix
+from app.core.experiments.takeoff import Takeoff
+from app.core.policy import PolicySpace, Vector
+from app.core.strategies.base import Explanation, Kind, Proposal, Strategy
+from app.core.strategies.foretelling import Foretold, foretell
+from app.core.strategies.hedging import Box, best_in, merit
+from app.core.strategies.history import best_flight, describe, was_flown
+from app.core.strategies.passing import may_fly
+from app.core.strategies.trust import trust_fraction
+
+MODELS: Final = 8
+HEDGE: Final = 0.75
+"""How far the models lie from the fit that the choice is hedged over, in standard deviations: more costs error on
+vehicles that are what they seem, less costs it on the others."""
+WORTH: Final = 0.005
+"""A step that promises less than this share of the error is not worth a flight."""
+
+_HALVINGS: Final = 5
+_DIFFERENCE: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """Gains to fly, shape (n,), how that came about, and what else the model had in mind."""
+
+    kind: Kind
+    gains: Vector
+    optimum: Vector
+    now: float
+    then: float
+    notes: tuple[str, ...] = ()
+
+
+def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+    """The hedged optimum of the calibrated model, as far as trust goes. At least one flight must be valid.
+
+    Raises TypeError for an experiment that it is not made for.
+    """
+    if not isinstance(experiment, Takeoff):
+        raise TypeError(f"calibrated works with takeoff only, not with {experiment.name}")
+    calibration = calibrate(experiment, flights)
+    fitted = [flight for flight in flights if flight.number in calibration.numbers]
+    base = best_flight(fitted)
+    models = calibration.plausible(runs=MODELS, width=HEDGE)
+    fraction = min(trust_fraction(flights), definition.step_fraction)
+    box = Box(*space.reachable(space.vector(base.gains), fraction))
+    choice = _choose(definition, experiment, space, flights, calibration, base, models, box)
+    foretold = foretell(calibration, base, choice.gains)
+    clipped = _at_an_edge(space, box, choice.optimum)
+    explanation = Explanation(
+        summary=_summary(experiment, base, choice, foretold, len(calibration.numbers)),
+        base_flight=base.number,
+        gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
+        direction=_named(space, choice.gains - space.vector(base.gains)),
+        clipped=clipped,
+        notes=(*choice.notes, *_notes(fraction, clipped)),
+        lesson=_lesson(calibration, foretold),
+        fitted=calibration.fitted,
+        trust_fraction=fraction,
+    )
+    return Proposal(
+        kind=choice.kind,
+        gains=space.mapping(choice.gains),
+        predicted=foretold.trajectory,
+        predicted_error=foretold.error,
+        explanation=explanation,
+        interval=foretold.interval,
+        spread=calibration.spread(),
+    )
+
+
+def _choose(
+    definition: Definition,
+    takeoff: Takeoff,
+    space: PolicySpace,
+    flights: Sequence[Flight],
+    calibration: Calibration,
+    base: Flight,
+    models: Matrix,
+    box: Box,
+) -> _Choice:
+    here = space.nearest(space.vector(base.gains))
+    optimum = best_in(takeoff, box, models, here[np.newaxis])
+    now, then = merit(takeoff, np.stack((here, optimum)), models).tolist()
+    if then > (1.0 - WORTH) * now and was_flown(space.mapping(here), flights):
+        return _Choice("none", here, optimum, now, then)
+    for halvings in range(_HALVINGS):
+        gains = box.nearest(here + (optimum - here) / 2**halvings)
+        if was_flown(space.mapping(gains), [flight for flight in flights if flight.outcome == "valid"]):
+            break
+        if was_flown(space.mapping(gains), flights):
+            continue
+        if may_fly(definition, takeoff, gains, calibration.spread()):
+            if halvings == 0:
+                return _Choice("step", gains, optimum, now, then)
+            note = f"The whole step, to {describe(space.mapping(optimum))}, was aborted before or the gate refuses it."
+            promised = float(merit(takeoff, gains[np.newaxis], models)[0])
+            return _Choice("shorter step", gains, optimum, now, promised, (note,))
+    note = f"Every step towards {describe(space.mapping(optimum))} was flown before or is refused by the gate."
+    return _Choice("none", here, optimum, now, then, (note,))
+
+
+def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
+    """∂error/∂gain at the best flight by central differences, as the hedge has it; zero for a pinned gain."""
+    steps = np.diag(np.maximum(np.rint(_DIFFERENCE * takeoff.space.scale), 1.0))
+    above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
+    errors = merit(takeoff, np.concatenate((above, below)), models)
+    run = np.diag(above - below)
+    rise = errors[: len(base)] - errors[len(base) :]
+    return _named(space, np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
+
+
+def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(space.names, values, strict=True)}
+
+
+def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
+    at_edge = (gains <= box.low) | (gains >= box.high)
+    return tuple(name for name, is_there in zip(space.names, at_edge, strict=True) if is_there)
+
+
+def _summary(experiment: Experiment, base: Flight, choice: _Choice, foretold: Foretold, flights: int) -> str:
+    unit = experiment.error_unit
+    told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
+    best = f"flight {base.number} ({describe(base.gains)}, error {base.error:.4f} {unit})"
+    if choice.kind == "none":
+        return f"{told} finds nothing that is better than {best} by {WORTH:.1%} and may be flown."
+    low, high = foretold.interval.lower, foretold.interval.upper
+    return (
+        f"{told} promises {1.0 - choice.then / choice.now:.0%} less error than with {best}: "
+        f"{foretold.error:.4f} {unit}, with {foretold.interval.confidence:.0%} confidence within "
+        f"{low:.4f} … {high:.4f} {unit}."
+    )
+
+
+def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
+    kept = "What the best flight did beyond the model is kept inside the control loop."
+    limits = f"A bound or the trust region stopped {', '.join(clipped)}." if clipped else ""
+    trust = f"Steps of at most {fraction:.0%} of each range are trusted." if fraction < 1.0 else ""
+    return tuple(filter(None, (kept, limits, trust)))
+
+
+def _lesson(calibration: Calibration, foretold: Foretold) -> str:
+    """The parameter that the foretold error hangs on most."""
+    values = foretold.models - foretold.models.mean(axis=0)
+    errors = foretold.errors - foretold.errors.mean()
+    spread = np.linalg.norm(values, axis=0)
+    shares = np.divide(np.abs(errors @ values), spread, out=np.zeros_like(spread), where=spread > 0.0)
+    most = calibration.fitted[int(np.argmax(np.round(shares, 9)))]
+    return (
+        f"Mostly {most.title.lower()}, now {most.value:.3g} ± {most.standard_error:.1g} {most.unit}: what is open in "
+        "the foretold error hangs on it more than on any other number."
+    )
+
+
+CALIBRATED: Final = Strategy(
+    name="calibrated",
+    title="Calibrated model",
+    line="Fits the model to all flights and flies its optimum, hedged over what is left open: about two flights.",
+    options=(),
+    propose=propose,
+    experiments=("takeoff",),
+)

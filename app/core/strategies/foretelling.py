@@ -1,0 +1,87 @@
+"""What a calibrated model expects of a flight: its curve with a band, its error with an interval.
+
+The remaining bias is kept inside the loop: what the best flight did beyond its own calibrated model in every step acts
+on the new gains as well, so that gains which hold against gusts are credited with it. Where the record lacks the climb
+rate or the thrust command, it is added outside the loop, the less the further the gains are from the flown ones.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import ndtri
+
+from app.core.calibration import Calibration
+from app.core.definition import Flight
+from app.core.experiments.base import Experiment, Matrix
+from app.core.plants.vertical_disturbed import ENTERED
+from app.core.policy import Vector
+from app.core.strategies.base import Interval, band_channels
+from app.core.trajectory import Samples, Trajectory
+
+CONFIDENCE: Final = 0.9
+
+_MODELS: Final = 16
+_MISFIT: Final = 0.02
+"""Share of the error that even the best simple model is off."""
+_WEATHER: Final = 0.5
+"""Share by which the next flight's gusts cost more or less than the last one's did."""
+_REACH: Final = float(ndtri(0.5 + CONFIDENCE / 2.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Foretold:
+    """The expected curve with its band, the expected error with its interval, and the models it was made with: (k, m),
+    with their errors (k,)."""
+
+    trajectory: Trajectory
+    error: float
+    interval: Interval
+    models: Matrix
+    errors: Vector
+
+
+def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
+    """A flight of `gains`, shape (n,); `base` is the best of the calibrated flights."""
+    experiment = calibration.experiment
+    bias = remaining_bias(calibration, base, gains)
+    models = calibration.plausible(runs=_MODELS, next_flight=True)
+    clean = experiment.outputs(np.tile(gains, (_MODELS, 1)), models)
+    outputs = clean + bias
+    errors = experiment.errors(outputs)
+    weather = _WEATHER * float(np.mean(errors - experiment.errors(clean)))
+    error = float(np.mean(errors))
+    sd = float(np.sqrt(np.var(errors) + weather**2 + (_MISFIT * error) ** 2))
+    curve = outputs.mean(axis=0)
+    noise = float(np.sqrt(np.mean(bias**2)))
+    half = _REACH * np.sqrt(outputs.var(axis=0) + noise**2)
+    lower, upper = band_channels(experiment.output)
+    channels = {experiment.output: curve, lower: curve - half, upper: curve + half}
+    return Foretold(
+        trajectory=Trajectory(experiment.grid_s, channels, "model", "simulation"),
+        error=error,
+        interval=Interval(lower=max(error - _REACH * sd, 0.0), upper=error + _REACH * sd, confidence=CONFIDENCE),
+        models=models,
+        errors=errors,
+    )
+
+
+def remaining_bias(calibration: Calibration, base: Flight, gains: Vector) -> Samples:
+    """What the flight is expected to do beyond the calibrated model, on the grid."""
+    experiment = calibration.experiment
+    flown = experiment.space.vector(base.gains)
+    own = calibration.own_models[calibration.numbers.index(base.number)]
+    disturbances = experiment.disturbances(base.trajectory.as_stored(), flown, own)
+    if disturbances is None:
+        return calibration.residual * _closeness(experiment, gains, flown)
+    calm = np.zeros_like(disturbances)
+    calm[:, ENTERED] = disturbances[:, ENTERED]
+    disturbed, undisturbed = (
+        experiment.disturbed_outputs(gains[np.newaxis], own, acting)[0] for acting in (disturbances, calm)
+    )
+    return np.asarray(disturbed - undisturbed)
+
+
+def _closeness(experiment: Experiment, gains: Vector, flown: Vector) -> float:
+    """1 at the flown gains, 0.6 one scale away from them."""
+    return float(np.exp(-0.5 * np.sum(((gains - flown) / experiment.space.scale) ** 2)))

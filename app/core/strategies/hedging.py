@@ -1,0 +1,64 @@
+"""Gains that fly well on several plausible models at once.
+
+A policy is judged by its mean error over the models, plus a metre for each metre by which it rises above 3.6 m on any
+of them or stays below 2.4 m after five seconds: a good distance from what is unsafe. First a fixed set of points spread
+over the box, cut short after 8 s and on half the models; then Nelder–Mead on whole counts from the best two.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.stats import qmc
+
+from app.core.descent import descend
+from app.core.experiments.base import Matrix
+from app.core.experiments.takeoff import Takeoff
+from app.core.policy import Vector
+
+HIGHEST_M: Final = 3.6
+LOWEST_M: Final = 2.4
+
+_POINTS: Final = 64
+_COARSE_S: Final = 8.0
+_FINE_S: Final = 12.0
+_EVALUATIONS: Final = (60, 40)
+_DIGITS: Final = 9
+"""Merits are compared in nanometres: what lies below differs between machines."""
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Lowest and highest gains that may be chosen, both of shape (n,)."""
+
+    low: Vector
+    high: Vector
+
+    def nearest(self, gains: Vector) -> Vector:
+        """The closest whole counts in the box."""
+        return np.clip(np.rint(gains), self.low, self.high)
+
+
+def merit(takeoff: Takeoff, gains: Matrix, models: Matrix, until_s: float = _FINE_S) -> Vector:
+    """Mean error, m, with what is added for unsafe flights: gains (c, 3), models (k, m) → (c,); lower is better."""
+    sketches = takeoff.sketches(gains, models, until_s)
+    beyond = np.maximum(sketches.highest_m - HIGHEST_M, 0.0) + np.maximum(LOWEST_M - sketches.lowest_m, 0.0)
+    return np.asarray(np.round(sketches.errors.mean(axis=1) + beyond.max(axis=1), _DIGITS))
+
+
+def best_in(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
+    """The best gains found in the box, shape (n,); `known` (c, n) are tried among the first points."""
+    spread = box.low + qmc.Halton(len(box.low), scramble=False).random(_POINTS + 1)[1:] * (box.high - box.low)
+    points = box.nearest(np.vstack((known, spread)))
+    first = merit(takeoff, points, models[::2], _COARSE_S)
+    starts = points[np.argsort(first, kind="stable")[: len(_EVALUATIONS)]]
+
+    def fine(gains: Vector) -> float:
+        return float(merit(takeoff, box.nearest(gains)[np.newaxis], models)[0])
+
+    steps = (box.high - box.low) / 10.0
+    ends = [
+        box.nearest(descend(fine, start, steps, box.low, box.high, evaluations=evaluations, tolerance=1.0))
+        for start, evaluations in zip(starts, _EVALUATIONS, strict=True)
+    ]
+    return ends[int(np.argmin([fine(end) for end in ends]))]

@@ -1,0 +1,86 @@
+"""Warm start: what another vehicle's campaign is worth to this one.
+
+Vehicle A's best gains are flown first. Both flights then have a bias, b(t) = measured(t) − nominal model(t; flown
+gains). What A knows is worth something where A's bias explains B's, with as much of the difference as repeated flights
+of one vehicle show put down to scatter:
+
+    agreement = 1 − max(⟨(b_B − b_A)²⟩ − 2 s², 0) / ⟨b_B²⟩,  held within 0 … 1,
+
+⟨·⟩ being the mean over the window and s the scatter as an offset of the output. From one half on A's fitted model takes
+the data sheet's place, the wider the less the two agree, and the first step is shortened to that share.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from app.core import calibration
+from app.core.definition import Definition, Flight
+from app.core.experiments.base import Experiment
+from app.core.predictions import cost_of_an_offset
+from app.core.strategies.bias import corrected_by
+from app.core.trajectory import CHANNEL_UNITS
+
+LEAST_AGREEMENT: Final = 0.5
+_TAKEN: Final = {
+    True: "The model fitted to the other vehicle's flight takes the data sheet's place",
+    False: "The other vehicle's best gains are taken over",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transfer:
+    """`agreement` is None until this vehicle has flown; `experiment` and `step_fraction` are what a strategy is to work
+    with."""
+
+    experiment: Experiment
+    step_fraction: float
+    agreement: float | None
+    sentence: str
+
+
+def transfer(definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight) -> Transfer:
+    """Judged by the first valid flight, for the whole campaign; the step is shortened for the flight after it only."""
+    valid = [flight for flight in flights if flight.outcome == "valid"]
+    plain = Transfer(experiment=experiment, step_fraction=definition.step_fraction, agreement=None, sentence="")
+    if not valid:
+        return plain
+    agreed, apart, own = _agreement(experiment, donor, valid[0])
+    unit = CHANNEL_UNITS.get(experiment.output, "")
+    numbers = (
+        f"this vehicle deviates from the data sheet's model by {own:.3f} {unit} r.m.s., from the other vehicle by "
+        f"{apart:.3f} {unit}: agreement {agreed:.0%}"
+    )
+    if agreed < LEAST_AGREEMENT:
+        sentence = f"Nothing is taken over from the other vehicle: {numbers}, less than {LEAST_AGREEMENT:.0%}."
+        return replace(plain, agreement=agreed, sentence=sentence)
+    is_first_step = len(valid) == 1
+    shortened = f" The first step goes {agreed:.0%} as far as it might." if is_first_step and agreed < 1.0 else ""
+    return Transfer(
+        experiment=_informed(experiment, donor, agreed),
+        step_fraction=definition.step_fraction * (agreed if is_first_step else 1.0),
+        agreement=agreed,
+        sentence=f"{_TAKEN[experiment.name in calibration.EXPERIMENTS]}: {numbers}.{shortened}",
+    )
+
+
+def _agreement(experiment: Experiment, donor: Flight, own: Flight) -> tuple[float, float, float]:
+    """Agreement as above, and the r.m.s. of b_B − b_A and of b_B, in the output's unit."""
+    theirs, ours = corrected_by(experiment, donor).bias, corrected_by(experiment, own).bias
+    apart, whole = float(np.mean((ours - theirs) ** 2)), float(np.mean(ours**2))
+    scatter = (experiment.scatter.sd / cost_of_an_offset(experiment)) ** 2
+    unexplained = max(apart - 2.0 * scatter, 0.0)
+    agreed = 1.0 - unexplained / whole if whole > unexplained else 0.0
+    return (agreed if unexplained else 1.0), float(np.sqrt(apart)), float(np.sqrt(whole))
+
+
+def _informed(experiment: Experiment, donor: Flight, agreed: float) -> Experiment:
+    """The donor's fit as the nominal model, each standard deviation widened by what the two vehicles disagree in; the
+    experiment itself where no fit is made."""
+    if experiment.name not in calibration.EXPERIMENTS:
+        return experiment
+    fitted = calibration.calibrate(experiment, (donor,))
+    prior = np.array([parameter.prior_sd for parameter in experiment.model_parameters])
+    return experiment.informed(fitted.model, np.sqrt(np.diag(fitted.covariance) + (1.0 - agreed) * prior**2))
