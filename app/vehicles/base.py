@@ -25,15 +25,14 @@ class VehicleOption:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Telemetry of one instant: seconds since the command, altitude up, thrust as share of full command."""
+    """Telemetry of one instant: seconds since the command, and the channels of a record that are worth watching, the
+    scored one among them."""
 
     time_s: float
-    altitude_m: float
-    climb_rate_m_s: float
-    set_point_m: float
-    reference_m: float
-    thrust: float
-    battery_v: float
+    channels: Mapping[str, float]
+
+    def __getitem__(self, channel: str) -> float:
+        return self.channels[channel]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

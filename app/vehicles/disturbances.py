@@ -12,6 +12,8 @@ def streams(seed: int, count: int) -> list[np.random.Generator]:
 
 def gusts(generator: np.random.Generator, steps: int, *, sd: float, correlation_s: float) -> Rows:
     """Gauss-Markov gusts at 512 Hz, shape (steps,), with the standard deviation's unit."""
+    if sd == 0.0:
+        return np.zeros(steps)
     series = generator.standard_normal(steps)
     correlate(series, correlation_s)
     series *= sd

@@ -21,6 +21,7 @@ IMPORT: Final = VehicleKind(
     line="You fly the proposed gains on your own vehicle and upload the recorded altitude as CSV.",
     is_real=True,
     can_fly=False,
+    experiments=("takeoff",),
     options=(),
     open=_open,
 )

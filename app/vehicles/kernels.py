@@ -104,30 +104,72 @@ def control(
     return thrust / FULL_THRUST
 
 
+HOVER_SHARE: Final = 0
+MOTOR_LAG_S: Final = 1
+DRAG_1_S: Final = 2
+QUADRATIC_SHARE: Final = 3
+GROUND_EFFECT: Final = 4
+GROUND_EFFECT_HEIGHT_M: Final = 5
+MEASUREMENT_DELAY_S: Final = 6
+SAG_1_S: Final = 7
+MODEL_SIZE: Final = 8
+"""Places in the simple model's parameters."""
+
+PAST: Final = 64
+"""Steps of altitude and climb rate that are remembered, a power of two: 0.1 s of delay are 51.2."""
+
+
 @kernel
 def fly_simple_model(
     autopilot: Integers,
     command: Integers,
     plant: Rows,
+    past: Rows,
     model: Rows,
     datum_m: float,
     gusts_m_s2: Rows,
     resting_steps: int,
+    first: int,
     rows: Rows,
 ) -> None:
     """Advance the simple vertical model by as many steps as `rows` is long, writing a row before each.
 
-    `plant` is altitude (m), climb rate (m/s) and thrust (share of full); `model` hover throttle, motor lag (s) and drag
-    (1/s); explicit Euler at 512 Hz, the ground at 0. `gusts_m_s2` has the shape of the steps; the loop may be entered
-    after the first `resting_steps` of them; altitude is sensed `datum_m` too high.
+    `plant` is altitude (m), climb rate (m/s) and thrust command after the lag (share of full); `past`, shape (2, 64),
+    the last altitudes and climb rates, for a delayed sense of them. A command u lifts by
+    ((1 − q)·u + q·u²) / `HOVER_SHARE` of the weight, q the quadratic share, times 1 + e·exp(−altitude / height) near
+    the ground, less `SAG_1_S` of it per second since the command. Explicit Euler at 512 Hz, the ground at 0.
+    `gusts_m_s2` has the shape of the steps, `first` is the number of the first one; the loop may be entered from step
+    `resting_steps` on; altitude is sensed `datum_m` too high.
     """
-    hover, lag, drag = model[0], model[1], model[2]
+    lag, drag, quadratic, ground_effect = (
+        model[MOTOR_LAG_S],
+        model[DRAG_1_S],
+        model[QUADRATIC_SHARE],
+        model[GROUND_EFFECT],
+    )
     response = STEP_S / lag if lag > STEP_S else 1.0
+    delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
+    whole = int(delay)
+    part = delay - whole
     height, climb, thrust = plant[0], plant[1], plant[2]
+    sensed_m, sensed_m_s = height, climb
     for i in range(len(rows)):
-        share = control(autopilot, command, height + datum_m, climb, 1.0, i >= resting_steps, rows[i])
+        if delay > 0.0:
+            now = first + i
+            past[0, now % PAST], past[1, now % PAST] = height, climb
+            late, later = (now - whole) % PAST, (now - whole - 1) % PAST
+            sensed_m = (1.0 - part) * past[0, late] + part * past[0, later]
+            sensed_m_s = (1.0 - part) * past[1, late] + part * past[1, later]
+        else:
+            sensed_m, sensed_m_s = height, climb
+        may_enter = first + i >= resting_steps
+        share = control(autopilot, command, sensed_m + datum_m, sensed_m_s, 1.0, may_enter, rows[i])
         thrust += response * (share - thrust)
-        acceleration = GRAVITY_M_S2 * (thrust / hover - 1.0) - drag * climb + gusts_m_s2[i]
+        lift = ((1.0 - quadratic) * thrust + quadratic * thrust * thrust) / model[HOVER_SHARE]
+        if ground_effect > 0.0:
+            lift *= 1.0 + ground_effect * np.exp(-height / model[GROUND_EFFECT_HEIGHT_M])
+        lift *= 1.0 - model[SAG_1_S] * ((first + i) * STEP_S)
+        acceleration = GRAVITY_M_S2 * (lift - 1.0) - drag * climb + gusts_m_s2[i]
         height += climb * STEP_S
         climb += acceleration * STEP_S
         if height <= 0.0:

@@ -18,8 +18,8 @@ def _nothing(_options: Options) -> tuple[Problem, ...]:
 class VehicleKind:
     """A registered kind of vehicle.
 
-    `open(options, safe_gains)` gets complete, checked options and returns a vehicle that holds its safe gains;
-    `conflicts(options)` names options that are possible one by one but not together.
+    `experiments` names those that it can fly. `open(options, safe_gains)` gets complete, checked options and returns a
+    vehicle that holds its safe gains; `conflicts(options)` names options that are possible one by one but not together.
     """
 
     name: str
@@ -27,6 +27,7 @@ class VehicleKind:
     line: str
     is_real: bool
     can_fly: bool
+    experiments: tuple[str, ...]
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains], Vehicle]
     conflicts: Callable[[Options], tuple[Problem, ...]] = _nothing

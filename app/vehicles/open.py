@@ -12,9 +12,12 @@ from app.vehicles.errors import SafeGainsError
 from app.vehicles.imported import IMPORT
 from app.vehicles.jsbsim.kind import JSBSIM
 from app.vehicles.kinds import VehicleKind
+from app.vehicles.lti import LTI
 from app.vehicles.twin import TWIN
 
-VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType({kind.name: kind for kind in (JSBSIM, TWIN, IMPORT)})
+VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
+    {kind.name: kind for kind in (JSBSIM, TWIN, LTI, IMPORT)}
+)
 
 
 def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:

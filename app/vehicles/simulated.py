@@ -7,11 +7,11 @@ import numpy as np
 
 from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
 from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S, THROTTLE
-from app.core.errors import GainsError, Problem
 from app.core.policy import Gains, shortened
 from app.core.trajectory import Trajectory
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.errors import VehicleError
+from app.vehicles.holding import held
 from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, SET_POINT, TARGET, Integers, Rows
 from app.vehicles.pacing import Pacer
 
@@ -20,6 +20,7 @@ TAKEOFF_ALTITUDE_M: Final = 3.0
 FLIGHT_S: Final = 33.0
 """Recorded after the command: a little more than the 32.6 s that are scored."""
 TELEMETRY_HZ: Final = 50
+_WATCHED: Final = ("altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "battery_v")
 
 _LANDING_RATE_M_S: Final = 0.5
 _LANDING_S: Final = 30.0
@@ -174,34 +175,14 @@ def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: f
 
 def _sample(step: int, row: Rows) -> Sample:
     values = dict(zip(CHANNELS, row.tolist(), strict=True))
-    return Sample(
-        time_s=step * STEP_S,
-        altitude_m=values["altitude_m"],
-        climb_rate_m_s=values["climb_rate_m_s"],
-        set_point_m=values["set_point_m"],
-        reference_m=values["reference_m"],
-        thrust=values["thrust"],
-        battery_v=values["battery_v"],
-    )
+    return Sample(step * STEP_S, {name: values[name] for name in _WATCHED})
 
 
 def _counts(gains: Gains) -> dict[str, float]:
-    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in GAIN_NAMES]
-    problems.extend(
-        Problem(f"gains.{name}", reason) for name in GAIN_NAMES if (reason := _refusal(gains.get(name))) is not None
-    )
-    if problems:
-        raise GainsError(
-            "The vehicle cannot hold these gains.",
-            problems=tuple(problems),
-            hint=f"Send {', '.join(GAIN_NAMES)} as whole numbers of counts.",
-        )
-    return {name: int(gains[name]) for name in GAIN_NAMES}
+    return held(gains, GAIN_NAMES, _refusal, kind=int, numbers="whole numbers of counts")
 
 
-def _refusal(value: float | None) -> str | None:
-    if value is None:
-        return "is missing"
+def _refusal(value: float) -> str | None:
     if not INT32_MIN <= value <= INT32_MAX:
         return f"must be a number that 32 bits hold, got {shortened(value)}"
     return None if value == int(value) else f"must be a whole number of counts, got {value:g}"

@@ -34,7 +34,14 @@ def opened_stubborn(_options: Options, safe_gains: Gains) -> Vehicle:
 
 
 STUBBORN = VehicleKind(
-    name="stubborn", title="Stubborn", line="", is_real=False, can_fly=True, options=(), open=opened_stubborn
+    name="stubborn",
+    title="Stubborn",
+    line="",
+    is_real=False,
+    can_fly=True,
+    experiments=("takeoff",),
+    options=(),
+    open=opened_stubborn,
 )
 
 
@@ -62,13 +69,13 @@ def test_an_unknown_kind_names_the_field_and_the_choices() -> None:
     with pytest.raises(InputError) as refusal:
         get_kind("balloon")
     assert refusal.value.problems[0].field == "vehicle.kind"
-    assert "jsbsim, twin, import" in refusal.value.hint
+    assert "jsbsim, twin, lti, import" in refusal.value.hint
 
 
 def test_options_are_completed_with_their_defaults() -> None:
     options = check_options("twin", {"scatter": 0})
-    assert options == {"scatter": 0.0, "hover_throttle": 0.61, "motor_lag_s": 0.05, "start_latency_s": 0.3,
-                       "drag_1_s": 0.0}  # fmt: skip
+    defaults = {option.name: option.default for option in VEHICLE_KINDS["twin"].options}
+    assert options == defaults | {"scatter": 0.0}
 
 
 @pytest.mark.parametrize(

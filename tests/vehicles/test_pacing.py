@@ -6,7 +6,7 @@ import pytest
 
 from app.vehicles.open import open_vehicle
 from app.vehicles.pacing import LISTEN_EVERY_S, Pacer
-from tests.vehicles.flying import CAN_FLY, SAFE, Watcher, fly, never
+from tests.vehicles.flying import CAN_FLY, PROFILES, Watcher, fly, never
 
 
 def after(questions: int) -> Callable[[], str | None]:
@@ -20,7 +20,7 @@ def after(questions: int) -> Callable[[], str | None]:
 def test_an_abort_does_not_wait_for_the_next_sample_of_a_slow_flight(kind: str, speed: float) -> None:
     """At 0.001 the next sample is 20 s away; at 1e-300 no clock can wait for it."""
     watcher = Watcher()
-    with open_vehicle(kind, {}, safe_gains=SAFE) as vehicle:
+    with open_vehicle(kind, {}, safe_gains=PROFILES[kind].safe) as vehicle:
         record = fly(vehicle, speed=speed, on_sample=watcher.see, should_abort=after(5))
     assert (record.ending, record.reason) == ("aborted", "enough")
     assert len(watcher.samples) == 1

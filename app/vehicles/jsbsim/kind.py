@@ -38,6 +38,7 @@ JSBSIM: Final = VehicleKind(
     line="Six degrees of freedom in JSBSim under the autopilot's own vertical loop, as flown for the paper's Table 1.",
     is_real=False,
     can_fly=True,
+    experiments=("takeoff",),
     options=(
         VehicleOption(
             name="thrust_scale",

@@ -1,0 +1,180 @@
+"""The F-16 of the paper's first experiment: the true linear model under the pitch controller, in simulation."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import numpy as np
+
+from app.core.experiments.pitch_tracking import DETAIL_CHANNELS, OUTPUT, WINDOW_S, PitchTracking, named_channels
+from app.core.plants.f16 import SYSTEM
+from app.core.plants.pitch import (
+    AMPLITUDE_RAD,
+    DETAIL,
+    MEMORY_SIZE,
+    PITCH,
+    RATE_HZ,
+    REFERENCE,
+    STATES,
+    STEP_S,
+    rollout,
+    transitions,
+)
+from app.core.policy import Gains, is_finite, shortened
+from app.core.trajectory import Samples, Trajectory
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Vehicle, VehicleOption
+from app.vehicles.errors import VehicleError
+from app.vehicles.holding import held
+from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.pacing import Pacer
+
+GAIN_NAMES: Final = PitchTracking.space.names
+LOG_NOISE: Final = np.array([3.0, math.radians(0.1), 0.5, math.radians(0.2), math.radians(0.1)])
+"""Standard deviations of the recorded states (ft, rad, ft/s, rad, rad/s) at 50 Hz, with `log_noise` 1."""
+
+_STEPS: Final = round(WINDOW_S * RATE_HZ) + 1
+_RECOVERY_STEPS: Final = 10 * RATE_HZ
+"""After an abort the wings stay level and the pitch returns to trim for ten seconds."""
+
+_NO_BIAS: Final = np.empty((0, STATES))
+_LARGEST_GAIN: Final = float(np.finfo(np.float32).max)
+
+ShouldAbort = Callable[[], str | None]
+
+
+class LinearAircraft:
+    """An aircraft that is a program: it holds the controller's six gains, and each flight starts from trim."""
+
+    kind: Final = "lti"
+    is_real: Final = False
+
+    def __init__(self, safe_gains: Gains, settings: Mapping[str, OptionValue]) -> None:
+        self.safe_gains: Final[Gains] = _numbers(safe_gains)
+        self._settings = dict(settings)
+        self._noise = float(settings["log_noise"]) * LOG_NOISE
+        self._motion = transitions(SYSTEM)
+        self._held: dict[str, float] = dict(self.safe_gains)
+        self._staged = False
+
+    def stage(self, gains: Gains) -> dict[str, float]:
+        """Write every gain and return what the aircraft now holds. Raises GainsError for what is no number of single
+        precision's size; nothing is changed then."""
+        self._held = _numbers(gains)
+        self._staged = True
+        return self.read_gains()
+
+    def read_gains(self) -> dict[str, float]:
+        """What the aircraft holds now."""
+        return dict(self._held)
+
+    def fly(
+        self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: ShouldAbort
+    ) -> FlightRecord:
+        """Track the reference for a minute with the staged gains, holding simulated time back to the order's speed.
+
+        `should_abort` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. An abort sets the
+        safe gains and lets the pitch return to trim for ten seconds, which the record keeps. Once the pitch error has
+        reached 10 rad the state stands still. Raises VehicleError when nothing was staged.
+        """
+        if not self._staged:
+            raise VehicleError(
+                "No gains were staged for this flight, so it was not started.",
+                hint="Stage the gains, compare what is read back, then fly.",
+            )
+        try:
+            memory, detail = np.zeros(MEMORY_SIZE), np.empty((_STEPS + _RECOVERY_STEPS, DETAIL))
+            noise = self._noise * np.random.default_rng(order.seed).standard_normal((len(detail), STATES))
+            flown, reason = self._track(memory, detail, noise, Pacer(order.speed), on_sample, should_abort)
+        finally:
+            self._restore()
+        if reason is not None:
+            ended = flown + (_RECOVERY_STEPS if flown else 1)
+            self._advance(memory, 0.0, detail[flown:ended])
+            detail[flown:ended, :STATES] += noise[flown:ended]
+            flown = ended
+        return FlightRecord(
+            trajectory=_trajectory(detail[:flown]),
+            ending="completed" if reason is None else "aborted",
+            reason=reason or "",
+            settings=self._settings,
+        )
+
+    def close(self) -> None:
+        """Nothing is held open between flights."""
+
+    def _restore(self) -> None:
+        self._held = dict(self.safe_gains)
+        self._staged = False
+
+    def _track(
+        self,
+        memory: Samples,
+        detail: Samples,
+        noise: Samples,
+        pacer: Pacer,
+        on_sample: Callable[[Sample], None],
+        should_abort: ShouldAbort,
+    ) -> tuple[int, str | None]:
+        """Fill `detail` step by step; how many steps were flown, and the reason of an abort or None."""
+        for i in range(_STEPS):
+            if (reason := pacer.wait_until(i * STEP_S, should_abort)) is not None:
+                return i, reason
+            row = detail[i : i + 1]
+            self._advance(memory, AMPLITUDE_RAD, row)
+            row[:, :STATES] += noise[i]
+            on_sample(_sample(i, row))
+        return _STEPS, None
+
+    def _advance(self, memory: Samples, amplitude_rad: float, detail: Samples) -> None:
+        gains = np.array([self._held[name] for name in GAIN_NAMES])
+        rollout(memory, gains, self._motion, amplitude_rad, _NO_BIAS, np.empty(len(detail)), detail)
+
+
+def _channels(detail: Samples) -> dict[str, Samples]:
+    return named_channels(detail[:, REFERENCE] - detail[:, PITCH], detail)
+
+
+def _trajectory(detail: Samples) -> Trajectory:
+    time_s = np.arange(len(detail), dtype=np.float64) * STEP_S
+    return Trajectory(time_s, _channels(detail), LinearAircraft.kind, "simulation")
+
+
+def _sample(step: int, row: Samples) -> Sample:
+    values: list[float] = row[0].tolist()
+    watched = {name: values[column] * unit for name, (column, unit) in DETAIL_CHANNELS.items()}
+    return Sample(step * STEP_S, {OUTPUT: values[REFERENCE] - values[PITCH]} | watched)
+
+
+def _numbers(gains: Gains) -> dict[str, float]:
+    return held(gains, GAIN_NAMES, _refusal, kind=float, numbers="finite numbers")
+
+
+def _refusal(value: float) -> str | None:
+    if not is_finite(value) or abs(value) > _LARGEST_GAIN:
+        return f"must be a finite number that single precision holds, got {shortened(value)}"
+    return None
+
+
+def _open(options: Options, safe_gains: Gains) -> Vehicle:
+    return LinearAircraft(safe_gains, options)
+
+
+LTI: Final = VehicleKind(
+    name="lti",
+    title="F-16, longitudinal",
+    line="The linear F-16 at 15 000 ft and 500 ft/s that stands for the truth in the paper's first experiment.",
+    is_real=False,
+    can_fly=True,
+    experiments=("pitch-tracking",),
+    options=(
+        VehicleOption(
+            name="log_noise",
+            title="Noise of the recorded states, as a multiple of 3 ft, 0.1°, 0.5 ft/s, 0.2°, 0.1 °/s at 50 Hz",
+            unit="×",
+            default=0.0,
+            lower=0.0,
+            upper=10.0,
+        ),
+    ),
+    open=_open,
+)
