@@ -1,3 +1,9 @@
 """Gainline: tune a vehicle's controller gains in a handful of flights."""
 
+import os
+
 __version__ = "0.1.0"
+
+# Before numpy is loaded. Its matrices are small here: with threads they take several times as long, and their last bits
+# depend on how many processors there are.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # noqa: TID251 - no setting of ours

@@ -32,8 +32,12 @@ DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [de
 class Reproducible(StrEnum):
     """What `gainline reproduce` knows."""
 
+    F16 = "f16"
     TABLE1 = "table1"
     TABLE2 = "table2"
+    CONTROLLER = "controller"
+    VARIABILITY = "variability"
+    ALL = "all"
 
 
 def plainly(command: Callable[P, None]) -> Callable[P, None]:
@@ -113,6 +117,12 @@ def run(
     max_flights: Annotated[
         int | None, typer.Option(min=1, max=200, help="Flights at most.", show_default=False)
     ] = None,
+    overrule: Annotated[
+        str,
+        typer.Option(
+            metavar="REASON", show_default=False, help="Fly gains that the gate refuses all the same; say why."
+        ),
+    ] = "",
     json_out: JsonOut = None,
 ) -> None:
     """Fly a whole campaign on a simulation, without the dashboard, and print its table."""
@@ -127,18 +137,27 @@ def run(
         max_flights=max_flights,
         settings=settings or [],
         json_out=json_out,
+        overrule=overrule,
     )
 
 
 @app.command()
 @plainly
 def reproduce(
-    what: Annotated[Reproducible, typer.Argument(help="Which table of the paper.")], json_out: JsonOut = None
+    what: Annotated[Reproducible, typer.Argument(help="Which experiment or table of the paper.")],
+    full: Annotated[
+        bool, typer.Option("--full", help="The long form, where there is one: it takes several minutes.")
+    ] = False,
+    trace: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", show_default=False, help="For controller: another recorded run, .csv or .csv.gz."),
+    ] = None,
+    json_out: JsonOut = None,
 ) -> None:
-    """Fly the gain sets of the paper's tables and print published, measured and their ratio."""
-    from app.commands.reproductions import reproduce_table
+    """Run the paper's experiments here and print measured, published and their ratio."""
+    from app.commands.reproductions import reproduce as run
 
-    reproduce_table(what.value, json_out)
+    run(what.value, full=full, trace=trace, json_out=json_out)
 
 
 @controller.command()

@@ -291,7 +291,7 @@ def _refusal(answer: httpx2.Response) -> RefusedError:
             status=answer.status_code,
             hint="Check that the address is that of a Gainline server of this version.",
         )
-    problems = tuple(Problem(problem.field, problem.reason) for problem in said.problems)
+    problems = tuple(Problem(problem.field, problem.reason, problem.offer) for problem in said.problems)
     return kind(said.detail, hint=said.hint, problems=problems, status=said.status, title=said.title)
 
 

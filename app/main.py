@@ -21,6 +21,7 @@ from app.fleet.router import router as fleet
 from app.jobs.router import router as jobs
 from app.live.link import live_link
 from app.settings import Settings
+from app.studies.router import router as reproductions
 from app.trials.router import records
 from app.trials.router import router as trials
 
@@ -53,7 +54,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.database = database
-    for router in (catalogue.router, campaigns, trials, records, fleet, jobs, figures.router, events.router):
+    own = (catalogue.router, campaigns, trials, records, fleet, jobs, reproductions, figures.router, events.router)
+    for router in own:
         app.include_router(router)
     errors.install(app)
     describe(app)

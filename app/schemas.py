@@ -28,10 +28,12 @@ class Request(BaseModel):
 
 
 class ProblemField(BaseModel):
-    """One refused field, dotted as the caller wrote it, and why it was refused."""
+    """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds values of gains that
+    would pass, by name, where any are known."""
 
     field: str
     reason: str
+    offer: Gains = {}
 
 
 class Problem(BaseModel):
@@ -61,14 +63,26 @@ class Page(BaseModel, Generic[T]):
     next_cursor: str | None
 
 
+class Interval(BaseModel):
+    """Where an error is expected, with probability `confidence`."""
+
+    lower: float
+    upper: float
+    confidence: float
+
+
 class Check(BaseModel):
-    """One check of the gate: its worst number and the limit, where it has them."""
+    """One check of the gate: its worst number and the limit, where it has them, and the gain and the case that gave it.
+    `offer` holds the nearest values of refused gains that would pass."""
 
     name: str
     passed: bool
     sentence: str
     worst: float | None
     limit: float | None
+    gain: str = ""
+    case: str = ""
+    offer: Gains = {}
 
 
 class Gate(BaseModel):

@@ -1,14 +1,15 @@
 """The worker process: it flies, and it computes. One for each database; the web process needs it for both.
 
 Flights and computations run in processes of their own, each watched by a thread of this one, which keeps the books. The
-live socket has a thread of its own too, so that an abort is heard whatever the others do.
+live socket has a thread of its own too, so that an abort is heard whatever the others do. Proposals have the pool to
+themselves; a reproduction, which takes minutes, has a process apart that yields to everything else.
 """
 
 import os
 import platform
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from multiprocessing import parent_process
@@ -18,11 +19,13 @@ from typing import Final
 import structlog
 
 from app import __version__
-from app.campaigns.tasks import ProposalDesk, prepare
+from app.campaigns.proposing import PROPOSAL_JOB
+from app.campaigns.tasks import Proposer, prepare
 from app.data_dir import prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import AlreadyRunningError, StorageError
+from app.jobs.tasks import Desk, recover
 from app.live.address import live_address
 from app.live.messages import WorkerHello
 from app.live.server import LiveServer
@@ -31,11 +34,14 @@ from app.locks import LockedError, exclusive
 from app.observability import configure_logs
 from app.pool import Pool
 from app.settings import Settings
+from app.studies.service import REPRODUCTION_JOB
+from app.studies.tasks import Reproducer
 from app.trials.flying import Airspace
 from app.trials.tasks import FlightDeck
 
 FLIGHTS_AT_ONCE: Final = 8
 SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
+REPRODUCTIONS_AT_ONCE: Final = 1
 LOOK_ANYWAY_S: Final = 1.0
 RETRY_S: Final = 1.0
 
@@ -134,35 +140,49 @@ class Worker:
             stack.callback(deck.close)
             self._until_stored(deck.recover)
             stack.enter_context(live)  # from here on flights can be asked for, which recovery would withdraw
-            computing = stack.enter_context(ThreadPoolExecutor(SPARE_PROCESSORS, thread_name_prefix="job"))
+            threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE
+            computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
-            desk = ProposalDesk(database, pool, worker=self._name, lease_s=self._settings.lease_s)
+            desks = self._desks(database, pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self._ending.ask, "the worker failed; its log says why")
-            self._until_stored(desk.recover)
+            self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid)
             _log.info("worker ready", worker=self._name)
-            self._loop(database, deck, flying, desk, computing)
+            self._loop(database, deck, flying, desks, computing)
             _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trials())
 
+    def _desks(self, database: Database, pool: Pool) -> tuple[Desk, ...]:
+        proposer = Proposer(database, pool, worker=self._name)
+        reproducer = Reproducer(database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event)
+        performed = (
+            (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
+            (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
+        )
+        return tuple(
+            Desk(database, kind, perform, room=room, worker=self._name, lease_s=self._settings.lease_s)
+            for kind, perform, room in performed
+        )
+
     def _loop(
-        self, database: Database, deck: FlightDeck, flying: Executor, desk: ProposalDesk, computing: Executor
+        self, database: Database, deck: FlightDeck, flying: Executor, desks: Sequence[Desk], computing: Executor
     ) -> None:
         with DatabaseWatch(database.file) as watch:
             while not self._ending.event.is_set():
                 try:
-                    self._claim(deck, flying, desk, computing)
+                    self._claim(deck, flying, desks, computing)
                 except StorageError as error:
                     _log.error("no work can be claimed", why=str(error))
                     self._ending.event.wait(RETRY_S)
                 watch.wait(self._ending.event, LOOK_ANYWAY_S)
 
-    def _claim(self, deck: FlightDeck, flying: Executor, desk: ProposalDesk, computing: Executor) -> None:
+    def _claim(self, deck: FlightDeck, flying: Executor, desks: Sequence[Desk], computing: Executor) -> None:
         while len(self._airspace.trials()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:
             flying.submit(deck.carry_out, task)
-        while desk.at_work < SPARE_PROCESSORS and (job := desk.claim()) is not None:
-            computing.submit(desk.carry_out, job)
-        desk.heartbeat()
+        for desk in desks:
+            while (job := desk.claim()) is not None:
+                computing.submit(desk.carry_out, job)
+            desk.heartbeat()
 
     def _until_stored(self, work: Callable[[], None]) -> None:
         while not self._ending.event.is_set():

@@ -78,7 +78,7 @@ def test_refusals_are_raised_with_the_servers_own_words(gainline: Client, databa
     run_jobs(database)
     with pytest.raises(InvalidError) as refused:
         gainline.fly(campaign.id, {"kp": -1, "ki": 13, "kd": 82})
-    assert [problem.field for problem in refused.value.problems] == ["gains.kp"]
+    assert refused.value.problems[0].field == "gains.kp"
     with pytest.raises(ConflictError, match="cannot be flown from here"):
         gainline.fly(campaign.id, {"kp": 283, "ki": 13, "kd": 82})
     with pytest.raises(ConflictError):

@@ -11,6 +11,7 @@ from app.campaigns.files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.core.experiments import EXPERIMENTS
 from app.core.strategies import STRATEGIES
+from app.core.trajectory import CHANNEL_UNITS
 from app.schemas import OptionValue
 from app.vehicles.open import VEHICLE_KINDS
 
@@ -34,50 +35,51 @@ class GainInfo(BaseModel):
     integer: bool
 
 
+class OptionInfo(BaseModel):
+    """A setting of an experiment, a strategy or a vehicle: one of `choices`, or any value of the default's type within
+    `lower` … `upper` where `choices` is empty."""
+
+    name: str
+    title: str
+    unit: str = ""
+    default: OptionValue
+    choices: list[OptionValue] = []
+    lower: float | None = None
+    upper: float | None = None
+
+
 class ExperimentInfo(BaseModel):
     """`output` is the channel that is scored."""
 
     name: str
     title: str
     output: str
+    output_unit: str
     error_unit: str
     gains: list[GainInfo]
-
-
-class StrategyOption(BaseModel):
-    """`choices` is empty when any value of the default's type may be set."""
-
-    name: str
-    title: str
-    default: OptionValue
-    choices: list[OptionValue]
+    options: list[OptionInfo]
 
 
 class StrategyInfo(BaseModel):
+    """`experiments` names those that it works with; empty: with all."""
+
     name: str
     title: str
     line: str
-    options: list[StrategyOption]
-
-
-class VehicleOptionInfo(BaseModel):
-    name: str
-    title: str
-    unit: str
-    default: OptionValue
-    lower: float | None
-    upper: float | None
+    options: list[OptionInfo]
+    experiments: list[str]
 
 
 class VehicleKindInfo(BaseModel):
-    """`can_fly` is false when flights are made elsewhere and uploaded."""
+    """`can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly."""
 
     name: str
     title: str
     line: str
     is_real: bool
     can_fly: bool
-    options: list[VehicleOptionInfo]
+    experiments: list[str]
+    options: list[OptionInfo]
 
 
 class PresetInfo(BaseModel):
@@ -112,8 +114,10 @@ def get_catalogue() -> Catalogue:
                     "name": each.name,
                     "title": each.title,
                     "output": each.output,
+                    "output_unit": CHANNEL_UNITS[each.output],
                     "error_unit": each.error_unit,
                     "gains": each.space.gains,
+                    "options": each.options,
                 }
                 for each in EXPERIMENTS.values()
             ],

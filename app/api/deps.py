@@ -69,8 +69,16 @@ class Once:
         self._key = key
         self._fingerprint = fingerprint
 
-    def __call__(self, answer: type[M], work: Callable[[Session], M]) -> M:
-        """What `work` answers, or what it answered the first time. Raises KeyReusedError for another request."""
+    def __call__(
+        self, answer: type[M], work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None
+    ) -> M:
+        """What `work` answers, or what it answered the first time. Raises KeyReusedError for another request.
+
+        `ahead` reads and computes before the transaction, so that nobody waits for the lock meanwhile.
+        """
+        if ahead is not None:
+            with self._database.read() as session:
+                ahead(session)
         with self._database.write() as session:
             if self._key is None:
                 return work(session)

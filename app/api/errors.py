@@ -116,7 +116,10 @@ def own_error(error: GainlineError) -> Response:
         status,
         error.message,
         error.hint,
-        [ProblemField(field=problem.field, reason=problem.reason) for problem in error.problems],
+        [
+            ProblemField(field=problem.field, reason=problem.reason, offer=dict(problem.offer))
+            for problem in error.problems
+        ],
         title=title,
     )
 

@@ -47,14 +47,15 @@ class FigureCard(BaseModel):
 @router.get("/campaigns/{campaign_id}/figures/{name}")
 def get_campaign_figure(session: Reader, campaign_id: Id, name: FigureName, theme: Theme = "light") -> FigureCard:
     """All takeoffs over the set point, the error of each flight, or the gains of each flight."""
-    return _card(drawing.campaign_figure(session, campaign_id, name, theme))
+    return figure_card(drawing.campaign_figure(session, campaign_id, name, theme))
 
 
 @router.get("/trials/{trial_id}/figure")
 def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> FigureCard:
     """One flight by itself, with its prediction and its commands."""
-    return _card(drawing.flight_figure(session, trial_id, theme))
+    return figure_card(drawing.flight_figure(session, trial_id, theme))
 
 
-def _card(card: Card) -> FigureCard:
+def figure_card(card: Card) -> FigureCard:
+    """The card as it is answered."""
     return FigureCard.model_validate(card, from_attributes=True)

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from typing import Final
 
@@ -15,7 +15,7 @@ from app.core.errors import InputError, Problem
 from app.db.models import CampaignRow, JsonObject
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue
-from app.vehicles.open import check_options
+from app.vehicles.open import VEHICLE_KINDS, check_options
 
 _ADAPTER: Final = TypeAdapter(Definition)
 
@@ -49,13 +49,18 @@ def stored(definition: Definition) -> JsonObject:
 
 def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definition, dict[str, OptionValue]]:
     """Definition and complete vehicle options. Raises InputError naming everything that cannot be used in either."""
+    _require_whole(asked)
     definition = core_definition(asked)
     options: dict[str, OptionValue] = {}
 
     def take_options() -> None:
         options.update(check_options(vehicle.kind, vehicle.options, field="vehicle"))
 
-    problems = [*_refusals(lambda: check_definition(definition), "definition."), *_refusals(take_options, "")]
+    problems = [
+        *_refusals(lambda: check_definition(definition), "definition."),
+        *_refusals(take_options, ""),
+        *_mismatch(definition, vehicle.kind),
+    ]
     if problems:
         raise InputError(
             "This campaign cannot be used.",
@@ -63,6 +68,22 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
             hint="Correct the named fields and send it again; nothing was changed.",
         )
     return definition, options
+
+
+def _require_whole(asked: DefinitionIn) -> None:
+    donor = asked.start.donor
+    if donor is not None and donor.trial_number is None:
+        raise InputError(
+            "This campaign cannot be used.",
+            problems=(Problem("definition.start.donor", "goes with start.kind 'campaign' only"),),
+            hint="Leave the donor out, or start from its campaign.",
+        )
+
+
+def _mismatch(definition: Definition, kind: str) -> Iterator[Problem]:
+    if kind in VEHICLE_KINDS and definition.experiment not in (flies := VEHICLE_KINDS[kind].experiments):
+        yield Problem("definition.experiment", f"{definition.experiment!r} cannot be flown by {kind}")
+        yield Problem("vehicle.kind", f"{kind!r} flies {', '.join(flies)} only")
 
 
 def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Final, Literal, cast
+from typing import Final, Literal, TypedDict, cast
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -10,13 +10,16 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.proposing import is_stale
-from app.core.experiments import get_experiment
+from app.core.experiments import experiment_of, get_experiment
+from app.core.experiments.base import Scatter
+from app.core.statistics import groups_of, pooled, winner_of
+from app.core.strategies.base import band_channels
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.flight import FlightFigure, FlightRecordData
-from app.figures.history import Curve, FlightData, History, NextFlight, Outcome
+from app.figures.history import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
 from app.figures.theme import ThemeName
 from app.trials import history
 from app.trials import service as trials_service
@@ -25,8 +28,17 @@ from app.trials.states import TrialState
 FULL_RECORDS: Final = 30
 """With more flights than this, all but the best and the latest are drawn from their coarse copies."""
 
-_TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude"}
-_INPUTS: Final[Mapping[str, str]] = {"thrust": "Thrust", "feed_forward": "Feed-forward", "feedback": "Feedback"}
+_TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
+_CURVES: Final[Mapping[str, str]] = {"takeoff": "Takeoff curves", "pitch-tracking": "Pitch error curves"}
+_INPUTS: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
+    "takeoff": ("Thrust (of full)", {"thrust": "Thrust", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
+    "pitch-tracking": (
+        "Pitch and elevator (rad)",
+        {"pitch_rad": "Pitch", "pitch_reference_rad": "Pitch reference", "elevator_rad": "Elevator"},
+    ),
+}
+"""What is drawn below the scored output, by experiment: the axis, and the channels with their titles."""
+_CONFIDENCE: Final = 0.9
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
 
@@ -49,7 +61,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool) -> History:
     """The campaign as its figures see it; without `curves` no record is read."""
     campaign = repository.get_one(session, campaign_id)
     definition = definition_of(campaign)
-    experiment = get_experiment(definition.experiment)
+    experiment = experiment_of(definition)
     rows = history.trials_of(session, campaign_id)
     flown = [row for row in rows if row.state in history.FLOWN]
     drawn = _curves(session, flown, experiment.output) if curves else {}
@@ -69,12 +81,41 @@ def history_of(session: Session, campaign_id: int, *, curves: bool) -> History:
                 curve=drawn.get(row.id),
                 error=row.error,
                 predicted_error=row.predicted_error,
+                interval=_interval(row.predicted_interval),
+                glitches=_glitches(row),
             )
             for row in flown
         ),
         proposal=_next_flight(session, campaign, rows, experiment.output),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
+        noise=_noise(rows, experiment.scatter),
+        curves_title=_CURVES.get(experiment.name, "Flight curves"),
     )
+
+
+def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
+    """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight."""
+    groups = groups_of(history.flown_gains(rows))
+    if not groups:
+        return None
+    scatter = pooled(groups, prior)
+    best = winner_of(groups, scatter)
+    half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
+    return Noise(
+        sd=scatter.sigma,
+        repeats=tuple(
+            Repeats(group.numbers, group.mean, group.standard_error(scatter)) for group in groups if group.size > 1
+        ),
+        around_best=Range(best.mean - half, best.mean + half),
+    )
+
+
+def _interval(stored: JsonObject | None) -> Range | None:
+    return None if stored is None else Range(float(stored["lower"]), float(stored["upper"]))
+
+
+def _glitches(row: TrialRow) -> tuple[Range, ...]:
+    return tuple(Range(float(glitch["start_s"]), float(glitch["end_s"])) for glitch in row.glitches or [])
 
 
 def _curves(session: Session, flown: Sequence[TrialRow], output: str) -> dict[int, Curve]:
@@ -124,7 +165,8 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
             number=planned.number,
             gains=planned.gains,
             predicted_error=planned.predicted_error,
-            curve=_predicted(session, planned.proposal_id, output),
+            interval=_interval(planned.predicted_interval),
+            **_predicted(session, _proposal_of(session, planned), output),
         )
     proposal = repository.latest_proposal(session, campaign.id)
     if proposal is None or campaign.outcome is not None or is_stale(campaign, proposal, rows):
@@ -133,15 +175,29 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
         number=max((row.number for row in rows), default=0) + 1,
         gains=proposal.gains,
         predicted_error=proposal.predicted_error,
-        curve=_predicted(session, proposal.id, output),
+        interval=_interval(proposal.interval),
+        **_predicted(session, proposal, output),
     )
 
 
-def _predicted(session: Session, proposal_id: int | None, output: str) -> Curve | None:
-    proposal = None if proposal_id is None else repository.get_proposal_or_none(session, proposal_id)
+class _Predicted(TypedDict):
+    curve: Curve | None
+    band: Band | None
+
+
+def _proposal_of(session: Session, row: TrialRow) -> ProposalRow | None:
+    return None if row.proposal_id is None else repository.get_proposal_or_none(session, row.proposal_id)
+
+
+def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _Predicted:
+    """The predicted curve with its band, as far as there are any."""
     if proposal is None or proposal.predicted_id is None:
-        return None
-    return _curve(history.trajectory_of(session, proposal.predicted_id), output)
+        return {"curve": None, "band": None}
+    predicted = history.trajectory_of(session, proposal.predicted_id)
+    lower, upper = band_channels(output)
+    has_band = lower in predicted.channels and upper in predicted.channels
+    band = Band(lower=_curve(predicted, lower), upper=_curve(predicted, upper)) if has_band else None
+    return {"curve": _curve(predicted, output), "band": band}
 
 
 def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
@@ -152,6 +208,8 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     best = history.best_of(trials)
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
     channels = {} if record is None else record.channels
+    inputs_title, drawn = _INPUTS.get(experiment.name, ("", {}))
+    predicted = _predicted(session, _proposal_of(session, row), experiment.output)
     return FlightRecordData(
         number=row.number,
         output_title=_TITLES.get(experiment.output, experiment.output),
@@ -159,10 +217,13 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         set_point=set_point,
         reference=reference,
         curve=None if record is None else _curve(record, experiment.output),
-        predicted=_predicted(session, row.proposal_id, experiment.output),
+        predicted=predicted["curve"],
+        band=predicted["band"],
+        glitches=_glitches(row),
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,
         inputs={
-            title: _curve(record, name) for name, title in _INPUTS.items() if record is not None and name in channels
+            title: _curve(record, name) for name, title in drawn.items() if record is not None and name in channels
         },
+        inputs_title=inputs_title,
     )

@@ -45,6 +45,9 @@ def read_campaign_file(path: Path) -> CampaignFile:
     except ValidationError as error:
         problems = tuple(_located(document, entry["loc"], entry["msg"]) for entry in error.errors())
         raise _no_campaign(path, problems) from error
+    if file.definition.start.kind == "campaign":
+        reason = "'campaign' needs the database that holds the other one: create it over the API or in the dashboard"
+        raise _no_campaign(path, (_located(document, ("definition", "start", "kind"), reason),))
     try:
         check_campaign(file.definition, file.vehicle)
     except InputError as error:

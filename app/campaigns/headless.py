@@ -5,23 +5,26 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.core.definition import Definition, Flight, flight_seed
-from app.core.errors import GainsError, Problem, TrajectoryError
-from app.core.experiments import get_experiment
+from app.core.errors import InputError, Problem, TrajectoryError
+from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.gate import check_policy
+from app.core.gate import check_policy, require_flyable
+from app.core.glitches import find_glitches
+from app.core.predictions import prediction_of
 from app.core.proposing import next_proposal
-from app.core.stopping import StopVerdict, verdict
-from app.core.strategies.base import Kind, Proposal
+from app.core.stopping import judge
+from app.core.strategies.base import Interval, Kind, Proposal
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.errors import VehicleError
-from app.vehicles.open import open_vehicle
+from app.vehicles.open import get_kind, open_vehicle
 
 Outcome = Literal["valid", "aborted", "invalid"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadlessTrial:
-    """One flown trial; `error` is None unless the flight was complete and could be scored."""
+    """One flown trial; `error` is None unless the flight was complete and could be scored. `overrule_reason` says why
+    it flew although the gate refused its gains."""
 
     number: int
     kind: Kind
@@ -30,6 +33,8 @@ class HeadlessTrial:
     error: float | None
     predicted_error: float | None
     reason: str
+    predicted_interval: Interval | None = None
+    overrule_reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,30 +60,39 @@ class Watcher:
 
 
 def fly_campaign(
-    definition: Definition, vehicle: str, options: Mapping[str, OptionValue], watcher: Watcher
+    definition: Definition,
+    vehicle: str,
+    options: Mapping[str, OptionValue],
+    watcher: Watcher,
+    *,
+    overrule: str = "",
 ) -> HeadlessCampaign:
     """Fly proposals as fast as possible until the campaign's own rule ends it.
 
-    The definition must have been checked. Raises GainsError when the strategy proposes what the gate refuses, and
-    VehicleError when the vehicle cannot fly.
+    `overrule` is the reason why gains that the gate refuses shall fly all the same, on a simulated vehicle. There is
+    nobody here to look at glitches: a flight with any does not count.
+
+    The definition must have been checked. Raises InputError for a warm start, whose donor only a database has,
+    GainsError when the strategy proposes what the gate refuses, and VehicleError when the vehicle cannot fly.
     """
-    experiment = get_experiment(definition.experiment)
+    _require_no_donor(definition)
+    experiment = experiment_of(definition)
     trials: list[HeadlessTrial] = []
     history: list[Flight] = []
     while True:
         number = len(trials) + 1
         proposal = next_proposal(definition, history)
-        judged = _judge(definition, history, proposal)
+        judged = judge(definition, history, proposal)
         if judged.stop:
             return HeadlessCampaign(trials=tuple(trials), stopped_because=judged.why)
         if len(trials) >= definition.stop.max_flights:
             unscored = len(trials) - len(history)
             why = f"All {len(trials)} flights are flown; {unscored} of them could not be scored."
             return HeadlessCampaign(trials=tuple(trials), stopped_because=why)
-        _require_flyable(definition, experiment, proposal, history)
+        overruled = _require_flyable(definition, experiment, proposal, history, overrule, get_kind(vehicle).is_real)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
-        trial = _assess(experiment, number, proposal, record)
+        trial = _assess(experiment, number, proposal, record, overruled)
         trials.append(trial)
         watcher.landed(trial)
         if trial.outcome != "invalid":
@@ -89,26 +103,32 @@ def fly_campaign(
                     trajectory=record.trajectory.as_stored(),
                     error=trial.error,
                     outcome=trial.outcome,
+                    predicted=prediction_of(proposal),
                 )
             )
 
 
-def _judge(definition: Definition, history: Sequence[Flight], proposal: Proposal) -> StopVerdict:
-    return verdict(definition.stop, [flight.error for flight in history], proposal.kind)
+def _require_no_donor(definition: Definition) -> None:
+    if definition.start.donor is not None or definition.start.kind == "campaign":
+        raise InputError(
+            "A campaign that starts from another one cannot be flown without the database that holds the other.",
+            problems=(Problem("definition.start.kind", "'campaign' needs the dashboard or the API"),),
+            hint="Create it in the dashboard, or start from the other's best gains as `given`.",
+        )
 
 
 def _require_flyable(
-    definition: Definition, experiment: Experiment, proposal: Proposal, history: Sequence[Flight]
-) -> None:
+    definition: Definition,
+    experiment: Experiment,
+    proposal: Proposal,
+    history: Sequence[Flight],
+    overrule: str,
+    is_real: bool,
+) -> str:
     space = experiment.space.narrowed(definition.bounds)
-    gate = check_policy(definition, experiment, space, proposal.gains, history)
-    if not gate.passed:
-        failed = tuple(Problem(check.name, check.sentence) for check in gate.checks if not check.passed)
-        raise GainsError(
-            "The proposed gains were refused before flight.",
-            problems=failed,
-            hint="Widen the bounds or the step limit of the campaign, or start from other gains.",
-        )
+    start = proposal.gains if proposal.kind == "start" else None
+    gate = check_policy(definition, experiment, space, proposal.gains, history, start=start, spread=proposal.spread)
+    return require_flyable(gate, overrule=overrule, is_real=is_real)
 
 
 def _fly(
@@ -132,15 +152,20 @@ def _fly(
         return controlled.fly(order, on_sample=watcher.sampled, should_abort=lambda: None)
 
 
-def _assess(experiment: Experiment, number: int, proposal: Proposal, record: FlightRecord) -> HeadlessTrial:
+def _assess(
+    experiment: Experiment, number: int, proposal: Proposal, record: FlightRecord, overrule_reason: str
+) -> HeadlessTrial:
     outcome: Outcome = "aborted" if record.ending == "aborted" else "valid"
     error: float | None = None
     reason = record.reason
     if outcome == "valid":
+        stored = record.trajectory.as_stored()
         try:
-            error = experiment.error(record.trajectory.as_stored())
+            error = experiment.error(stored)
         except TrajectoryError as refused:
             outcome, reason = "invalid", str(refused)
+        if error is not None and (glitches := find_glitches(experiment, stored)):
+            outcome, error, reason = "invalid", None, " ".join(glitch.sentence for glitch in glitches)
     return HeadlessTrial(
         number=number,
         kind=proposal.kind,
@@ -149,4 +174,6 @@ def _assess(experiment: Experiment, number: int, proposal: Proposal, record: Fli
         error=error,
         predicted_error=proposal.predicted_error,
         reason=reason,
+        predicted_interval=proposal.interval,
+        overrule_reason=overrule_reason,
     )

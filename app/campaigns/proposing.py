@@ -3,6 +3,7 @@
 For a worker: `read_history`, then `compute` (pure, in any process), then `store_proposal`.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
@@ -12,12 +13,17 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.states import MOVES, CampaignState, Outcome
+from app.core.advice import Advice, advise
+from app.core.calibration import known
+from app.core.checks import Check
 from app.core.definition import Definition, Flight
-from app.core.experiments import get_experiment
+from app.core.experiments import experiment_of
+from app.core.experiments.base import Experiment
 from app.core.gate import Gate, check_policy
 from app.core.policy import Gains, PolicySpace
 from app.core.proposing import next_proposal
-from app.core.stopping import Reason, StopVerdict, verdict
+from app.core.spread import Spread, before_flight
+from app.core.stopping import Reason, StopVerdict, judge
 from app.core.strategies.base import Proposal
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.errors import ConflictError, NotFoundError
@@ -25,36 +31,46 @@ from app.jobs import service as jobs
 from app.moves import check_move
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
-from app.trials.states import UNFLOWN
+from app.trials.states import UNFLOWN, TrialState
 
 PROPOSAL_JOB: Final = "proposal"
 _COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
 _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "flight budget": Outcome.BUDGET,
     "not improving": Outcome.CONVERGED,
-    "nothing better on the line": Outcome.CONVERGED,
+    "nothing better": Outcome.CONVERGED,
+    "told from noise": Outcome.CONVERGED,
+    "battery low": Outcome.BUDGET,
 }
 _UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no longer say so:"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """All that a proposal is computed from. `digest` changes as soon as any of it does."""
+    """All that a proposal is computed from. `digest` changes as soon as any of it does. `donor` is the flight that a
+    warm start comes from; the definition holds the checksum of its record. `safe_gains` are what an abort would fly,
+    None for the experiment's default gains."""
 
     campaign_id: int
     definition: Definition
     flights: tuple[Flight, ...]
     digest: str
+    donor: Flight | None = None
+    safe_gains: Gains | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Computed:
-    """A proposal with the gate's word on it and the stop rule's."""
+    """A proposal with the gate's word on it, over the `spread` of what is known of the vehicle, the stop rule's, and
+    what is recommended."""
 
     history_digest: str
     proposal: Proposal
     gate: Gate
+    spread: Spread
+    flights: tuple[int, ...]
     stop_verdict: StopVerdict
+    advice: Advice
 
 
 def read_history(session: Session, campaign_id: int) -> History:
@@ -66,20 +82,50 @@ def read_history(session: Session, campaign_id: int) -> History:
         definition=definition,
         flights=history.flights_of(session, campaign_id),
         digest=history.history_digest(definition.digest(), history.trials_of(session, campaign_id)),
+        donor=_donor(session, definition),
+        safe_gains=dict(row.vehicle.safe_gains),
     )
+
+
+def _donor(session: Session, definition: Definition) -> Flight | None:
+    named = definition.start.donor
+    if named is None:
+        return None
+    found = history.donor_of(session, experiment_of(definition), named)
+    if found is None:
+        raise ConflictError(
+            f"The flight that this campaign starts from, {named.trial_number} of campaign {named.campaign_id}, is no "
+            "longer there as it was.",
+            hint="Choose another start, or name the campaign as the donor again.",
+        )
+    return found
 
 
 def compute(past: History) -> Computed:
     """Pure: the same history gives the same answer. Takes up to a second; call it outside of any transaction."""
     definition, flights = past.definition, past.flights
-    proposal = next_proposal(definition, flights)
+    experiment = experiment_of(definition)
+    proposal = next_proposal(definition, flights, past.donor)
+    stop_verdict = judge(definition, flights, proposal)
+    spread = known(experiment, flights) if proposal.spread is None else proposal.spread
+    gate = check_policy(
+        definition,
+        experiment,
+        space_of(definition),
+        proposal.gains,
+        flights,
+        start=proposal.gains if proposal.kind == "start" else None,
+        spread=spread,
+        safe_gains=past.safe_gains,
+    )
     return Computed(
         history_digest=past.digest,
         proposal=proposal,
-        gate=check_policy(
-            definition, get_experiment(definition.experiment), space_of(definition), proposal.gains, flights
-        ),
-        stop_verdict=verdict(definition.stop, [flight.error for flight in flights], proposal.kind),
+        gate=gate,
+        spread=spread,
+        flights=tuple(flight.number for flight in flights if flight.outcome == "valid"),
+        stop_verdict=stop_verdict,
+        advice=advise(definition, experiment, flights, proposal, stop_verdict),
     )
 
 
@@ -102,6 +148,9 @@ def store_proposal(session: Session, campaign_id: int, computed: Computed) -> Pr
         explanation=asdict(proposal.explanation),
         gate=gate_json(computed.gate),
         stop_verdict=asdict(computed.stop_verdict),
+        interval=None if proposal.interval is None else asdict(proposal.interval),
+        advice=asdict(computed.advice),
+        spread={**asdict(computed.spread), "flights": list(computed.flights)},
     )
     session.add(row)
     session.flush()
@@ -141,6 +190,17 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     return row
 
 
+def latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow:
+    """The present proposal. Raises ConflictError while there is none for the present flights."""
+    row = repository.latest_proposal(session, campaign.id)
+    if row is None or is_stale(campaign, row, history.trials_of(session, campaign.id)):
+        raise ConflictError(
+            f"The next gains of campaign {campaign.id} are not computed yet.",
+            hint="Try again in a moment; ask for the campaign's proposal to see when they are there.",
+        )
+    return row
+
+
 def is_stale(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the campaign's history is no longer the one that the proposal was computed from."""
     return row.history_digest != history.history_digest(definition_of(campaign).digest(), trials)
@@ -170,6 +230,25 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
     return latest.gains
 
 
+def stored_spread(session: Session, campaign: CampaignRow, experiment: Experiment) -> Spread:
+    """What was known of the vehicle when the latest proposal was computed: a fit takes too long for a transaction.
+
+    One that further flights have overtaken still serves, it only knows less; one from a flight that no longer counts
+    does not, and before any there is the data sheet.
+    """
+    latest = repository.latest_proposal(session, campaign.id)
+    if latest is None or latest.spread is None:
+        return before_flight(experiment)
+    valid = {row.number for row in history.trials_of(session, campaign.id) if row.state == TrialState.VALID}
+    if not valid.issuperset(latest.spread["flights"]):
+        return before_flight(experiment)
+    return Spread(
+        mean=tuple(latest.spread["mean"]),
+        covariance=tuple(tuple(row) for row in latest.spread["covariance"]),
+        origin=latest.spread["origin"],
+    )
+
+
 def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reason: str) -> None:
     """Finish a campaign; what has not flown is cancelled."""
     move_campaign(campaign, CampaignState.FINISHED)
@@ -185,9 +264,20 @@ def move_campaign(row: CampaignRow, to: CampaignState) -> None:
 
 def space_of(definition: Definition) -> PolicySpace:
     """The gains that a campaign may choose from."""
-    return get_experiment(definition.experiment).space.narrowed(definition.bounds)
+    return experiment_of(definition).space.narrowed(definition.bounds)
 
 
 def gate_json(gate: Gate) -> JsonObject:
-    """The gate's answer as it is stored."""
-    return {"passed": gate.passed, "checks": [asdict(check) for check in gate.checks]}
+    """The gate's answer as it is stored; a number that is none is null there."""
+    checks = [asdict(check) | {"worst": check.worst if math.isfinite(check.worst) else None} for check in gate.checks]
+    return {"passed": gate.passed, "checks": checks}
+
+
+def gate_of(stored: JsonObject) -> Gate:
+    """The gate's answer again."""
+    return Gate(
+        tuple(
+            Check(**check | {"worst": math.inf if check["worst"] is None else check["worst"]})
+            for check in stored["checks"]
+        )
+    )

@@ -6,8 +6,19 @@ from fastapi import APIRouter, Depends, Query, status
 
 from app.api.deps import Act, CursorText, Id, Limit, Reader, Writer, json_only
 from app.campaigns import service
-from app.campaigns.schemas import Campaign, CampaignEdit, CampaignSummary, Clone, Finish, NewCampaign, NextFlight, Sort
+from app.campaigns.schemas import (
+    Campaign,
+    CampaignEdit,
+    CampaignStatistics,
+    CampaignSummary,
+    Clone,
+    Finish,
+    NewCampaign,
+    NextFlight,
+    Sort,
+)
 from app.campaigns.states import CampaignState
+from app.campaigns.statistics import campaign_statistics
 from app.schemas import Page
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
@@ -71,6 +82,12 @@ def archive_campaign(act: Act, campaign_id: Id) -> Campaign:
 def clone_campaign(act: Act, campaign_id: Id, body: Clone | None = None) -> Campaign:
     """A new campaign with the same definition, linked to this one."""
     return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
+
+
+@router.get("/{campaign_id}/statistics")
+def get_statistics(session: Reader, campaign_id: Id) -> CampaignStatistics:
+    """What the flights say about the gains: repeats, scatter, better or worse, drift, and how well predictions held."""
+    return campaign_statistics(session, campaign_id)
 
 
 @router.get("/{campaign_id}/proposal")

@@ -2,17 +2,20 @@
 
 from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, Field
 
 from app.campaigns.states import CampaignState, Outcome
+from app.core.advice import AdviceKind
+from app.core.statistics import Word
 from app.core.strategies.base import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
-from app.schemas import Gains, Gate, Name, Number, OptionValue, Request, Text, Trouble, Version
+from app.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Request, Text, Trouble, Version
 
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
 Key = Annotated[str, Field(max_length=40)]
+VERDICT: Final = "the best gains against the first flight's; null while they are the same, or nothing has flown"
 
 
 class Sort(StrEnum):
@@ -25,36 +28,54 @@ class Sort(StrEnum):
     BEST_ERROR = "error"
 
 
-class Start(Request):
-    """Where the first flight's gains come from; `gains` only with kind `given`."""
+class Donor(Request):
+    """The flight of another campaign that a warm start comes from, with the checksum of its record. Without a trial
+    number it is the best valid one; the checksum is filled in."""
 
-    kind: Literal["default", "simplex", "given"] = "default"
+    campaign_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)]
+    trial_number: Annotated[int, Field(ge=1, le=2**31, strict=True)] | None = None
+    checksum: Annotated[str, Field(max_length=64)] = ""
+
+
+class Start(Request):
+    """Where the first flight's gains come from; `gains` with kind `given`, `donor` with `campaign`, whose gains are
+    filled in."""
+
+    kind: Literal["default", "simplex", "given", "campaign"] = "default"
     gains: dict[str, Number] | None = None
+    donor: Donor | None = None
 
 
 class StopRule(Request):
     """`paper`: two flights in a row without `improvement` (a share of the best) on the best so far, or the budget;
-    `budget`: only the number of flights ends the campaign."""
+    `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
+    the baseline; `budget`: only the number of flights ends the campaign. With every kind a flight that ends below
+    `min_battery_v` ends it."""
 
-    kind: Literal["paper", "budget"] = "paper"
+    kind: Literal["paper", "noise", "budget"] = "paper"
     max_flights: Annotated[int, Field(strict=True, ge=1, le=200)] = 7
     improvement: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.5)] = 0.05
+    confidence: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.5, lt=1)] = 0.9
+    min_battery_v: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)] | None = None
 
 
 class Definition(Request):
     """Everything that a proposal depends on, beside the flights. Frozen at the first flight.
 
     `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change as shares of
-    its range, before and after the first valid flight.
+    its range, before and after the first valid flight; `ceiling_m` is the highest altitude that the gate lets a model
+    run reach.
     """
 
     experiment: Key = "takeoff"
+    experiment_options: dict[str, OptionValue] = Field(default_factory=dict)
     strategy: Key = "gradient"
     options: dict[str, OptionValue] = Field(default_factory=dict)
     start: Start = Field(default_factory=Start)
     bounds: dict[str, tuple[Number, Number]] = Field(default_factory=dict)
     first_step_fraction: Fraction = 0.25
     step_fraction: Fraction = 1.0
+    ceiling_m: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)] = 4.5
     stop: StopRule = Field(default_factory=StopRule)
     seed: Annotated[int, Field(strict=True, ge=0, le=2**53 - 1)] = 1
 
@@ -77,10 +98,12 @@ class CampaignEdit(Request):
 
 
 class Clone(Request):
-    """A new campaign with the same definition, perhaps on another vehicle, linked to this one."""
+    """A new campaign with the same definition, perhaps on another vehicle, linked to this one. With `warm_start` it
+    starts from this one's best flight."""
 
     name: Name | None = None
     vehicle: VehicleChoice | None = None
+    warm_start: bool = False
 
 
 class Finish(Request):
@@ -90,12 +113,16 @@ class Finish(Request):
 
 
 class BestTrial(BaseModel):
-    """The valid trial with the lowest error."""
+    """The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
+    from the scatter pooled over the campaign."""
 
     trial_id: int
     trial_number: int
     error: float
     gains: Gains
+    mean: float
+    standard_error: float
+    flights: int
 
 
 class FlyingTrial(BaseModel):
@@ -132,6 +159,7 @@ class Campaign(BaseModel):
     vehicle: CampaignVehicle
     parent_id: int | None
     best: BestTrial | None
+    verdict: Annotated[Word | None, Field(description=VERDICT)]
     trials: TrialCounts
     flying: FlyingTrial | None
     next_action: str
@@ -162,6 +190,7 @@ class CampaignSummary(BaseModel):
     flights: int
     best: BestTrial | None
     first_error: float | None
+    verdict: Annotated[Word | None, Field(description=VERDICT)]
     next_action: str
     spark: list[SparkCurve]
     updated_at: datetime
@@ -184,16 +213,28 @@ class StopVerdict(BaseModel):
     threshold: Annotated[float | None, Field(description="error that the next flight has to beat to count as better")]
 
 
+class Advice(BaseModel):
+    """The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
+    first flight, or its gains once more."""
+
+    kind: AdviceKind
+    gains: Gains
+    why: str
+
+
 class Proposal(BaseModel):
-    """The next gain set, from one history. Stale as soon as that history has changed."""
+    """The next gain set, from one history. Stale as soon as that history has changed. `recommended` is the advice's
+    kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so."""
 
     id: int
     campaign_id: int
     kind: Kind
-    recommended: Literal["step", "repeat", "baseline", "stop"]
+    recommended: AdviceKind
+    advice: Advice
     gains: Gains
     changes: dict[str, GainChange]
     predicted_error: float | None
+    interval: Interval | None
     explanation: Explanation
     gate: Gate
     stop_verdict: StopVerdict
@@ -208,3 +249,87 @@ class NextFlight(BaseModel):
     state: Literal["computing", "ready", "failed", "none"]
     proposal: Proposal | None
     problem: Trouble | None
+
+
+class RepeatGroup(BaseModel):
+    """The valid flights of one gain set."""
+
+    gains: Gains
+    trial_numbers: list[int]
+    errors: list[float]
+    mean: float
+    standard_error: Annotated[float, Field(description="from the pooled scatter")]
+    is_baseline: bool
+    is_best: bool
+
+
+class FlightsToDecide(BaseModel):
+    """Further flights after which a difference that stays as it is would be decided."""
+
+    best: int
+    baseline: int
+
+
+class Comparison(BaseModel):
+    """The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
+    direction, with the allowance for having chosen the best among several."""
+
+    verdict: Word
+    confidence: float
+    difference: float
+    standard_error: float
+    further: FlightsToDecide | None
+    sentence: str
+
+
+class Drift(BaseModel):
+    """The first gains' last flight against their first: `confidence` that anything has changed."""
+
+    first_trial: int
+    last_trial: int
+    difference: float
+    standard_error: float
+    confidence: float
+    sentence: str
+
+
+class Trend(BaseModel):
+    """Slope of the error of the gains flown most, with its interval, 90 %."""
+
+    against: Literal["flight number", "battery voltage"]
+    unit: str
+    slope: float
+    lower: float
+    upper: float
+    sentence: str
+
+
+class TrackRecord(BaseModel):
+    """How well the predictions held."""
+
+    inside: int
+    of: int
+    share: float | None
+    agreeing: int
+    disagreeing: int
+    trustworthy: bool
+    sentence: str
+
+
+class CampaignStatistics(BaseModel):
+    """What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
+    repeats and the experiment's prior; `optimism` by how much the best is expected to look better than it is, for
+    having been chosen, and `shrunk_error` its error without that."""
+
+    error_unit: str
+    confidence: float
+    sigma: float
+    degrees_of_freedom: float
+    groups: list[RepeatGroup]
+    comparison: Comparison | None
+    drift: Drift | None
+    trends: list[Trend]
+    optimism: float
+    shrunk_error: float | None
+    track_record: TrackRecord
+    notes: list[str]

@@ -6,6 +6,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.definitions import check_campaign, frozen_digest, stored
+from app.campaigns.donors import with_donor
 from app.campaigns.proposing import cancel_outdated, end_campaign, move_campaign, request_proposal
 from app.campaigns.schemas import (
     Campaign,
@@ -13,9 +14,11 @@ from app.campaigns.schemas import (
     CampaignSummary,
     Clone,
     Definition,
+    Donor,
     NewCampaign,
     NextFlight,
     Sort,
+    Start,
 )
 from app.campaigns.states import ACTIONS, CampaignState, Outcome
 from app.campaigns.views import campaign_view, next_flight_view, summaries
@@ -68,11 +71,14 @@ def create_campaign(session: Session, new: NewCampaign) -> Campaign:
 
 
 def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
-    """A new draft with the same definition, linked to its origin."""
+    """A new draft with the same definition, linked to its origin, with a warm start from the origin's best flight."""
     origin = repository.get_one(session, campaign_id)
     vehicle = clone.vehicle or VehicleChoice(kind=origin.vehicle.kind, options=origin.vehicle_options)
     name = clone.name or f"{origin.name[:110]} (again)"
-    row = _add(session, name, Definition.model_validate(origin.definition), vehicle, parent_id=origin.id)
+    definition = Definition.model_validate(origin.definition)
+    if clone.warm_start:
+        definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})
+    row = _add(session, name, definition, vehicle, parent_id=origin.id)
     return campaign_view(session, row)
 
 
@@ -176,7 +182,7 @@ def history_changed(session: Session, row: CampaignRow) -> None:
 def _add(
     session: Session, name: str, asked: Definition, choice: VehicleChoice, *, parent_id: int | None
 ) -> CampaignRow:
-    definition, options = check_campaign(asked, choice)
+    definition, options = check_campaign(with_donor(session, asked), choice)
     space = get_experiment(definition.experiment).space
     vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
     row = CampaignRow(
@@ -200,7 +206,7 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     _require_no_flight(session, row)
     asked = edit.definition or Definition.model_validate(row.definition)
     choice = edit.vehicle or VehicleChoice(kind=row.vehicle.kind, options=row.vehicle_options)
-    definition, options = check_campaign(asked, choice)
+    definition, options = check_campaign(with_donor(session, asked), choice)
     space = get_experiment(definition.experiment).space
     row.vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
     row.experiment, row.strategy = definition.experiment, definition.strategy

@@ -2,7 +2,7 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Final, Literal
+from typing import Final
 
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.proposing import PROPOSAL_JOB, is_stale
 from app.campaigns.schemas import (
-    BestTrial,
+    Advice,
     Campaign,
     CampaignSummary,
     Definition,
@@ -23,13 +23,16 @@ from app.campaigns.schemas import (
     TrialCounts,
 )
 from app.campaigns.states import ACTIONS, CampaignState
+from app.campaigns.statistics import best_trial, standing_of
+from app.core.confirming import Standing
+from app.core.statistics import Word
 from app.core.strategies.base import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs
 from app.jobs.states import JobState
 from app.moves import allowed
-from app.schemas import Gate, Trouble
+from app.schemas import Gate, Interval, Trouble
 from app.trials import history
 from app.trials.states import TrialState
 
@@ -48,6 +51,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     session.flush()
     trials = history.trials_of(session, row.id)
     flight = history.flight_under_way(session, row.id)
+    now = standing_of(row, trials)
     return Campaign(
         id=row.id,
         version=row.version,
@@ -59,7 +63,8 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         definition_digest=row.definition_digest,
         vehicle=fleet.campaign_vehicle(row),
         parent_id=row.parent_id,
-        best=_best(trials),
+        best=best_trial(trials, now),
+        verdict=_word(now),
         trials=_counts(trials),
         flying=_flying(flight, trials),
         next_action=_next_action(row, trials),
@@ -79,6 +84,7 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
 
 def _summary(row: CampaignRow, trials: Sequence[TrialRow]) -> CampaignSummary:
     valid = [trial for trial in trials if trial.state == TrialState.VALID]
+    now = standing_of(row, trials)
     return CampaignSummary(
         id=row.id,
         name=row.name,
@@ -88,8 +94,9 @@ def _summary(row: CampaignRow, trials: Sequence[TrialRow]) -> CampaignSummary:
         experiment=row.experiment,
         strategy=row.strategy,
         flights=_counts(trials).flown,
-        best=_best(trials),
+        best=best_trial(trials, now),
         first_error=valid[0].error if valid else None,
+        verdict=_word(now),
         next_action=_next_action(row, trials),
         spark=_sparks(trials),
         updated_at=row.updated_at,
@@ -138,14 +145,17 @@ def proposal_view(campaign: CampaignRow, row: ProposalRow, trials: Sequence[Tria
     verdict = StopVerdict(
         stop=said["stop"], reason=said["reason"] or "", sentence=said["why"], threshold=said["threshold"]
     )
+    advice = _advice(row, verdict)
     return Proposal(
         id=row.id,
         campaign_id=row.campaign_id,
         kind=row.kind,
-        recommended=_recommended(row.kind, verdict),
+        recommended=advice.kind,
+        advice=advice,
         gains=row.gains,
         changes=_changes(now, row.gains),
         predicted_error=row.predicted_error,
+        interval=None if row.interval is None else Interval.model_validate(row.interval),
         explanation=_explanation(row),
         gate=Gate.model_validate(row.gate),
         stop_verdict=verdict,
@@ -159,12 +169,11 @@ def _explanation(row: ProposalRow) -> Explanation:
     return _EXPLANATION.validate_python(row.explanation)
 
 
-def _recommended(kind: str, verdict: StopVerdict) -> Literal["step", "repeat", "baseline", "stop"]:
-    if verdict.stop:
-        return "stop"
-    if kind == "start":
-        return "baseline"
-    return "repeat" if kind == "none" else "step"
+def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
+    """As stored; rows of releases without advice have the stop rule's word and the proposal."""
+    if row.advice is not None:
+        return Advice.model_validate(row.advice)
+    return Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
 
 
 def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[str, GainChange]:
@@ -174,11 +183,8 @@ def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[s
     }
 
 
-def _best(trials: Sequence[TrialRow]) -> BestTrial | None:
-    best = history.best_of(trials)
-    if best is None or best.error is None:
-        return None
-    return BestTrial(trial_id=best.id, trial_number=best.number, error=best.error, gains=best.gains)
+def _word(now: Standing | None) -> Word | None:
+    return None if now is None or now.comparison is None else now.comparison.verdict
 
 
 def _counts(trials: Sequence[TrialRow]) -> TrialCounts:

@@ -14,9 +14,10 @@ from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly
 from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
 from app.core.definition import Definition
-from app.core.experiments import get_experiment
+from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.strategies.base import Proposal
+from app.core.trajectory import CHANNEL_UNITS
 from app.errors import InputError, Problem
 from app.vehicles.base import OptionValue, Sample
 from app.vehicles.open import get_kind
@@ -32,6 +33,7 @@ def run_campaign(
     max_flights: int | None,
     settings: Sequence[str],
     json_out: Path | None,
+    overrule: str = "",
 ) -> None:
     """Fly the campaign of a preset or file and print its table. Raises InputError for what cannot be flown."""
     file = override(
@@ -45,10 +47,10 @@ def run_campaign(
     )
     definition, options = check_campaign(file.definition, file.vehicle)
     _require_wings(file)
-    experiment = get_experiment(definition.experiment)
+    experiment = experiment_of(definition)
     out = console(json_out)
     with _Display(definition, experiment) as display:
-        campaign = fly_campaign(definition, file.vehicle.kind, options, display.watcher)
+        campaign = fly_campaign(definition, file.vehicle.kind, options, display.watcher, overrule=overrule)
     _print(out, file, experiment, campaign)
     write_json(json_out, _document(file, definition, options, campaign))
 
@@ -63,7 +65,7 @@ def _require_wings(file: CampaignFile) -> None:
         raise InputError(
             f"{kind.title} cannot be flown from the command line.",
             problems=(Problem("vehicle.kind", f"{kind.name} is not a simulation"),),
-            hint="Choose --vehicle jsbsim or --vehicle twin, or use the dashboard.",
+            hint="Choose a simulation (--vehicle jsbsim, twin or lti), or use the dashboard.",
         )
 
 
@@ -82,6 +84,7 @@ class _Display:
         self._task = self._progress.add_task("computing the first gains", total=float(experiment.grid_s[-1]), note="")
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
+        self._output, self._output_unit = experiment.output, CHANNEL_UNITS[experiment.output]
         self.watcher = Watcher(proposed=self._proposed, sampled=self._sampled, landed=self._landed)
 
     def __enter__(self) -> "_Display":
@@ -102,7 +105,9 @@ class _Display:
         )
 
     def _sampled(self, sample: Sample) -> None:
-        self._progress.update(self._task, completed=sample.time_s, note=f"{sample.altitude_m:.2f} m")
+        self._progress.update(
+            self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}"
+        )
 
     def _landed(self, trial: HeadlessTrial) -> None:
         self._progress.console.print(
@@ -132,6 +137,8 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: H
         for trial in campaign.trials
     ]
     out.print(table(("run #", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
+    if overruled := [str(trial.number) for trial in campaign.trials if trial.overrule_reason]:
+        out.print(f"Refused by the gate, and flown all the same: flight {', '.join(overruled)}.")
     out.print(f"Stopped: {campaign.stopped_because}")
     if best is not None:
         out.print(f"Best: {_error(best.error, unit)} with {_gains(best.gains)}, flight {best.number}.")

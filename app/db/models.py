@@ -54,6 +54,7 @@ class Base(DeclarativeBase):
         OptionsJson: _JSON,
         list[str]: _JSON,
         list[list[float]]: _JSON,
+        list[JsonObject]: _JSON,
     }
 
 
@@ -149,8 +150,9 @@ class TrajectoryRow(Base):
 
 
 class TrialRow(Base, Reported):
-    """One flight of one policy. `curve` is the scored output in a few [time_s, value] pairs, for small plots; `ending`
-    says how the record ends, whatever the trial is classed as."""
+    """One flight of one policy. `predicted_interval` is the proposal's own, copied; `repaired_error` what the flight
+    would score without its `glitches`; `curve` the scored output in a few [time_s, value] pairs, for small plots;
+    `ending` says how the record ends, whatever the trial is classed as."""
 
     __tablename__ = "trial"
     __table_args__ = (
@@ -180,6 +182,11 @@ class TrialRow(Base, Reported):
     settings: Mapped[OptionsJson] = mapped_column(default=dict)
     reason: Mapped[str] = mapped_column(default="")
     note: Mapped[str] = mapped_column(default="")
+    predicted_interval: Mapped[JsonObject | None]
+    overrule_reason: Mapped[str] = mapped_column(default="", server_default="")
+    glitches: Mapped[list[JsonObject] | None]
+    repaired_error: Mapped[float | None]
+    landing_battery_v: Mapped[float | None]
     seed: Mapped[int]
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     flown_at: Mapped[datetime | None]
@@ -249,6 +256,9 @@ class ProposalRow(Base, Reported):
     explanation: Mapped[JsonObject]
     gate: Mapped[JsonObject]
     stop_verdict: Mapped[JsonObject]
+    interval: Mapped[JsonObject | None]
+    advice: Mapped[JsonObject | None]
+    spread: Mapped[JsonObject | None]
     computed_at: Mapped[datetime] = mapped_column(default=utc_now)
 
     predicted: Mapped[TrajectoryRow | None] = relationship()
@@ -258,7 +268,8 @@ class ProposalRow(Base, Reported):
 
 
 class JobRow(Base, Reported):
-    """Numeric work in waiting, running or done. `lease_until` passes when its worker falls silent."""
+    """Numeric work in waiting, running or done: `order` says what exactly, `done_share` (0 … 1) and `doing` how far it
+    is, `result` what came of it, read only when asked for. `lease_until` passes when its worker falls silent."""
 
     __tablename__ = "job"
     __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"), _NEVER_REUSE_IDS)
@@ -268,6 +279,10 @@ class JobRow(Base, Reported):
     state: Mapped[JobState] = mapped_column(_state_type(JobState))
     campaign_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
     problem: Mapped[JsonObject | None]
+    order: Mapped[JsonObject | None]
+    done_share: Mapped[float | None]
+    doing: Mapped[str] = mapped_column(default="", server_default="")
+    result: Mapped[JsonObject | None] = mapped_column(deferred=True)
     attempts: Mapped[int] = mapped_column(default=0)
     worker: Mapped[str | None]
     lease_until: Mapped[datetime | None]

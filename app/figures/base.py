@@ -52,7 +52,9 @@ class Figure(Protocol):
     """One figure over plain data; it never reads anything else."""
 
     name: ClassVar[str]
-    title: ClassVar[str]
+
+    @property
+    def title(self) -> str: ...
 
     def not_ready(self) -> str | None:
         """Why there is nothing to draw yet, or None."""

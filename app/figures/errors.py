@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from app.figures import theme
-from app.figures.base import Card, Column, Table, plotly_json
-from app.figures.history import FlightData, History
-from app.figures.scale import robust_range
+from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.history import FlightData, History, Range, last_number
+from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 FEW: Final = 8
@@ -17,7 +17,12 @@ FOOT: Final = 0.05
 
 @dataclass(frozen=True, slots=True)
 class ErrorsFigure:
-    """Table columns: `flight`, `outcome`, `error`, `predicted_error`, `best_so_far`."""
+    """Table columns: `flight`, `outcome`, `error`, `standard_error` (of one flight, where the noise is known),
+    `predicted_error`, `predicted_low`, `predicted_high`, `best_so_far`; the proposal is the last row.
+
+    Every trace carries `meta.role`: noise (around the best), best so far, threshold, interval, predicted, repeats,
+    measured, not counted, off scale.
+    """
 
     history: History
     theme: ThemeName = "light"
@@ -35,25 +40,19 @@ class ErrorsFigure:
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history
+        last, span = last_number(history), self._span()
         traces = [
+            *self._noise(palette, last),
             self._best_so_far(palette),
-            *self._threshold(palette),
+            *self._threshold(palette, last),
+            *self._intervals(palette, span.high),
             *self._predicted(palette),
+            *self._repeats(palette),
             *self._measured(palette),
+            *self._not_counted(palette, FOOT * span.high),
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
-        must = [flight.error for flight in history.valid[:1] if flight.error is not None]
-        span = robust_range(
-            [flight.error or 0.0 for flight in scored],
-            low=0.0,
-            high=max(must, default=min(flight.error or 0.0 for flight in scored)),
-        )
-        traces += self._not_counted(palette, FOOT * span.high)
         traces += [_off_scale(palette, scored[index], span.high, history.error_unit) for index in span.outside]
-        last = max(
-            [flight.number for flight in history.flights]
-            + ([history.proposal.number] if history.proposal is not None else [])
-        )
         layout = theme.layout(
             palette,
             xaxis=theme.titled(
@@ -72,6 +71,15 @@ class ErrorsFigure:
             table=self._table(),
         )
 
+    def _span(self) -> RobustRange:
+        """Up to the first flight's error and every other one that is no outlier; and up to the next one's interval."""
+        errors = [flight.error for flight in self.history.flights if flight.error is not None]
+        first = [flight.error for flight in self.history.valid[:1] if flight.error is not None]
+        proposal = self.history.proposal
+        expected = [] if proposal is None or proposal.interval is None else [proposal.interval.high]
+        high = max(first, default=min(errors))
+        return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 1.5 * high)]))
+
     def _measured(self, palette: Palette) -> list[dict[str, object]]:
         flights, best = self.history.valid, self.history.best
         if not flights:
@@ -85,15 +93,114 @@ class ErrorsFigure:
                 "x": [flight.number for flight in flights],
                 "y": [_rounded(flight.error) for flight in flights],
                 "cliponaxis": False,
+                **self._error_bars(palette),
                 "marker": theme.solid(
                     colours,
                     size=[13 if flight is best else 8 for flight in flights],
                     symbol=["star" if flight is best else "circle" for flight in flights],
                 ),
                 "meta": {"role": "measured"},
-                "hovertemplate": f"<b>Flight %{{x}}</b><br>error {self._reading}<extra></extra>",
+                "hovertemplate": f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
             }
         ]
+
+    @property
+    def _scatter(self) -> str:
+        noise = self.history.noise
+        return "" if noise is None else f" ± {noise.sd:.4f}"
+
+    def _error_bars(self, palette: Palette) -> dict[str, object]:
+        """One standard error of a single flight, up and down."""
+        noise = self.history.noise
+        if noise is None:
+            return {}
+        bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
+        return {"error_y": bar}
+
+    def _noise(self, palette: Palette, last: int) -> list[dict[str, object]]:
+        """Where another flight of the best gains would land: what falls in here is no news."""
+        noise = self.history.noise
+        if noise is None or noise.around_best is None:
+            return []
+        low, high = round(max(0.0, noise.around_best.low), 6), round(noise.around_best.high, 6)
+        right = last + 0.95
+        return [
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": "Noise of the best",
+                "x": [0.5, right, right, 0.5, 0.5],
+                "y": [low, low, high, high, low],
+                "line": theme.line(theme.faint(palette.best, 0.3), 0.75),
+                "fill": "toself",
+                "fillcolor": theme.faint(palette.best, 0.12),
+                "meta": {"role": "noise"},
+                "hoverinfo": "skip",
+            }
+        ]
+
+    def _repeats(self, palette: Palette) -> list[dict[str, object]]:
+        """The mean of flights with the same gains, with its standard error, over those flights."""
+        repeats = () if self.history.noise is None else self.history.noise.repeats
+        if not repeats:
+            return []
+        unit = self.history.error_unit
+        return [
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "Mean of repeats",
+                "x": [max(group.numbers) + 0.22 for group in repeats],
+                "y": [round(group.mean, 6) for group in repeats],
+                "text": [
+                    f"Flights {', '.join(map(str, group.numbers))}<br>"
+                    f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit}"
+                    for group in repeats
+                ],
+                "error_y": {
+                    "type": "data",
+                    "array": [round(group.standard_error, 6) for group in repeats],
+                    "color": palette.best,
+                    "thickness": 3,
+                    "width": 0,
+                },
+                "marker": theme.solid(palette.best, size=9, symbol="square"),
+                "meta": {"role": "repeats"},
+                "cliponaxis": False,
+                "hovertemplate": "<b>%{text}</b><extra></extra>",
+            }
+        ]
+
+    def _intervals(self, palette: Palette, top: float) -> list[dict[str, object]]:
+        """Where each flight's error was expected, and the next one's: a bar behind its diamond, cut at the edge."""
+        known = self._expected()
+        if not known:
+            return []
+        unit, x, y, text = self.history.error_unit, [], [], []
+        for number, interval in known:
+            x += [number, number, None]
+            y += [round(max(0.0, interval.low), 6), round(min(1.08 * top, interval.high), 6), None]
+            text += 3 * [f"expected {interval.low:.4f} … {interval.high:.4f} {unit}"]
+        return [
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": "90 % interval",
+                "x": x,
+                "y": y,
+                "text": text,
+                "line": theme.line(theme.faint(palette.prediction, 0.4), 8),
+                "connectgaps": False,
+                "meta": {"role": "interval"},
+                "hovertemplate": "<b>Flight %{x}</b><br>%{text}<extra></extra>",
+            }
+        ]
+
+    def _expected(self) -> list[tuple[int, Range]]:
+        pairs = [(flight.number, flight.interval) for flight in self.history.flights]
+        if self.history.proposal is not None:
+            pairs.append((self.history.proposal.number, self.history.proposal.interval))
+        return [(number, interval) for number, interval in pairs if interval is not None]
 
     def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
         """The error beside each mark, clear of the steps; with many flights above the best only."""
@@ -147,19 +254,18 @@ class ErrorsFigure:
             "hoverinfo": "skip",
         }
 
-    def _threshold(self, palette: Palette) -> list[dict[str, object]]:
+    def _threshold(self, palette: Palette, last: int) -> list[dict[str, object]]:
         """What a further flight must get below for the stop rule to call it progress."""
         best, improvement = self.history.best, self.history.stop_improvement
         if best is None or best.error is None or improvement is None:
             return []
         value = round(best.error * (1 - improvement), 6)
-        last = max(flight.number for flight in self.history.flights)
         return [
             {
                 "type": "scatter",
                 "mode": "lines",
                 "name": f"To beat: {value:.3f}",
-                "x": [0.5, last + 1.95],
+                "x": [0.5, last + 0.95],
                 "y": [value, value],
                 "line": theme.line(palette.dim, 1.25, "dot"),
                 "meta": {"role": "threshold"},
@@ -181,7 +287,7 @@ class ErrorsFigure:
                 "name": "Predicted",
                 "x": [number for number, _ in known],
                 "y": [value for _, value in known],
-                "marker": {"size": 17, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
+                "marker": {"size": 13, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
                 "meta": {"role": "predicted"},
                 "cliponaxis": False,
                 "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>{self._reading}<extra></extra>",
@@ -198,20 +304,36 @@ class ErrorsFigure:
         return f"Best error {best.error:.3f} {self.history.error_unit} in flight {best.number}{share}."
 
     def _table(self) -> Table:
-        unit = self.history.error_unit
+        unit, noise, proposal = self.history.error_unit, self.history.noise, self.history.proposal
         running = dict(zip((flight.number for flight in self.history.valid), best_so_far(self.history), strict=True))
+        rows: list[tuple[Cell, ...]] = [
+            (
+                flight.number,
+                flight.outcome,
+                flight.error,
+                None if noise is None or flight.error is None else round(noise.sd, 6),
+                flight.predicted_error,
+                *_ends(flight.interval),
+                running.get(flight.number),
+            )
+            for flight in self.history.flights
+        ]
+        if proposal is not None and proposal.predicted_error is not None:
+            rows.append(
+                (proposal.number, "next", None, None, proposal.predicted_error, *_ends(proposal.interval), None)
+            )
         return Table(
             (
                 Column("flight", "Flight", digits=0),
                 Column("outcome", "Outcome"),
                 Column("error", "Error", unit, 4),
+                Column("standard_error", "±", unit, 4),
                 Column("predicted_error", "Predicted", unit, 4),
+                Column("predicted_low", "At least, 90 %", unit, 4),
+                Column("predicted_high", "At most, 90 %", unit, 4),
                 Column("best_so_far", "Best so far", unit, 4),
             ),
-            tuple(
-                (flight.number, flight.outcome, flight.error, flight.predicted_error, running.get(flight.number))
-                for flight in self.history.flights
-            ),
+            tuple(rows),
         )
 
 
@@ -222,6 +344,10 @@ def best_so_far(history: History) -> list[float]:
         assert flight.error is not None
         running.append(min([flight.error, *running[-1:]]))
     return running
+
+
+def _ends(interval: Range | None) -> tuple[float | None, float | None]:
+    return (None, None) if interval is None else (interval.low, interval.high)
 
 
 def _rounded(value: float | None) -> float | None:

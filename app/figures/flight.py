@@ -8,8 +8,9 @@ import numpy as np
 
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
-from app.figures.history import Curve
-from app.figures.scale import robust_range, thinned
+from app.figures.history import Band, Curve, Range
+from app.figures.marks import band_traces, glitch_traces
+from app.figures.scale import robust_span, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 1200
@@ -18,7 +19,8 @@ TABLE_ROWS: Final = 34
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecordData:
-    """One recorded flight. `inputs` are the commands by title (Thrust, Feed-forward, …) as shares of full command."""
+    """One recorded flight. `inputs` are further channels by title (Thrust, Feed-forward, …), all in the unit that
+    `inputs_title` names."""
 
     number: int
     output_title: str
@@ -27,9 +29,12 @@ class FlightRecordData:
     set_point: Curve
     reference: Curve | None = None
     predicted: Curve | None = None
+    band: Band | None = None
+    glitches: tuple[Range, ...] = ()
     best: Curve | None = None
     best_number: int | None = None
     inputs: Mapping[str, Curve] = field(default_factory=dict)
+    inputs_title: str = "Thrust (of full)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,7 @@ class FlightFigure:
         palette, record = PALETTES[self.theme], self.record
         assert record.curve is not None
         lines = [
+            *band_traces(palette, record.band, POINTS),
             *self._context(palette),
             _line(
                 f"Flight {record.number}",
@@ -59,17 +65,21 @@ class FlightFigure:
                 "flight",
                 f"%{{x:.2f}} s · %{{y:.3f}} {record.output_unit}",
             ),
+            *glitch_traces(palette, record.number, record.curve, record.glitches, record.output_unit),
         ]
         inputs = [self._input(palette, index, title) for index, title in enumerate(record.inputs)]
-        span = robust_range([float(record.curve.values.max())], low=0.0, high=float(record.set_point.values.max()))
+        goal = record.set_point.values
+        low, high, _ = robust_span(
+            [record.curve.values], low=min(0.0, float(goal.min())), high=max(0.0, float(goal.max()))
+        )
         top = [0.36, 1.0] if inputs else [0.0, 1.0]
         axes: dict[str, object] = {
             "yaxis": theme.titled(
-                palette, f"{record.output_title} ({record.output_unit})", domain=top, range=[span.low, span.high]
+                palette, f"{record.output_title} ({record.output_unit})", domain=top, range=[low, high]
             )
         }
         if inputs:
-            axes["yaxis2"] = theme.titled(palette, "Thrust (of full)", domain=[0.0, 0.28], nticks=4)
+            axes["yaxis2"] = theme.titled(palette, record.inputs_title, domain=[0.0, 0.28], nticks=4)
         layout = theme.layout(
             palette,
             uirevision="flight",
@@ -78,7 +88,10 @@ class FlightFigure:
                 palette,
                 "Time since the command (s)",
                 anchor="y2" if inputs else "y",
-                range=[float(record.curve.time_s[0]) - 0.3, float(record.curve.time_s[-1])],
+                range=[
+                    float(record.curve.time_s[0]) - 0.01 * float(record.set_point.time_s[-1]),
+                    float(record.curve.time_s[-1]),
+                ],
             ),
         )
         return Card(

@@ -6,7 +6,7 @@ from typing import ClassVar
 from app.core.policy import Gain
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
-from app.figures.history import History
+from app.figures.history import History, last_number
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09
@@ -30,10 +30,7 @@ class GainsFigure:
         palette, history = PALETTES[self.theme], self.history
         panels = list(enumerate(history.gains, start=1))
         traces = [trace for index, gain in panels for trace in self._panel(palette, index, gain)]
-        last = max(
-            [flight.number for flight in history.flights]
-            + ([history.proposal.number] if history.proposal is not None else [])
-        )
+        last = last_number(history)
         axes: dict[str, object] = {}
         for index, gain in panels:
             axes |= self._axes(palette, index, gain, last)
@@ -108,7 +105,7 @@ class GainsFigure:
                 domain=[max(0.0, top - height), top],
                 anchor=_axis("x", index),
                 range=[low, high],
-                nticks=4,
+                nticks=4 if count <= 3 else 3,
             ),
         }
 

@@ -25,9 +25,21 @@ class Curve:
         return float(np.interp(time_s, self.time_s, self.values))
 
 
+@dataclass(frozen=True, slots=True)
+class Range:
+    """From `low` to `high`, in the unit of what it stands beside."""
+
+    low: float
+    high: float
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightData:
-    """One flown trial. `error` and `predicted_error` in the experiment's error unit, None where there is none."""
+    """One flown trial. `error` and `predicted_error` in the experiment's error unit, None where there is none;
+    `interval` is where the error was expected, `glitches` the seconds during which the record cannot be right."""
 
     number: int
     gains: Gains
@@ -35,16 +47,48 @@ class FlightData:
     curve: Curve | None
     error: float | None
     predicted_error: float | None = None
+    interval: Range | None = None
+    glitches: tuple[Range, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """Between which two curves a flight is expected, on the same instants."""
+
+    lower: Curve
+    upper: Curve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NextFlight:
-    """The proposed next flight, with the model's curve for it where there is one."""
+    """The proposed next flight, with the model's curve for it, its band, and the interval of its error where there
+    are any."""
 
     number: int
     gains: Gains
     curve: Curve | None
     predicted_error: float | None
+    band: Band | None = None
+    interval: Range | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    """Several valid flights of the same gains: their numbers, and the mean of their errors with its standard error."""
+
+    numbers: tuple[int, ...]
+    mean: float
+    standard_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """How much errors scatter: `sd` of a single flight, the repeated flights, and where another flight of the best
+    gains would land with 90 % probability."""
+
+    sd: float
+    repeats: tuple[Repeats, ...] = ()
+    around_best: Range | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +96,7 @@ class History:
     """A campaign as its figures see it.
 
     `stop_improvement`: the share of the best error by which a flight must beat it to count as progress, None when the
-    stop rule does not ask. `flights` in the order of their numbers.
+    stop rule does not ask. `flights` in the order of their numbers. `noise`: None while nothing is known of it.
     """
 
     output_title: str
@@ -64,6 +108,8 @@ class History:
     flights: tuple[FlightData, ...]
     proposal: NextFlight | None = None
     stop_improvement: float | None = None
+    noise: Noise | None = None
+    curves_title: str = "Takeoff curves"
 
     @property
     def valid(self) -> tuple[FlightData, ...]:
@@ -83,3 +129,9 @@ class History:
 def _error(flight: FlightData) -> float:
     assert flight.error is not None
     return flight.error
+
+
+def last_number(history: History) -> int:
+    """The highest flight number that a figure has to show, the proposed flight's included."""
+    numbers = [flight.number for flight in history.flights]
+    return max([*numbers, history.proposal.number] if history.proposal is not None else numbers, default=1)

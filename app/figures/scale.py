@@ -36,10 +36,21 @@ def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: flo
     return RobustRange(low=low - pad, high=top + pad, outside=outside)
 
 
+def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> tuple[float, float, tuple[int, ...]]:
+    """A range for whole curves, upwards and downwards: low, high, and the curves that leave it on either side."""
+    if not curves:
+        curves = [np.array([low, high])]
+    up = robust_range([float(values.max()) for values in curves], low=low, high=high)
+    down = robust_range([-float(values.min()) for values in curves], low=-high, high=-low)
+    return -down.high, up.high, tuple(sorted({*up.outside, *down.outside}))
+
+
 def thinned(time_s: Samples, values: Samples, points: int) -> tuple[list[float], list[float]]:
-    """At most `points` samples that keep the curve's look and its extremes (MinMaxLTTB), at 0.1 ms and 0.1 mm."""
+    """At most `points` samples that keep the curve's look and its extremes (MinMaxLTTB), at 0.1 ms and 0.1 mm; a curve
+    that stays below 1 keeps a digit more."""
     if len(time_s) > points:
         downsampler = MinMaxLTTBDownsampler()  # type: ignore[no-untyped-call]
         chosen = downsampler.downsample(np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
         time_s, values = time_s[chosen], values[chosen]
-    return [round(float(t), 4) for t in time_s], [round(float(v), 4) for v in values]
+    digits = 4 if len(values) == 0 or float(np.abs(values).max()) >= 1.0 else 5
+    return [round(float(t), 4) for t in time_s], [round(float(v), digits) for v in values]

@@ -6,7 +6,8 @@ from typing import ClassVar, Final
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.history import Curve, FlightData, History
-from app.figures.scale import robust_range, thinned
+from app.figures.marks import band_traces, glitch_traces
+from app.figures.scale import robust_span, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 CURVE_POINTS: Final = 500
@@ -21,54 +22,67 @@ TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 1
 @dataclass(frozen=True, slots=True)
 class TakeoffsFigure:
     """Table columns: `time_s`, `set_point`, `reference` (where known), `flight_N` for each flight with a record, and
-    `prediction` (where there is one), at the seconds of `TABLE_TIMES_S`.
+    `prediction` (where there is one) with `prediction_lower` and `prediction_upper` (where its band is known), at those
+    seconds of `TABLE_TIMES_S` that the experiment lasts.
 
-    Every trace carries `meta`: `role` (set point, reference, flight, legend, prediction, live, off scale) and, for
-    flights, `trial` and `standing` (best, latest, earlier, invalid). The `live` trace is empty: a page fills it while
-    it flies.
+    Every trace carries `meta`: `role` (set point, reference, flight, legend, prediction, band, glitch, live, off scale)
+    and, for flights, `trial` and `standing` (best, latest, earlier, invalid). The `live` trace is empty: a page fills
+    it while it flies.
     """
 
     history: History
     theme: ThemeName = "light"
     name: ClassVar[str] = "takeoffs"
-    title: ClassVar[str] = "Takeoff curves"
+
+    @property
+    def title(self) -> str:
+        return self.history.curves_title
 
     def not_ready(self) -> str | None:
         return None
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history
-        drawn = [flight for flight in history.flights if flight.curve is not None]
+        drawn = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
         points = max(60, min(CURVE_POINTS, ALL_POINTS // max(1, len(drawn))))
-        traces = [self._set_point(palette), *self._reference(palette)]
+        band = None if history.proposal is None else history.proposal.band
+        traces = [*band_traces(palette, band, CURVE_POINTS), self._set_point(palette), *self._reference(palette)]
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
+        for flight in drawn:
+            traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
         traces += [*self._legend(palette, drawn), *self._prediction(palette), self._live(palette)]
-        peaks = [float(flight.curve.values.max()) for flight in drawn if flight.curve is not None]
-        predicted = [] if history.proposal is None or history.proposal.curve is None else [history.proposal.curve]
-        span = robust_range(
-            [*peaks, *(float(curve.values.max()) for curve in predicted)],
-            low=0.0,
-            high=HEADROOM * float(history.set_point.values.max()),
-        )
-        traces += [_off_scale(palette, drawn[index], span.high) for index in span.outside if index < len(drawn)]
+        low, high, outside = self._span(drawn)
+        traces += [_off_scale(palette, drawn[index], low, high) for index in outside if index < len(drawn)]
         unit = history.output_unit
         layout = theme.layout(
             palette,
             xaxis=theme.titled(palette, "Time since the command (s)", range=self._time_range()),
-            yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[span.low, span.high], nticks=7),
+            yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[low, high], nticks=7),
             uirevision="takeoffs",
         )
         return Card(
             name=self.name,
             title=self.title,
             state="ready",
-            summary=self._summary(sum(index < len(drawn) for index in span.outside)),
+            summary=self._summary(sum(index < len(drawn) for index in outside)),
             figure=plotly_json(traces, layout),
             table=self._table(drawn),
         )
 
     def _time_range(self) -> list[float]:
-        return [-0.3, float(self.history.set_point.time_s[-1])]
+        end = float(self.history.set_point.time_s[-1])
+        return [-0.01 * end, end]
+
+    def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
+        """From the ground to above the set point; where the set point is zero, as far as the first flight strays."""
+        curves = [flight.curve.values for flight in drawn if flight.curve is not None]
+        if self.history.proposal is not None and self.history.proposal.curve is not None:
+            curves.append(self.history.proposal.curve.values)
+        goal = self.history.set_point.values
+        low, high = min(0.0, float(goal.min())), HEADROOM * max(0.0, float(goal.max()))
+        if low == high and curves:
+            low, high = min(low, float(curves[0].min())), max(high, float(curves[0].max()))
+        return robust_span(curves, low=low, high=high)
 
     def _standing(self, flight: FlightData) -> str:
         if flight.outcome != "valid":
@@ -207,10 +221,14 @@ class TakeoffsFigure:
             if flight.curve is not None
         ]
         if history.proposal is not None and history.proposal.curve is not None:
-            named.append(
-                (Column("prediction", f"Flight {history.proposal.number}, predicted", unit, 3), history.proposal.curve)
-            )
-        rows = tuple((time_s, *_rounded(time_s, [curve for _, curve in named])) for time_s in TABLE_TIMES_S)
+            title = f"Flight {history.proposal.number}, predicted"
+            named.append((Column("prediction", title, unit, 3), history.proposal.curve))
+            if history.proposal.band is not None:
+                named.append((Column("prediction_lower", f"{title}, at least", unit, 3), history.proposal.band.lower))
+                named.append((Column("prediction_upper", f"{title}, at most", unit, 3), history.proposal.band.upper))
+        lasts = float(history.set_point.time_s[-1])
+        times = [time_s for time_s in TABLE_TIMES_S if time_s <= lasts]
+        rows = tuple((time_s, *_rounded(time_s, [curve for _, curve in named])) for time_s in times)
         return Table((Column("time_s", "Time", "s", 1), *(column for column, _ in named)), rows)
 
 
@@ -233,20 +251,22 @@ def _trace(name: str, curve: Curve, points: int, **style: object) -> dict[str, o
     return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, **style}
 
 
-def _off_scale(palette: Palette, flight: FlightData, top: float) -> dict[str, object]:
-    """A triangle at the upper edge where a flight leaves the scale, with how far it went."""
+def _off_scale(palette: Palette, flight: FlightData, low: float, high: float) -> dict[str, object]:
+    """A triangle at the edge where a flight leaves the scale, with how far it went."""
     assert flight.curve is not None
-    peak = int(flight.curve.values.argmax())
-    text = f"Flight {flight.number} reaches {flight.curve.values[peak]:.2f}"
+    values = flight.curve.values
+    up = bool(values.max() - high >= low - values.min())
+    peak = int(values.argmax() if up else values.argmin())
+    text = f"Flight {flight.number} reaches {values[peak]:.2f}"
     return {
         "type": "scatter",
         "mode": "markers+text",
         "name": text,
         "x": [round(float(flight.curve.time_s[peak]), 3)],
-        "y": [top],
-        "text": [f"{flight.number} ↑ {flight.curve.values[peak]:.1f}"],
-        "textposition": "bottom center",
-        "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},
+        "y": [high if up else low],
+        "text": [f"{flight.number} {'↑' if up else '↓'} {values[peak]:.1f}"],
+        "textposition": "bottom center" if up else "top center",
+        "marker": {"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": palette.bad},
         "textfont": {"color": palette.bad},
         "showlegend": False,
         "cliponaxis": False,

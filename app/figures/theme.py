@@ -102,6 +102,12 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
     }
 
 
+def faint(colour: str, opacity: float) -> str:
+    """A hex colour as a see-through one."""
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
+
+
 def solid(colour: str | list[str], **more: object) -> dict[str, object]:
     """A filled mark in full colour; Plotly makes marks of several sizes pale and rimmed unless told otherwise."""
     return {"color": colour, "opacity": 1, "line": {"width": 0}, **more}

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from datetime import datetime
 
-from sqlalchemy import func, select
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from app.db.models import JobRow
@@ -53,6 +53,28 @@ def running(session: Session, *, lease_before: datetime | None = None) -> Sequen
     if lease_before is not None:
         wanted = wanted.where(JobRow.lease_until < lease_before)
     return session.scalars(wanted.order_by(JobRow.id)).all()
+
+
+def latest_of_order(
+    session: Session, kind: str, name: str, states: Collection[JobState], *, with_result: bool = False
+) -> JobRow | None:
+    """The newest job whose order has that name, in one of the states; `with_result`: among those that keep one."""
+    wanted = select(JobRow).where(
+        JobRow.kind == kind, JobRow.order["name"].as_string() == name, JobRow.state.in_(states)
+    )
+    if with_result:
+        wanted = wanted.where(JobRow.result.is_not(None))
+    return session.scalar(wanted.order_by(JobRow.id.desc()).limit(1))
+
+
+def drop_older_results(session: Session, row: JobRow, name: str) -> None:
+    """Only the newest result of an order is kept."""
+    session.execute(
+        update(JobRow)
+        .where(JobRow.kind == row.kind, JobRow.order["name"].as_string() == name, JobRow.id < row.id)
+        .values(result=None)
+        .execution_options(synchronize_session=False)
+    )
 
 
 def latest_of_campaign(session: Session, campaign_id: int, kind: str) -> JobRow | None:

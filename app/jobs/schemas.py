@@ -10,13 +10,17 @@ from app.schemas import Trouble
 
 
 class Job(BaseModel):
-    """Numeric work: a proposal, a study, a report."""
+    """Numeric work: a proposal, a reproduction."""
 
     id: int
     kind: str
+    name: Annotated[str, Field(description="what exactly, for the kinds that have a choice; empty otherwise")]
     state: JobState
     campaign_id: int | None
     problem: Trouble | None
+    done_share: Annotated[float | None, Field(description="0 … 1 while it runs, where the kind can tell")]
+    doing: Annotated[str, Field(description="what it is at")]
+    remaining_s: Annotated[float | None, Field(description="seconds that it will still take, at the pace so far")]
     attempts: int
     created_at: datetime
     started_at: datetime | None

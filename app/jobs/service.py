@@ -1,6 +1,7 @@
 """Numeric work as rows: written in the transaction that needs it, carried out by a worker, and again after a crash.
 
-For a worker: `claim_job`, then `heartbeat_job` while it computes, then `finish_job` or `fail_job`.
+For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job` or `fail_job`;
+`put_back_job` and `give_up_job` when it has to end before that.
 """
 
 from collections.abc import Collection
@@ -20,15 +21,24 @@ from app.jobs.states import ACTIONS, MOVES, JobState
 from app.moves import allowed, check_action, check_move
 from app.schemas import Page, Trouble
 
+LEAST_PACE_S: Final = 30.0
+LEAST_PACE_SHARE: Final = 0.1
+"""Before so many seconds or such a share the pace says nothing about the rest: starting takes its time too."""
+
 MAX_ATTEMPTS: Final = 3
 """A job that lost its worker so many times probably killed it, and is failed."""
 
 
-def enqueue_job(session: Session, kind: str, *, campaign_id: int | None = None) -> JobRow:
-    """A job that waits. One of the same kind for the same campaign that still waits serves for both."""
+def enqueue_job(
+    session: Session, kind: str, *, campaign_id: int | None = None, order: JsonObject | None = None
+) -> JobRow:
+    """A job that waits. One of the same kind for the same campaign that still waits serves for both.
+
+    `order` says what exactly is to be done; its `name` is what `latest_ordered` finds the job by.
+    """
     if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
         return waiting
-    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id)
+    row = JobRow(kind=kind, state=JobState.QUEUED, campaign_id=campaign_id, order=order)
     session.add(row)
     session.flush()
     return row
@@ -41,6 +51,7 @@ def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s:
     _move(row, JobState.RUNNING)
     row.worker, row.attempts = worker, row.attempts + 1
     row.started_at, row.finished_at, row.problem = utc_now(), None, None
+    row.done_share, row.doing = None, ""
     row.lease_until = utc_now() + timedelta(seconds=lease_s)
     return row
 
@@ -59,13 +70,49 @@ def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float)
     return True
 
 
-def finish_job(session: Session, job_id: int, *, worker: str) -> bool:
-    """The job is done. False, and nothing changes, when it was cancelled, deleted or given away meanwhile."""
+def report_progress(session: Session, job_id: int, share: float, doing: str, *, worker: str, lease_s: float) -> bool:
+    """How far it is: a share of 0 … 1 and a few words; the lease is extended too. False when the job is no longer this
+    worker's: stop it."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    row.done_share, row.doing = share, doing
+    row.lease_until = utc_now() + timedelta(seconds=lease_s)
+    return True
+
+
+def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject | None = None) -> bool:
+    """The job is done; of jobs with an order only the newest result of each is kept. False, and nothing changes, when
+    it was cancelled, deleted or given away meanwhile."""
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
     _move(row, JobState.DONE)
     row.finished_at, row.lease_until = utc_now(), None
+    if result is not None:
+        row.result, row.done_share, row.doing = result, 1.0, ""
+        repository.drop_older_results(session, row, _ordered(row))
+    return True
+
+
+def put_back_job(session: Session, job_id: int, *, worker: str) -> bool:
+    """The worker ends, in good order: the job waits again as if it had not been begun. False when it was no longer
+    this worker's."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    row.attempts -= 1
+    _requeue(row)
+    return True
+
+
+def give_up_job(session: Session, job_id: int, *, worker: str) -> bool:
+    """What computed it went away: it waits again, or is failed when that has happened too often. False when it was no
+    longer this worker's."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    _requeue(row)
     return True
 
 
@@ -91,6 +138,16 @@ def requeue_expired_jobs(session: Session) -> list[int]:
 def latest_job(session: Session, campaign_id: int, kind: str) -> JobRow | None:
     """The newest job of that kind for a campaign, whatever became of it."""
     return repository.latest_of_campaign(session, campaign_id, kind)
+
+
+def latest_ordered(session: Session, kind: str, name: str, states: Collection[JobState]) -> JobRow | None:
+    """The newest job of that kind whose order has that name, in one of the states."""
+    return repository.latest_of_order(session, kind, name, states)
+
+
+def latest_result(session: Session, kind: str, name: str) -> JobRow | None:
+    """The newest job of that kind and name that has a result."""
+    return repository.latest_of_order(session, kind, name, (JobState.DONE,), with_result=True)
 
 
 def list_jobs(
@@ -123,6 +180,7 @@ def retry_job(session: Session, job_id: int) -> Job:
     check_action(ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
     row.attempts, row.problem, row.finished_at = 0, None, None
+    row.done_share, row.doing = None, ""
     session.flush()
     return job_view(row)
 
@@ -131,9 +189,13 @@ def job_view(row: JobRow) -> Job:
     return Job(
         id=row.id,
         kind=row.kind,
+        name=_ordered(row),
         state=row.state,
         campaign_id=row.campaign_id,
         problem=trouble(row),
+        done_share=row.done_share,
+        doing=row.doing,
+        remaining_s=_remaining_s(row),
         attempts=row.attempts,
         created_at=row.created_at,
         started_at=row.started_at,
@@ -147,6 +209,21 @@ def trouble(row: JobRow) -> Trouble | None:
     return None if row.problem is None else Trouble.model_validate(row.problem)
 
 
+def _remaining_s(row: JobRow) -> float | None:
+    """By the pace so far; None before it can be told."""
+    if row.state != JobState.RUNNING or row.started_at is None or not row.done_share:
+        return None
+    elapsed_s = (utc_now() - row.started_at).total_seconds()
+    if elapsed_s < LEAST_PACE_S and row.done_share < LEAST_PACE_SHARE:
+        return None
+    return elapsed_s * (1.0 - row.done_share) / row.done_share
+
+
+def _ordered(row: JobRow) -> str:
+    """The name in its order, empty without one."""
+    return str((row.order or {}).get("name", ""))
+
+
 def _requeue(row: JobRow) -> int:
     if row.attempts >= MAX_ATTEMPTS:
         _fail(
@@ -158,6 +235,7 @@ def _requeue(row: JobRow) -> int:
     else:
         _move(row, JobState.QUEUED)
         row.worker, row.lease_until = None, None
+        row.done_share, row.doing = None, ""
     return row.id
 
 

@@ -9,21 +9,20 @@ from app.core.errors import InputError
 
 MAX_LINE_BYTES: Final = 256 * 1024
 
-Row = tuple[float, float, float, float, float, float, float]
-"""Seconds since the command, altitude, climb rate, set point, reference (SI, up), share of full thrust, volts."""
-
 Phase = Literal["staging", "flying", "landed", "ended"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Telemetry:
-    """What was measured since the last message of this flight. `error_so_far` is the mean error up to `time_s`, in the
-    experiment's unit; None until the first scored sample."""
+    """What was measured since the last message of this flight: rows of `columns`, the first of which is the seconds
+    since the command and the second the scored channel. `error_so_far` is the error up to `time_s`, in the experiment's
+    unit; None until the first scored sample."""
 
     campaign_id: int
     trial_id: int
     time_s: float
-    samples: list[Row]
+    columns: list[str]
+    samples: list[list[float]]
     error_so_far: float | None
     type: Literal["telemetry"] = "telemetry"
 

@@ -1,8 +1,12 @@
 """From a record to a classed trial: stored once, scored as stored, classed by the program where it may."""
 
+from dataclasses import asdict
+
 from sqlalchemy.orm import Session
 
 from app.core.experiments import get_experiment
+from app.core.glitches import find_glitches, repaired
+from app.core.stopping import landing_battery_v
 from app.core.trajectory import Trajectory
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
@@ -17,13 +21,22 @@ def capture(
 ) -> None:
     """Store a flight's record and class it: `aborted` with its reason, else by the program where it may.
 
-    A flight of a real vehicle stays captured until a person has classed it. Raises TrajectoryError when the
+    A flight of a real vehicle stays captured until a person has classed it, and so does one with glitches in its record
+    that can be scored. Raises TrajectoryError when the
     record cannot be stored.
     """
     stored = history.store_trajectory(session, trajectory)
     row.trajectory = stored
-    judged = score(get_experiment(campaign.experiment), history.trajectory_of(session, stored.id))
+    recorded = history.trajectory_of(session, stored.id)
+    experiment = get_experiment(campaign.experiment)
+    judged = score(experiment, recorded)
+    glitches = find_glitches(experiment, recorded)
+    row.glitches = [asdict(glitch) for glitch in glitches]
+    row.repaired_error = (
+        score(experiment, repaired(experiment, recorded, glitches), accept_gaps=True).error if glitches else None
+    )
     row.overshoot_m, row.curve = judged.overshoot, judged.curve
+    row.landing_battery_v = landing_battery_v(recorded)
     row.ending = "completed" if aborted is None else "aborted"
     if aborted is not None and row.state == TrialState.FLYING:
         move_trial(row, TrialState.ABORTED, reason=aborted)
@@ -31,13 +44,14 @@ def capture(
     move_trial(row, TrialState.CAPTURED, reason="")
     if aborted is not None:
         move_trial(row, TrialState.ABORTED, reason=aborted)
-    elif fleet.classed_by_program(campaign.vehicle):
-        _classify(row, judged.error, judged.refusal)
+        return
+    row.error = judged.error  # told before somebody classes the flight; classing scores it again
+    if fleet.classed_by_program(campaign.vehicle):
+        _classify(row, judged.refusal)
 
 
-def _classify(row: TrialRow, error: float | None, refusal: str) -> None:
-    if error is None:
+def _classify(row: TrialRow, refusal: str) -> None:
+    if row.error is None:
         move_trial(row, TrialState.INVALID, reason=refusal)
-    else:
-        row.error = error
+    elif not row.glitches:
         move_trial(row, TrialState.VALID)

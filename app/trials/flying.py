@@ -4,8 +4,10 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+import numpy as np
+
 from app.core.experiments.base import Experiment
-from app.live.messages import FlightPhase, Phase, Row, Telemetry
+from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import Sample
 
 MESSAGES_PER_S: Final = 25
@@ -70,17 +72,19 @@ class Airspace:
 class Monitor:
     """Gathers one flight's samples and publishes them in at most 25 messages a second, with the error so far.
 
-    The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample, and no
-    further than the experiment scores; the flight's own error is computed from its full-rate record.
+    The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral
+    where the experiment's error is one), and no further than the experiment scores; the flight's own error is computed
+    from its full-rate record.
     """
 
     def __init__(self, campaign_id: int, trial_id: int, experiment: Experiment, publish: Publish) -> None:
         self._campaign_id = campaign_id
         self._trial_id = trial_id
-        self._output = experiment.output
+        self._experiment = experiment
+        self._columns: list[str] = []
         self._scored_until_s = float(experiment.grid_s[-1])
         self._publish = publish
-        self._rows: list[Row] = []
+        self._rows: list[list[float]] = []
         self._due_s = 0.0
         self._last: tuple[float, float] | None = None
         self._integral = 0.0
@@ -89,18 +93,12 @@ class Monitor:
         self._publish(FlightPhase(campaign_id=self._campaign_id, trial_id=self._trial_id, phase=phase, note=note))
 
     def sample(self, sample: Sample) -> None:
-        self._score(sample.time_s, abs(sample.set_point_m - getattr(sample, self._output)))
-        self._rows.append(
-            (
-                sample.time_s,
-                sample.altitude_m,
-                sample.climb_rate_m_s,
-                sample.set_point_m,
-                sample.reference_m,
-                sample.thrust,
-                sample.battery_v,
-            )
-        )
+        output = self._experiment.output
+        set_point = float(self._experiment.set_point(np.array([sample.time_s]))[0])
+        self._score(sample.time_s, abs(set_point - sample[output]))
+        others = [name for name in sample.channels if name != output]
+        self._columns = ["time_s", output, *others]
+        self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
         now_s = time.monotonic()
         if now_s >= self._due_s:
             self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
@@ -115,6 +113,7 @@ class Monitor:
                     campaign_id=self._campaign_id,
                     trial_id=self._trial_id,
                     time_s=rows[-1][0],
+                    columns=self._columns,
                     samples=rows,
                     error_so_far=self.error_so_far,
                 )
@@ -124,7 +123,7 @@ class Monitor:
     def error_so_far(self) -> float | None:
         if self._last is None or self._last[0] <= 0.0:
             return None
-        return self._integral / self._last[0]
+        return self._integral if self._experiment.integrates else self._integral / self._last[0]
 
     def _score(self, time_s: float, deviation: float) -> None:
         if 0.0 <= time_s <= self._scored_until_s:

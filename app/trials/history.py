@@ -8,7 +8,8 @@ from typing import Final, Literal
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.core.definition import Flight
+from app.core.definition import Donor, Flight, Prediction
+from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
 from app.db.models import FlightRow, TrajectoryRow, TrialRow
 from app.errors import NotFoundError
@@ -43,6 +44,17 @@ def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     )
 
 
+def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight | None:
+    """The flight a warm start comes from: valid and scored from its record, whatever it is classed as now, since what
+    is computed from it may depend on nothing else. None when the record is not the one the checksum names."""
+    rows = [row for row in trials_of(session, donor.campaign_id) if row.number == donor.trial_number]
+    if not rows or rows[0].trajectory is None or rows[0].trajectory.checksum != donor.checksum:
+        return None
+    record = trajectory_of(session, rows[0].trajectory.id)
+    error = experiment.error(record, accept_gaps=True)
+    return Flight(number=rows[0].number, gains=rows[0].gains, trajectory=record, error=error, outcome="valid")
+
+
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
     """The same flights with nothing in their trajectories, for checks that look at gains only."""
     return tuple(_flight(row, _NOTHING) for row in counted(trials))
@@ -56,7 +68,15 @@ def counted(trials: Sequence[TrialRow]) -> list[TrialRow]:
 def history_digest(definition_digest: str, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from; differs as soon as any of it does."""
     flights = [
-        [row.number, row.gains, row.state, row.error, row.trajectory.checksum if row.trajectory is not None else None]
+        [
+            row.number,
+            row.gains,
+            row.state,
+            row.error,
+            row.trajectory.checksum if row.trajectory is not None else None,
+            row.predicted_error,
+            row.predicted_interval,
+        ]
         for row in counted(trials)
     ]
     content = json.dumps([definition_digest, flights], sort_keys=True, separators=(",", ":"))
@@ -141,4 +161,18 @@ def _unpacked(row: TrajectoryRow) -> Trajectory:
 
 def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
     outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
-    return Flight(number=row.number, gains=row.gains, trajectory=trajectory, error=row.error, outcome=outcome)
+    return Flight(
+        number=row.number,
+        gains=row.gains,
+        trajectory=trajectory,
+        error=row.error,
+        outcome=outcome,
+        predicted=_predicted(row),
+    )
+
+
+def _predicted(row: TrialRow) -> Prediction | None:
+    if row.predicted_error is None:
+        return None
+    interval = row.predicted_interval or {}
+    return Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper"))

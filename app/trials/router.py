@@ -23,7 +23,11 @@ def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: Cur
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
 def create_trial(act: Act, campaign_id: Id, body: NewTrial) -> Trial:
     """Plan a trial of the proposal or of gains of one's own, and fly it at once if asked to."""
-    return act(Trial, lambda session: service.create_trial(session, campaign_id, body))
+    return act(
+        Trial,
+        lambda session: service.create_trial(session, campaign_id, body),
+        ahead=lambda session: service.judge_new_ahead(session, campaign_id, body),
+    )
 
 
 @router.get("/trials/{trial_id}")
@@ -40,7 +44,11 @@ def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
 @router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
 def fly_trial(act: Act, trial_id: Id, body: FlightOrder | None = None) -> Trial:
     """Ask for the flight of a planned trial. A vehicle that has a flight already refuses a second one."""
-    return act(Trial, lambda session: service.fly_trial(session, trial_id, body or FlightOrder()))
+    return act(
+        Trial,
+        lambda session: service.fly_trial(session, trial_id, body or FlightOrder()),
+        ahead=lambda session: service.judge_ahead(session, trial_id),
+    )
 
 
 @router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)

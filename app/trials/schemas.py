@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.schemas import Gains, Gate, Number, OptionValue, Reason, Request, Text, Version
+from app.core.statistics import Word
+from app.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
 from app.trials.states import Ending, FlightState, TrialKind, TrialState
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
@@ -17,11 +18,21 @@ class FlightOrder(Request):
     speed: Speed | None = 10.0
 
 
+Variant = Literal["smaller step", "repeat", "baseline"]
+
+
 class NewTrial(Request):
-    """A trial of a proposal, or of gains of one's own: exactly one of the two. With `fly` it is flown at once."""
+    """A trial of a proposal, of gains of one's own, or of a variant: exactly one of the three. With `fly` it is flown
+    at once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
+    `baseline`, the first flight's gains again."""
 
     proposal_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)] | None = None
     gains: Annotated[dict[str, Number], Field(max_length=50, examples=[{"kp": 283, "ki": 13, "kd": 82}])] | None = None
+    variant: Variant | None = None
+    overrule: Annotated[
+        Reason | None,
+        Field(description="why gains that the gate refuses shall fly all the same; simulated vehicles only"),
+    ] = None
     note: Text = ""
     fly: FlightOrder | None = None
 
@@ -77,6 +88,36 @@ class FlightBrief(BaseModel):
     problem: str
 
 
+class GroupBrief(BaseModel):
+    """The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
+    campaign."""
+
+    mean: float
+    standard_error: float
+    n: int
+
+
+class TrialComparison(BaseModel):
+    """The flight's gains against those of another one, each with all their flights. `difference` is this − other;
+    `confidence` is that of the likelier direction, and decides from 90 % on."""
+
+    against: Literal["best before", "first"]
+    trial_number: int
+    verdict: Word
+    confidence: float
+    difference: float
+    standard_error: float
+
+
+class Glitch(BaseModel):
+    """What the record cannot have seen: between the last good sample before it and the first good one after."""
+
+    kind: Literal["acceleration", "frozen", "gap", "disagreement"]
+    start_s: float
+    end_s: float
+    sentence: str
+
+
 class Trial(BaseModel):
     """One flight of one policy. `error` is the performance measure, lower is better."""
 
@@ -91,11 +132,22 @@ class Trial(BaseModel):
     proposal_id: int | None
     error: float | None
     predicted_error: float | None
+    predicted_interval: Interval | None
+    inside_interval: Annotated[
+        bool | None, Field(description="whether a valid flight's error lay where it was expected")
+    ]
+    group: Annotated[GroupBrief | None, Field(description="all valid flights of the same gains; null before the first")]
+    comparisons: list[TrialComparison]
     overshoot_m: float | None
     verdict: Annotated[str, Field(description="the flight against the best before it and against its prediction")]
     reason: Annotated[str, Field(description="why it has the state that it has, where somebody or something said so")]
     note: str
     gate: Gate
+    overrule_reason: Annotated[str, Field(description="why the gate's refusal was overruled; empty when it was not")]
+    glitches: Annotated[list[Glitch], Field(description="what the record cannot have seen; the record itself stays")]
+    repaired_error: Annotated[
+        float | None, Field(description="the error with straight lines over the glitches; null without any")
+    ]
     record: RecordBrief | None
     flight: FlightBrief | None
     seed: int

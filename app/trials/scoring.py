@@ -48,14 +48,15 @@ def thinned(time_s: Samples, values: Samples, points: int) -> NDArray[np.uint64]
 
 
 def _overshoot(experiment: Experiment, trajectory: Trajectory) -> float | None:
-    """How far the output went beyond its last set point; zero when it stayed below, None without samples."""
+    """How far the output went beyond its last set point; zero when it stayed below. None without samples, and where the
+    set point is zero: there is nothing to rise to."""
     if experiment.output not in trajectory.channels:
         return None
     flown = trajectory[experiment.output][trajectory.time_s >= 0.0]
     if not flown.size:
         return None
     target = float(experiment.set_point(trajectory.time_s[-1:])[0])
-    return max(float(flown.max()) - target, 0.0)
+    return max(float(flown.max()) - target, 0.0) if target > 0.0 else None
 
 
 def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:

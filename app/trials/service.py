@@ -1,6 +1,7 @@
 """What people and scripts do with trials. The worker's side of a flight is in `flights`."""
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -12,12 +13,11 @@ from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.core.definition import flight_seed
-from app.core.errors import GainsError, InputError, Problem
+from app.core.errors import GainlineError, InputError, Problem
 from app.core.experiments import get_experiment
-from app.core.gate import check_policy
 from app.core.policy import Gains
 from app.core.trajectory import Trajectory
-from app.db.models import CampaignRow, FlightRow, JsonObject, ProposalRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import BusyError, ConflictError
@@ -27,11 +27,13 @@ from app.moves import check_action, check_move, check_version
 from app.schemas import Page
 from app.trials import history, repository
 from app.trials.capture import capture
+from app.trials.judging import Judged, judge_gains, judge_proposal
 from app.trials.lifecycle import move_flight, move_trial
 from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
 from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, FlightState, TrialKind, TrialState
+from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
 
 
@@ -53,21 +55,25 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
     """Plan a trial and, with `fly`, ask for its flight.
 
     Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
-    ready; GainsError naming what the gate refuses; BusyError when the vehicle has a flight already.
+    ready; GainsError naming what the gate refuses, unless that is overruled; BusyError when the vehicle has a
+    flight already.
     """
     campaign = campaigns.get_row(session, campaign_id)
     _require_open(session, campaign, IN_BUDGET)
-    gains, gate, proposal = _chosen(session, campaign, new)
+    judged, proposal = _chosen(session, campaign, new)
+    gains = judged.gains
     number = repository.next_number(session, campaign_id)
     row = TrialRow(
         campaign_id=campaign_id,
         number=number,
         state=TrialState.PLANNED,
         gains=gains,
-        kind=_kind(session, campaign, gains, proposal),
+        kind=_kind(session, campaign, gains, proposal) if new.variant is None else KINDS[new.variant],
         proposal_id=None if proposal is None else proposal.id,
         predicted_error=None if proposal is None else proposal.predicted_error,
-        gate=gate,
+        predicted_interval=None if proposal is None else proposal.interval,
+        gate=judged.gate,
+        overrule_reason=judged.overrule_reason,
         note=new.note,
         seed=flight_seed(definition_of(campaign).seed, number),
     )
@@ -78,13 +84,28 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
     return trial_view(session, campaign, row)
 
 
+def judge_new_ahead(session: Session, campaign_id: int, new: NewTrial) -> None:
+    """Let the gate simulate before `create_trial` asks it within its transaction: it remembers what it found. What is
+    wrong with the trial is said there."""
+    with suppress(GainlineError):
+        _chosen(session, campaigns.get_row(session, campaign_id), new)
+
+
+def judge_ahead(session: Session, trial_id: int) -> None:
+    """The same before `fly_trial`."""
+    with suppress(GainlineError):
+        row = repository.get_one(session, trial_id)
+        judge_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
+
+
 def fly_trial(session: Session, trial_id: int, order: FlightOrder) -> Trial:
     """Ask for the flight of a planned trial; the worker carries it out. Raises as `create_trial` does."""
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "fly", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     _require_open(session, campaign, HISTORY)
-    _, row.gate = _through_the_gate(session, campaign, row.gains)
+    judged = judge_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
+    row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
     _request_flight(session, campaign, row, order)
     return trial_view(session, campaign, row)
 
@@ -234,47 +255,20 @@ def _require_open(session: Session, campaign: CampaignRow, spent_by: Collection[
         )
 
 
-def _chosen(
-    session: Session, campaign: CampaignRow, new: NewTrial
-) -> tuple[dict[str, float], JsonObject, ProposalRow | None]:
-    """Gains that have passed the gate, its answer, and the proposal that they are from, if they are from one."""
-    if new.gains is not None and new.proposal_id is None:
-        return *_through_the_gate(session, campaign, new.gains), None
-    if new.proposal_id is None or new.gains is not None:
+def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[Judged, ProposalRow | None]:
+    """Gains that may fly, and the proposal that they are from, if they are from one."""
+    if sum(given is not None for given in (new.proposal_id, new.gains, new.variant)) != 1:
         raise InputError(
-            "A trial flies a proposal or gains of one's own.",
-            hint="Send exactly one of the two.",
-            problems=(Problem("proposal_id", "or gains, exactly one of the two, must be given"),),
+            "A trial flies a proposal, gains of one's own, or a variant.",
+            hint="Send exactly one of the three.",
+            problems=(Problem("proposal_id", "or gains or variant, exactly one of the three, must be given"),),
         )
+    if new.proposal_id is None:
+        asked = new.gains if new.variant is None else gains_of(session, campaign, new.variant)
+        assert asked is not None
+        return judge_gains(session, campaign, asked, overrule=new.overrule), None
     proposal = proposing.fresh_proposal(session, campaign, new.proposal_id)
-    _require_passed(proposal.gate)  # it was judged on this very history
-    return proposal.gains, proposal.gate, proposal
-
-
-def _through_the_gate(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], JsonObject]:
-    """The gains, complete and in order, with the gate's answer. Raises GainsError naming what was refused."""
-    definition = definition_of(campaign)
-    space = proposing.space_of(definition)
-    gains = space.check(asked)
-    flown = history.flown_gains(history.trials_of(session, campaign.id))
-    searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
-    start = proposing.stored_start(session, campaign) if searched else None
-    experiment = get_experiment(campaign.experiment)
-    gate = proposing.gate_json(check_policy(definition, experiment, space, gains, flown, start=start))
-    _require_passed(gate)
-    return gains, gate
-
-
-def _require_passed(gate: JsonObject) -> None:
-    refused = [check for check in gate["checks"] if not check["passed"]]
-    if refused:
-        raise GainsError(
-            "The gate refuses these gains.",
-            hint="Choose gains nearer to the set that the refusal names, or clone the campaign with wider limits.",
-            problems=tuple(
-                Problem(f"gains.{check['gain']}" if check["gain"] else "gains", check["sentence"]) for check in refused
-            ),
-        )
+    return judge_proposal(campaign, proposal, overrule=new.overrule), proposal
 
 
 def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None) -> TrialKind:

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Final, Literal
 
-TrialKind = Literal["start", "step", "shorter step", "repeat", "manual"]
-"""Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, a person."""
+TrialKind = Literal["start", "step", "shorter step", "repeat", "baseline", "manual"]
+"""Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, the first
+flight's again, a person."""
 
 Ending = Literal["completed", "aborted"]
 """How a flight's record ends: where it should, or where the flight was broken off."""

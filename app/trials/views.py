@@ -5,14 +5,17 @@ from collections.abc import Iterable, Sequence
 from sqlalchemy.orm import Session
 
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
+from app.campaigns.statistics import standing_of
+from app.core.confirming import Standing
 from app.core.experiments import get_experiment
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.moves import allowed
-from app.schemas import Gate
+from app.schemas import Gate, Interval
 from app.trials import repository
-from app.trials.schemas import FlightBrief, RecordBrief, Trial
+from app.trials.comparisons import comparisons
+from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import thinned
 from app.trials.states import ACTIONS, UNDER_WAY, TrialState
@@ -31,7 +34,8 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     session.flush()
     flights = repository.latest_flights(session, [row.id for row in rows])
     scored = repository.scored(session, campaign.id)
-    return [_view(campaign, row, scored, flights.get(row.id)) for row in rows]
+    now = standing_of(campaign, repository.of_campaigns(session, (campaign.id,)))
+    return [_view(campaign, row, scored, flights.get(row.id), now) for row in rows]
 
 
 def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
@@ -52,7 +56,10 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
     )
 
 
-def _view(campaign: CampaignRow, row: TrialRow, scored: Sequence[Scored], flight: FlightRow | None) -> Trial:
+def _view(
+    campaign: CampaignRow, row: TrialRow, scored: Sequence[Scored], flight: FlightRow | None, now: Standing | None
+) -> Trial:
+    interval = None if row.predicted_interval is None else Interval.model_validate(row.predicted_interval)
     return Trial(
         id=row.id,
         version=row.version,
@@ -65,11 +72,18 @@ def _view(campaign: CampaignRow, row: TrialRow, scored: Sequence[Scored], flight
         proposal_id=row.proposal_id,
         error=row.error,
         predicted_error=row.predicted_error,
+        predicted_interval=interval,
+        inside_interval=_is_inside(interval, row),
+        group=_group(row, now),
+        comparisons=comparisons(row, scored, now),
         overshoot_m=row.overshoot_m,
         verdict=verdict(row, scored, get_experiment(campaign.experiment).error_unit),
         reason=row.reason,
         note=row.note,
         gate=Gate.model_validate(row.gate),
+        overrule_reason=row.overrule_reason,
+        glitches=[Glitch.model_validate(glitch) for glitch in row.glitches or ()],
+        repaired_error=row.repaired_error,
         record=_record(row),
         flight=_flight(flight),
         seed=row.seed,
@@ -79,6 +93,21 @@ def _view(campaign: CampaignRow, row: TrialRow, scored: Sequence[Scored], flight
         flown_at=row.flown_at,
         actions=_actions(campaign, row, flight),
     )
+
+
+def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
+    if interval is None or row.error is None:
+        return None
+    return interval.lower <= row.error <= interval.upper
+
+
+def _group(row: TrialRow, now: Standing | None) -> GroupBrief | None:
+    if now is None:
+        return None
+    same = next((group for group in now.groups if group.gains == row.gains), None)
+    if same is None:
+        return None
+    return GroupBrief(mean=same.mean, standard_error=same.standard_error(now.scatter), n=same.size)
 
 
 def verdict(row: TrialRow, scored: Sequence[Scored], unit: str) -> str:
@@ -94,9 +123,16 @@ def verdict(row: TrialRow, scored: Sequence[Scored], unit: str) -> str:
         case TrialState.LOST:
             return f"Lost: {row.reason}"
         case TrialState.CAPTURED:
-            return "Landed and recorded; somebody has to say whether it counts."
+            return f"Landed and recorded{_glitches(row)}; somebody has to say whether it counts."
         case _:
             return ""
+
+
+def _glitches(row: TrialRow) -> str:
+    """What a person has to look at before classing the flight."""
+    if not row.glitches:
+        return ""
+    return f", with {len(row.glitches)} {'glitch' if len(row.glitches) == 1 else 'glitches'} in its record"
 
 
 def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
@@ -105,9 +141,9 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
     best, number = before
     than = f"the best before it (flight {number}, {best:.3f} {unit})"
     if f"{error:.3f}" == f"{best:.3f}":
-        return f"as good as {than}"
+        return f"the same as {than}"
     gain = best - error
-    word = "better than" if gain > 0 else "worse than"
+    word = "lower than" if gain > 0 else "higher than"
     share = f" ({100 * abs(gain) / best:.0f} %)" if best else ""
     return f"{abs(gain):.3f} {unit}{share} {word} {than}"
 

@@ -27,7 +27,13 @@ def test_a_campaign_needs_nothing_but_a_name(client: TestClient) -> None:
     campaign = answer.json()
     assert (campaign["name"], campaign["state"], campaign["version"]) == ("Mine", "draft", 1)
     assert (campaign["vehicle"]["kind"], campaign["definition"]["strategy"]) == ("jsbsim", "gradient")
-    assert campaign["definition"]["stop"] == {"kind": "paper", "max_flights": 7, "improvement": 0.05}
+    assert campaign["definition"]["stop"] == {
+        "kind": "paper",
+        "max_flights": 7,
+        "improvement": 0.05,
+        "confidence": 0.9,
+        "min_battery_v": None,
+    }
     assert campaign["next_action"] == "Wait for the first gains"
 
 

@@ -4,7 +4,9 @@ import sqlite3
 from pathlib import Path
 
 import pytest
+from alembic import command
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.migration import MigrationContext
 from fastapi.testclient import TestClient
 
@@ -50,6 +52,32 @@ def test_start_up_refuses_a_database_without_tables_and_names_the_command(settin
     settings.database_file.unlink()
     with pytest.raises(SchemaError, match="gainline serve"), TestClient(create_app(settings)):
         pass
+
+
+def test_a_filled_first_database_is_brought_up_to_date_and_its_proposals_computed_again(tmp_path: Path) -> None:
+    file = tmp_path / "gainline.sqlite3"
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parents[2] / "migrations"))
+    with open_engine(file, foreign_keys=False).connect() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0001")
+        connection.exec_driver_sql(
+            "INSERT INTO vehicle VALUES (1, 'jsbsim', 'Drone', 0, 'ready', '{}', '', '2026-11-20 10:00:00')"
+        )
+        for number, state in enumerate(("ready", "finished"), start=1):
+            connection.exec_driver_sql(
+                "INSERT INTO campaign (id, version, name, state, stop_reason, experiment, strategy, definition,"
+                " vehicle_id, vehicle_options, created_at, updated_at) VALUES (?, 1, 'A', ?, '', 'takeoff', 'gradient',"
+                " '{}', 1, '{}', '2026-11-20 10:00:00', '2026-11-20 10:00:00')",
+                (number, state),
+            )
+        connection.commit()
+    migrate(file)
+    with sqlite3.connect(file) as connection:
+        assert connection.execute("SELECT kind, state, campaign_id, done_share FROM job").fetchall() == [
+            ("proposal", "queued", 1, None)
+        ]
+        assert connection.execute("SELECT count(*) FROM campaign").fetchone() == (2,)
 
 
 def test_a_database_of_a_newer_program_is_refused_and_left_alone(settings: Settings) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.core.policy import Gain
 from app.figures.base import Card
-from app.figures.history import Curve, FlightData, History, NextFlight, Outcome
+from app.figures.history import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range
 
 TIME_S = np.linspace(0.0, 32.6, 3261)
 SET_POINT = Curve(TIME_S, np.full_like(TIME_S, 3.0))
@@ -31,6 +31,8 @@ def flight(
     outcome: Outcome = "valid",
     overshoot_m: float = 0.3,
     predicted_error: float | None = None,
+    interval: Range | None = None,
+    glitches: tuple[Range, ...] = (),
 ) -> FlightData:
     return FlightData(
         number=number,
@@ -39,10 +41,17 @@ def flight(
         curve=climb(overshoot_m),
         error=error,
         predicted_error=predicted_error,
+        interval=interval,
+        glitches=glitches,
     )
 
 
-def history(*flights: FlightData, proposal: NextFlight | None = None, improvement: float | None = 0.05) -> History:
+def history(
+    *flights: FlightData,
+    proposal: NextFlight | None = None,
+    improvement: float | None = 0.05,
+    noise: Noise | None = None,
+) -> History:
     return History(
         output_title="Altitude",
         output_unit="m",
@@ -53,11 +62,26 @@ def history(*flights: FlightData, proposal: NextFlight | None = None, improvemen
         flights=flights,
         proposal=proposal,
         stop_improvement=improvement,
+        noise=noise,
     )
 
 
-def proposal(number: int) -> NextFlight:
-    return NextFlight(number=number, gains={"kp": 500, "ki": 200, "kd": 90}, curve=climb(0.1), predicted_error=0.12)
+def proposal(number: int, *, interval: Range | None = None, band_m: float | None = None) -> NextFlight:
+    """Expected to overshoot by 0.1 m, within ± `band_m` all along."""
+    curve = climb(0.1)
+    band = (
+        None
+        if band_m is None
+        else Band(lower=Curve(TIME_S, curve.values - band_m), upper=Curve(TIME_S, curve.values + band_m))
+    )
+    return NextFlight(
+        number=number,
+        gains={"kp": 500, "ki": 200, "kd": 90},
+        curve=curve,
+        predicted_error=0.12,
+        band=band,
+        interval=interval,
+    )
 
 
 def traces(card: Card) -> list[dict[str, Any]]:

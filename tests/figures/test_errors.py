@@ -1,6 +1,7 @@
 import pytest
 
 from app.figures.errors import ErrorsFigure
+from app.figures.history import Noise, Range, Repeats
 from tests.figures.builders import flight, history, layout, proposal, trace, traces
 
 TABLE_1 = [
@@ -55,11 +56,48 @@ def test_a_flight_with_a_huge_error_is_marked_at_the_edge_with_its_value() -> No
     assert trace(card, "off scale", trial=6)["text"] == ["↑ 4.20"]
 
 
-def test_the_table_lists_every_flight_with_its_running_best() -> None:
-    card = ErrorsFigure(history(flight(1, 0.3), flight(2, None, outcome="invalid"), flight(3, 0.2))).compute()
+def test_each_flight_stands_over_the_interval_it_was_expected_in() -> None:
+    flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Range(0.18, 0.22)))
+    card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Range(-0.01, 0.15)))).compute()
+    drawn = trace(card, "interval")
+    assert drawn["x"] == [2, 2, None, 3, 3, None]
+    assert drawn["y"] == [0.18, 0.22, None, 0.0, 0.15, None]
+
+
+def test_an_interval_far_above_all_errors_is_cut_at_the_edge_and_does_not_stretch_the_axis() -> None:
+    card = ErrorsFigure(history(flight(1, 0.3), proposal=proposal(2, interval=Range(0.1, 7.0)))).compute()
+    top = layout(card)["yaxis"]["range"][1]
+    assert top < 0.4
+    assert trace(card, "interval")["y"] == [0.1, pytest.approx(top), None]
+
+
+def test_the_noise_is_drawn_as_error_bars_as_means_of_repeats_and_as_a_band_around_the_best() -> None:
+    noise = Noise(0.0141, (Repeats((4, 5), 0.1491, 0.01),), Range(0.12, 0.178))
+    card = ErrorsFigure(history(*TABLE_1, noise=noise)).compute()
+    assert trace(card, "measured")["error_y"]["value"] == 0.0141
+    repeats = trace(card, "repeats")
+    assert (repeats["y"], repeats["error_y"]["array"]) == ([0.1491], [0.01])
+    assert "Flights 4, 5" in repeats["text"][0]
+    assert set(trace(card, "noise")["y"]) == {0.12, 0.178}
+    quiet = {one["meta"]["role"] for one in traces(ErrorsFigure(history(*TABLE_1)).compute())}
+    assert not quiet & {"noise", "repeats", "interval"}
+
+
+def test_the_table_lists_every_flight_with_its_running_best_and_the_next_one_last() -> None:
+    card = ErrorsFigure(
+        history(
+            flight(1, 0.3),
+            flight(2, None, outcome="invalid"),
+            flight(3, 0.2, predicted_error=0.21, interval=Range(0.19, 0.23)),
+            proposal=proposal(4, interval=Range(0.1, 0.14)),
+            noise=Noise(0.01),
+        )
+    ).compute()
     assert card.table is not None
     assert card.table.rows == (
-        (1, "valid", 0.3, None, 0.3),
-        (2, "invalid", None, None, None),
-        (3, "valid", 0.2, None, 0.2),
+        (1, "valid", 0.3, 0.01, None, None, None, 0.3),
+        (2, "invalid", None, None, None, None, None, None),
+        (3, "valid", 0.2, 0.01, 0.21, 0.19, 0.23, 0.2),
+        (4, "next", None, None, 0.12, 0.1, 0.14, None),
     )
+    assert {len(row) for row in card.table.rows} == {len(card.table.columns)}

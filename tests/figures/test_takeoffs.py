@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from app.figures.history import Curve
+from app.figures.history import Curve, Range
 from app.figures.scale import robust_range, thinned
 from app.figures.takeoffs import TakeoffsFigure
 from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, layout, proposal, trace, traces
@@ -48,6 +50,37 @@ def test_the_prediction_is_dashed_and_named_after_the_next_flight() -> None:
     assert drawn["line"]["dash"] == "dash"
     assert drawn["name"] == "Predicted"
     assert "Flight 2, predicted" in drawn["hovertemplate"]
+
+
+def test_the_band_of_the_prediction_lies_below_every_curve() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2, band_m=0.2))).compute()
+    assert [one["meta"].get("edge") for one in traces(card)][:2] == ["lower", "upper"]
+    lower, upper = trace(card, "band", edge="lower"), trace(card, "band", edge="upper")
+    assert upper["fill"] == "tonexty"
+    np.testing.assert_allclose(lower["y"], np.interp(lower["x"], TIME_S, climb(0.1).values - 0.2), atol=1e-4)
+    np.testing.assert_allclose(upper["y"], np.interp(upper["x"], TIME_S, climb(0.1).values + 0.2), atol=1e-4)
+    assert card.table is not None
+    assert [column.name for column in card.table.columns][-2:] == ["prediction_lower", "prediction_upper"]
+    assert list(card.table.rows[-1][-2:]) == pytest.approx([2.8, 3.2], abs=1e-4)
+
+
+def test_a_glitch_is_marked_on_the_curve_where_it_happened() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3, glitches=(Range(5.0, 5.2), Range(9.0, 9.1))))).compute()
+    marked = trace(card, "glitch", trial=1)
+    seconds = [value for value in marked["x"] if value is not None]
+    assert (min(seconds), max(seconds)) == (pytest.approx(4.99, abs=0.011), pytest.approx(9.1, abs=0.011))
+    assert not [value for value in seconds if 5.25 < value < 8.95]
+    assert None in marked["x"]
+
+
+def test_an_error_around_zero_is_shown_on_both_sides() -> None:
+    wave = Curve(TIME_S, 0.17 * np.sin(TIME_S))
+    zero = Curve(TIME_S, np.zeros_like(TIME_S))
+    first = replace(flight(1, 3.38), curve=wave)
+    second = replace(flight(2, 0.2), curve=Curve(TIME_S, 0.01 * np.sin(TIME_S)))
+    card = TakeoffsFigure(replace(history(first, second), set_point=zero, reference=None)).compute()
+    low, high = layout(card)["yaxis"]["range"]
+    assert (low, high) == (pytest.approx(-0.19, abs=0.03), pytest.approx(0.19, abs=0.03))
 
 
 def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others() -> None:

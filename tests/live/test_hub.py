@@ -15,7 +15,7 @@ def change(number: int) -> Change:
 
 
 def telemetry(time_s: float) -> Telemetry:
-    return Telemetry(campaign_id=1, trial_id=7, time_s=time_s, samples=[], error_so_far=None)
+    return Telemetry(campaign_id=1, trial_id=7, time_s=time_s, columns=[], samples=[], error_so_far=None)
 
 
 def test_a_slow_stream_gets_every_change_and_only_the_newest_telemetry() -> None:
@@ -57,8 +57,8 @@ def test_two_streams_see_the_same() -> None:
 
 def test_a_stream_that_joins_late_gets_the_flight_from_its_command_on() -> None:
     def sample(time_s: float) -> Telemetry:
-        row = (time_s, 0.1, 0.0, 3.0, 0.0, 0.6, 12.0)
-        return Telemetry(campaign_id=1, trial_id=7, time_s=time_s, samples=[row], error_so_far=2.9)
+        row, columns = [time_s, 0.1, 0.6], ["time_s", "altitude_m", "thrust"]
+        return Telemetry(campaign_id=1, trial_id=7, time_s=time_s, columns=columns, samples=[row], error_so_far=2.9)
 
     async def first_heard(hub: Hub, now_s: float) -> list[float]:
         """Times of the first telemetry that a new stream gets, while the flight goes on."""

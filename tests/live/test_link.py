@@ -23,7 +23,8 @@ def telemetry(time_s: float = 1.0, rows: int = 1) -> Telemetry:
         trial_id=2,
         time_s=time_s,
         error_so_far=0.25,
-        samples=[(time_s, 1.5, 0.5, 3.0, 2.5, 0.6, 11.1)] * rows,
+        columns=["time_s", "altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "battery_v"],
+        samples=[[time_s, 1.5, 0.5, 3.0, 2.5, 0.6, 11.1]] * rows,
     )
 
 

@@ -38,6 +38,12 @@ def test_the_lock_for_running_covers_every_dependency_of_the_package() -> None:
     assert {normalised(each) for each in project["dependencies"]} <= {normalised(name) for name in pinned("run")}
 
 
+def test_what_benchmarks_compare_with_goes_with_the_versions_that_are_tested() -> None:
+    tested, compared = pinned("dev"), pinned("bench")
+    assert {"optuna", "bayesian-optimization"} <= set(compared)
+    assert {name: version for name, version in compared.items() if tested.get(name, version) != version} == {}
+
+
 def test_tests_run_with_the_versions_that_are_served() -> None:
     developing = pinned("dev")
     assert {name: developing[name] for name in pinned("run")} == pinned("run")

@@ -2,6 +2,8 @@
 
 import re
 
+import numpy as np
+import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
@@ -18,7 +20,26 @@ def test_a_difference_is_told_only_where_the_printed_errors_differ(client: TestC
     trials = [get(client, f"/api/trials/{number}") for number in (1, 2, 3)]
     first, alike, slower = (trial["error"] for trial in trials)
     assert 0.0 < alike - first < 0.0005
-    assert f"as good as the best before it (flight 1, {first:.3f} m)" in trials[1]["verdict"]
+    assert f"the same as the best before it (flight 1, {first:.3f} m)" in trials[1]["verdict"]
     share = 100 * (slower - first) / first
-    told = re.escape(f"{slower - first:.3f} m ({share:.0f} %) worse than the best before it (flight 1, {first:.3f} m)")
+    told = re.escape(f"{slower - first:.3f} m ({share:.0f} %) higher than the best before it (flight 1, {first:.3f} m)")
     assert re.search(told, trials[2]["verdict"])
+
+
+def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_the_scatter_allows(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=PATIENT)
+    for settling_s in (2.0, 1.0, 1.001):
+        run_jobs(database)
+        create_imported_trial(client, campaign["id"], create_csv(settling_s))
+    first, second, third = (get(client, f"/api/trials/{number}") for number in (1, 2, 3))
+    assert first["comparisons"] == []
+    [said] = second["comparisons"]
+    assert (said["against"], said["trial_number"], said["verdict"]) == ("best before", 1, "better")
+    assert said["difference"] == pytest.approx(second["group"]["mean"] - first["group"]["mean"], abs=1e-9)
+    errors = [flight["group"]["standard_error"] for flight in (first, second)]
+    assert said["standard_error"] == pytest.approx(np.hypot(*errors), abs=1e-9)
+    assert [one["verdict"] for one in third["comparisons"] if one["against"] == "first"] == ["better"]
+    same = third["gains"] == second["gains"]
+    assert ("best before" in {one["against"] for one in third["comparisons"]}) is not same

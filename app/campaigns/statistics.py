@@ -1,0 +1,196 @@
+"""What a campaign's flights say about its gains, as it looks from outside."""
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.definitions import definition_of
+from app.campaigns.schemas import (
+    BestTrial,
+    CampaignStatistics,
+    Comparison,
+    Drift,
+    FlightsToDecide,
+    RepeatGroup,
+    TrackRecord,
+    Trend,
+)
+from app.core.confirming import Standing, standing, verdict_sentence
+from app.core.experiments import get_experiment
+from app.core.experiments.base import Experiment
+from app.core.predictions import TrackRecord as Record
+from app.core.predictions import track_record
+from app.core.statistics import Group, drift_of, optimism, pooled, trend_of
+from app.core.strategies.history import describe
+from app.db.models import CampaignRow, TrialRow
+from app.trials import history
+
+_SURE: Final = 0.9
+_NO_OPTIMISM: Final = 0.05
+"""Shares of a standard error below this are not worth a sentence."""
+
+
+def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistics:
+    """Raises NotFoundError."""
+    row = repository.get_one(session, campaign_id)
+    trials = history.trials_of(session, campaign_id)
+    definition, experiment = definition_of(row), get_experiment(row.experiment)
+    flights = history.flown_gains(trials)
+    now = standing_of(row, trials)
+    scatter = pooled((), experiment.scatter) if now is None else now.scatter
+    expected = 0.0 if now is None else _optimism(now)
+    record = track_record(flights)
+    drift = None if now is None else _drift(experiment, now)
+    return CampaignStatistics(
+        error_unit=experiment.error_unit,
+        confidence=definition.stop.confidence,
+        sigma=scatter.sigma,
+        degrees_of_freedom=scatter.degrees_of_freedom,
+        groups=[] if now is None else [_group(now, group) for group in now.groups],
+        comparison=None if now is None else _comparison(experiment, now),
+        drift=drift,
+        trends=[] if now is None else _trends(experiment, max(now.groups, key=lambda group: group.size), trials),
+        optimism=expected,
+        shrunk_error=None if now is None else now.winner.mean + expected,
+        track_record=_track_record(record),
+        notes=[] if now is None else _notes(experiment, now, expected, drift, record),
+    )
+
+
+def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> Standing | None:
+    """Groups, scatter and winner of a campaign; None before its first valid flight."""
+    return standing(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
+
+
+def best_trial(trials: Sequence[TrialRow], now: Standing | None) -> BestTrial | None:
+    """The valid trial with the lowest error and the mean of its gains."""
+    best = history.best_of(trials)
+    if best is None or best.error is None or now is None:
+        return None
+    group = next(group for group in now.groups if best.number in group.numbers)
+    return BestTrial(
+        trial_id=best.id,
+        trial_number=best.number,
+        error=best.error,
+        gains=best.gains,
+        mean=group.mean,
+        standard_error=group.standard_error(now.scatter),
+        flights=group.size,
+    )
+
+
+def _group(now: Standing, group: Group) -> RepeatGroup:
+    return RepeatGroup(
+        gains=dict(group.gains),
+        trial_numbers=list(group.numbers),
+        errors=list(group.errors),
+        mean=group.mean,
+        standard_error=group.standard_error(now.scatter),
+        is_baseline=group is now.baseline,
+        is_best=group is now.winner,
+    )
+
+
+def _comparison(experiment: Experiment, now: Standing) -> Comparison | None:
+    said = now.comparison
+    if said is None:
+        return None
+    return Comparison(
+        verdict=said.verdict,
+        confidence=said.confidence,
+        difference=said.difference,
+        standard_error=said.standard_error,
+        further=None
+        if said.further is None
+        else FlightsToDecide(best=said.further.first, baseline=said.further.second),
+        sentence=verdict_sentence(experiment, now),
+    )
+
+
+def _optimism(now: Standing) -> float:
+    return optimism([group.mean for group in now.groups], [group.standard_error(now.scatter) for group in now.groups])
+
+
+def _drift(experiment: Experiment, now: Standing) -> Drift | None:
+    found = drift_of(now.baseline, now.scatter)
+    if found is None:
+        return None
+    amount = f"{found.difference:+.4f} ± {found.standard_error:.4f} {experiment.error_unit}"
+    word = "has drifted" if found.confidence >= _SURE else "has not drifted noticeably"
+    return Drift(
+        first_trial=found.first_number,
+        last_trial=found.last_number,
+        difference=found.difference,
+        standard_error=found.standard_error,
+        confidence=found.confidence,
+        sentence=f"From flight {found.first_number} to {found.last_number}, with the same gains, the vehicle {word}: "
+        f"{amount}, {found.confidence:.0%} confidence.",
+    )
+
+
+def _trends(experiment: Experiment, group: Group, trials: Sequence[TrialRow]) -> list[Trend]:
+    """Of the gains flown most: their errors against the flights' numbers, and against the battery where it was told."""
+    voltages = {row.number: row.landing_battery_v for row in trials}
+    told = [
+        (volts, error)
+        for number, error in zip(group.numbers, group.errors, strict=True)
+        if (volts := voltages[number]) is not None
+    ]
+    found = (
+        _trend("flight number", "per flight", experiment, [float(number) for number in group.numbers], group.errors),
+        _trend("battery voltage", "per V", experiment, [volts for volts, _ in told], [error for _, error in told]),
+    )
+    return [trend for trend in found if trend is not None]
+
+
+def _trend(
+    against: Literal["flight number", "battery voltage"],
+    per: str,
+    experiment: Experiment,
+    x: Sequence[float],
+    errors: Sequence[float],
+) -> Trend | None:
+    found = trend_of(x, errors, _SURE)
+    if found is None:
+        return None
+    unit = f"{experiment.error_unit} {per}"
+    word = "changes with" if found.is_resolved else "shows no dependence on"
+    return Trend(
+        against=against,
+        unit=unit,
+        slope=found.slope,
+        lower=found.lower,
+        upper=found.upper,
+        sentence=f"The error {word} the {against}: {found.slope:+.2g} {unit}, {_SURE:.0%} interval "
+        f"{found.lower:+.2g} … {found.upper:+.2g}.",
+    )
+
+
+def _track_record(record: Record) -> TrackRecord:
+    return TrackRecord(
+        inside=record.inside,
+        of=record.of,
+        share=record.share,
+        agreeing=record.agreeing,
+        disagreeing=record.disagreeing,
+        trustworthy=record.trustworthy,
+        sentence=record.sentence,
+    )
+
+
+def _notes(experiment: Experiment, now: Standing, expected: float, drift: Drift | None, record: Record) -> list[str]:
+    unit = experiment.error_unit
+    notes = [verdict_sentence(experiment, now)]
+    if expected > _NO_OPTIMISM * now.winner.standard_error(now.scatter):
+        notes.append(
+            f"The best of {len(now.groups)} gain sets ({describe(now.winner.gains)}) looks better than it is, for "
+            f"having been chosen: by {expected:.4f} {unit} on average, so that its error is nearer to "
+            f"{now.winner.mean + expected:.4f} {unit}."
+        )
+    if drift is not None:
+        notes.append(drift.sentence)
+    if not record.trustworthy:
+        notes.append(record.sentence)
+    return notes

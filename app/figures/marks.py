@@ -1,0 +1,82 @@
+"""What several figures lay over or under their curves: a prediction's band, and stretches that cannot be right."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from app.figures import theme
+from app.figures.history import Band, Curve, Range
+from app.figures.scale import thinned
+from app.figures.theme import Palette
+
+GLITCH_POINTS: Final = 60
+
+
+def band_traces(palette: Palette, band: Band | None, points: int) -> list[dict[str, object]]:
+    """Between which curves a flight is expected: two traces (`meta` role band, edge lower and upper), none without."""
+    if band is None:
+        return []
+    quiet: dict[str, object] = {
+        "type": "scatter",
+        "mode": "lines",
+        "line": theme.line(theme.faint(palette.prediction, 0.35), 0.75),
+        "hoverinfo": "skip",
+        "legendgroup": "band",
+        "legendrank": 900,
+    }
+    lower, upper = (thinned(curve.time_s, curve.values, points) for curve in (band.lower, band.upper))
+    return [
+        {
+            **quiet,
+            "name": "Likely, lower edge",
+            "x": lower[0],
+            "y": lower[1],
+            "showlegend": False,
+            "meta": {"role": "band", "edge": "lower"},
+        },
+        {
+            **quiet,
+            "name": "Likely",
+            "x": upper[0],
+            "y": upper[1],
+            "fill": "tonexty",
+            "fillcolor": theme.faint(palette.prediction, 0.14),
+            "meta": {"role": "band", "edge": "upper"},
+        },
+    ]
+
+
+def glitch_traces(
+    palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+) -> list[dict[str, object]]:
+    """The stretches of a flight's record that cannot be right, laid over its curve: one trace, or none."""
+    if curve is None or not glitches:
+        return []
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for glitch in glitches:
+        time_s, values = _stretch(curve, glitch)
+        x, y = [*x, *time_s, None], [*y, *values, None]
+    return [
+        {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "name": f"Flight {number}, glitch",
+            "x": x[:-1],
+            "y": y[:-1],
+            "line": theme.line(palette.bad, 5),
+            "marker": {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
+            "opacity": 0.85,
+            "showlegend": False,
+            "meta": {"role": "glitch", "trial": number},
+            "hovertemplate": f"<b>Flight {number}, glitch</b><br>%{{x:.2f}} s · %{{y:.3f}} {unit}<extra></extra>",
+        }
+    ]
+
+
+def _stretch(curve: Curve, part: Range) -> tuple[list[float], list[float]]:
+    """A part of a curve, with the samples just before and after it, so that a gap shows too."""
+    first = max(0, int(np.searchsorted(curve.time_s, part.low, "left")) - 1)
+    last = int(np.searchsorted(curve.time_s, part.high, "right")) + 1
+    return thinned(curve.time_s[first:last], curve.values[first:last], GLITCH_POINTS)

@@ -1,0 +1,195 @@
+"""A drawing of a few panels, one above the other: what the figures of a publication are made of."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Final, Literal
+
+import numpy as np
+
+from app.figures import theme
+from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.theme import PALETTES, Palette, ThemeName
+
+Style = Literal[
+    "goal", "reference", "before", "after", "model", "recorded", "replica", "mean", "spread",
+    "run 1", "run 2", "run 3", "run 4", "run 5", "run 6",
+]  # fmt: skip
+"""What a line stands for. A style is told from the others by its dash or width too, not by its colour alone."""
+
+GAP: Final = 0.1
+TABLE_ROWS: Final = 33
+SEPARATE: Final = 60
+"""Up to so many abscissae each is a row of the table; with more, rows are spaced evenly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One line or row of marks: `x` and `y` of the same length; `note` is shown when a point is asked for."""
+
+    name: str
+    style: Style
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    marks: bool = False
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One pair of axes with its lines, drawn in their order; `digits` after the point in tables and readings."""
+
+    y_title: str
+    lines: tuple[Line, ...]
+    y_range: tuple[float, float] | None = None
+    digits: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """Panels over one abscissa. `summary` says in a sentence what is to be seen."""
+
+    title: str
+    summary: str
+    x_title: str
+    panels: tuple[Panel, ...]
+    x_range: tuple[float, float] | None = None
+    x_digits: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PanelsFigure:
+    """Table columns: `x`, then one for each line that is not a mere repetition of its name in the panel above.
+
+    Every trace carries `meta`: `role` is its style, `panel` its place from 1 on, `line` its name.
+    """
+
+    plot: Plot
+    theme: ThemeName = "light"
+    name: ClassVar[str] = "panels"
+    title: ClassVar[str] = "Panels"
+
+    def not_ready(self) -> str | None:
+        return None if any(panel.lines for panel in self.plot.panels) else "There is nothing to draw."
+
+    def compute(self) -> Card:
+        palette, plot = PALETTES[self.theme], self.plot
+        axes: dict[str, object] = {}
+        traces: list[dict[str, object]] = []
+        named: set[str] = set()
+        for number, panel in enumerate(plot.panels, start=1):
+            axes |= self._axes(palette, number, panel)
+            for line in panel.lines:
+                traces.append(self._trace(palette, number, panel, line, in_legend=line.name not in named))
+                named.add(line.name)
+        layout = theme.layout(palette, uirevision=plot.title, showlegend=len(named) > 1, **axes)
+        return Card(
+            name=self.name,
+            title=plot.title,
+            state="ready",
+            summary=plot.summary,
+            figure=plotly_json(traces, layout),
+            table=self._table(),
+        )
+
+    def _trace(self, palette: Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> dict[str, object]:
+        colour, width, dash = _pen(palette, line.style)
+        drawn: dict[str, object] = (
+            {"mode": "markers", "marker": theme.solid(colour, size=7), "cliponaxis": False}
+            if line.marks
+            else {"mode": "lines", "line": theme.line(colour, width, dash)}
+        )
+        note = f"<br>{line.note}" if line.note else ""
+        return {
+            "type": "scatter",
+            "name": line.name,
+            "x": list(line.x),
+            "y": list(line.y),
+            "xaxis": "x" + _suffix(number),
+            "yaxis": "y" + _suffix(number),
+            "legendgroup": line.name,
+            "showlegend": in_legend,
+            "meta": {"role": line.style, "panel": number, "line": line.name},
+            "hovertemplate": f"<b>{line.name}</b><br>%{{x}} · %{{y:.{panel.digits}f}}{note}<extra></extra>",
+            **drawn,
+        }
+
+    def _axes(self, palette: Palette, number: int, panel: Panel) -> dict[str, object]:
+        count = len(self.plot.panels)
+        height = (1 - GAP * (count - 1)) / count
+        top = 1 - (number - 1) * (height + GAP)
+        lowest = number == count
+        x: dict[str, object] = {"anchor": "y" + _suffix(number), "showticklabels": lowest}
+        if self.plot.x_range is not None:
+            x["range"] = list(self.plot.x_range)
+        if number > 1:
+            x["matches"] = "x"
+        y: dict[str, object] = {
+            "anchor": "x" + _suffix(number),
+            "domain": [max(0.0, top - height), top],
+            "nticks": 7 if count == 1 else 4,
+        }
+        if panel.y_range is not None:
+            y["range"] = list(panel.y_range)
+        return {
+            "xaxis" + _suffix(number): theme.titled(palette, self.plot.x_title, **x)
+            if lowest
+            else theme.axis(palette, **x),
+            "yaxis" + _suffix(number): theme.titled(palette, panel.y_title, **y),
+        }
+
+    def _table(self) -> Table:
+        several = len(self.plot.panels) > 1
+        columns = [Column("x", self.plot.x_title, digits=self.plot.x_digits)]
+        lines: list[tuple[Line, int]] = []
+        for number, panel in enumerate(self.plot.panels, start=1):
+            for line in panel.lines:
+                title = f"{panel.y_title}: {line.name}" if several else line.name
+                columns.append(Column(f"panel_{number}_{len(lines) + 1}", title, digits=panel.digits))
+                lines.append((line, panel.digits))
+        rows = tuple(
+            (round(x, 6), *(_at(line, x, digits + 1) for line, digits in lines))
+            for x in self._abscissae([line for line, _ in lines])
+        )
+        return Table(tuple(columns), rows)
+
+    def _abscissae(self, lines: list[Line]) -> list[float]:
+        every = sorted({x for line in lines for x in line.x})
+        if len(every) <= SEPARATE:
+            return every
+        low, high = self.plot.x_range or (every[0], every[-1])
+        return [float(x) for x in np.linspace(max(low, every[0]), min(high, every[-1]), TABLE_ROWS)]
+
+
+def _at(line: Line, x: float, digits: int) -> Cell:
+    """The line's value there, between its points by interpolation, marks only where they are; None elsewhere."""
+    if line.marks:
+        return next((round(y, digits) for at, y in zip(line.x, line.y, strict=True) if at == x), None)
+    if not line.x or not line.x[0] <= x <= line.x[-1]:
+        return None
+    return round(float(np.interp(x, line.x, line.y)), digits)
+
+
+def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
+    """Colour, width and dash."""
+    _, orange, blue = palette.gains
+    pens: dict[Style, tuple[str, float, str]] = {
+        "goal": (palette.dim, 1.5, "dot"),
+        "reference": (palette.dim, 1.5, "dashdot"),
+        "before": (palette.bad, 2, "dash"),
+        "after": (palette.best, 2.5, "solid"),
+        "model": (palette.prediction, 2, "dash"),
+        "recorded": (palette.earlier, 4.5, "solid"),
+        "replica": (palette.ink, 1.5, "dash"),
+        "mean": (palette.best, 2, "solid"),
+        "spread": (palette.dim, 1.25, "dash"),
+        "run 1": (palette.ink, 2, "solid"),
+        "run 2": (orange, 2, "dash"),
+        "run 3": (blue, 2, "dot"),
+        "run 4": (palette.prediction, 2, "dashdot"),
+        "run 5": (palette.best, 3, "solid"),
+        "run 6": (palette.bad, 2, "longdash"),
+    }
+    return pens[style]
+
+
+def _suffix(number: int) -> str:
+    return "" if number == 1 else str(number)

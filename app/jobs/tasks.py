@@ -1,0 +1,123 @@
+"""A worker's desk: it claims jobs of its kind and carries them out, whatever they are."""
+
+from collections.abc import Callable
+from concurrent.futures import CancelledError
+from dataclasses import dataclass
+from time import monotonic
+from typing import Final
+
+import structlog
+
+from app.db.session import Database
+from app.errors import GainlineError, StorageError
+from app.jobs import service as jobs
+
+BEATS_PER_LEASE: Final = 3
+
+_log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Claimed:
+    """A claimed job, apart from its row."""
+
+    id: int
+    campaign_id: int | None
+    order: dict[str, object]
+
+
+def recover(database: Database) -> None:
+    """After a worker's start: whatever ran waits again. Raises StorageError."""
+    with database.write() as session:
+        for job_id in jobs.requeue_running_jobs(session):
+            _log.warning("job waits again: its worker ended", job_id=job_id)
+
+
+class Desk:
+    """Claims jobs of one kind, at most `room` at a time. `claim` and `heartbeat` belong to one thread, `carry_out` to
+    any.
+
+    `perform(job)` does the work and stores what came of it. It may raise GainlineError, which is kept with the job for
+    a person, and CancelledError when the worker ends.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        kind: str,
+        perform: Callable[[Claimed], None],
+        *,
+        room: int,
+        worker: str,
+        lease_s: float,
+    ) -> None:
+        self._database = database
+        self._kind = kind
+        self._perform = perform
+        self._room = room
+        self._worker = worker
+        self._lease_s = lease_s
+        self._at_work: set[int] = set()
+        self._beat_due_s = 0.0
+
+    @property
+    def at_work(self) -> int:
+        """How many jobs are claimed and not finished."""
+        return len(self._at_work)
+
+    def claim(self) -> Claimed | None:
+        """The job that has waited longest, now this worker's; None when none waits or the desk is full. Raises
+        StorageError."""
+        if self.at_work >= self._room:
+            return None
+        with self._database.write() as session:
+            row = jobs.claim_job(session, worker=self._worker, kinds=(self._kind,), lease_s=self._lease_s)
+            if row is None:
+                return None
+            job = Claimed(row.id, row.campaign_id, dict(row.order or {}))
+        self._at_work.add(job.id)
+        return job
+
+    def heartbeat(self) -> None:
+        """When it is time, extend the leases of the jobs at work; those given up (their result found no room on the
+        disk) wait again once their lease is over. Raises StorageError."""
+        if monotonic() < self._beat_due_s:
+            return
+        self._beat_due_s = monotonic() + self._lease_s / BEATS_PER_LEASE
+        with self._database.write() as session:
+            for job_id in tuple(self._at_work):
+                jobs.heartbeat_job(session, job_id, worker=self._worker, lease_s=self._lease_s)
+            jobs.requeue_expired_jobs(session)
+
+    def carry_out(self, job: Claimed) -> None:
+        """The whole job, from the stored order to the stored result. Raises nothing."""
+        with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
+            try:
+                self._perform(job)
+            except CancelledError:
+                _log.info("job dropped, because the worker ends; it runs again with the next one")
+            except StorageError as error:
+                _log.error("job given up; it runs again when its lease is over", why=str(error))
+            except GainlineError as error:
+                self._fail(job, error)
+            except Exception as error:  # noqa: BLE001 - the edge of the thread
+                _log.exception("job failed by a mistake of the program")
+                self._fail(job, mistake(f"{type(error).__name__}: {error}"))
+            finally:
+                self._at_work.discard(job.id)
+
+    def _fail(self, job: Claimed, error: GainlineError) -> None:
+        _log.warning("job failed", why=str(error))
+        try:
+            with self._database.write() as session:
+                jobs.fail_job(session, job.id, error, worker=self._worker)
+        except StorageError as refused:
+            _log.error("job given up; it runs again when its lease is over", why=str(refused))
+
+
+def mistake(what: str) -> GainlineError:
+    """The error that a person sees when the program itself is to blame."""
+    return GainlineError(
+        f"The program made a mistake ({what}).",
+        hint="Try again; if it happens again, report it with the worker's log.",
+    )

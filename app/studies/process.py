@@ -1,0 +1,109 @@
+"""A process that computes one reproduction, with less priority than everything else, and says how far it is.
+
+It holds one end of a lifeline as the pool's processes do: when its parent lets go or dies, it ends at once. A
+reproduction is pure, so nothing is lost by that.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Final, Self
+
+from app.core.errors import GainlineError, Problem
+from app.studies.reproductions import get_reproduction
+from app.studies.results import Result
+
+NICENESS: Final = 10
+ENDS_WITHIN_S: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Advance:
+    """Said by the process: the share done, 0 … 1, and what it is at."""
+
+    share: float
+    doing: str
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Said by the process: an error of ours, for a person."""
+
+    message: str
+    hint: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mistaken:
+    """Said by the process: the program's own mistake."""
+
+    what: str
+
+
+Said = Advance | Result | Refused | Mistaken
+
+
+class DiedError(Exception):
+    """The process is gone without a word; `args` hold its exit code."""
+
+
+class StudyProcess:
+    """One reproduction between enter and exit; on exit the process is ended, wherever it is."""
+
+    def __init__(self, name: str, *, full: bool) -> None:
+        context = get_context("spawn")
+        self._pipe, self._theirs = context.Pipe()
+        self._process = context.Process(
+            target=_work, args=(self._theirs, name, full), name=f"reproduction {name}", daemon=True
+        )
+
+    def __enter__(self) -> Self:
+        self._process.start()
+        self._theirs.close()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pipe.close()
+        self._process.kill()
+        self._process.join(ENDS_WITHIN_S)
+
+    def listen(self, within_s: float) -> Said | None:
+        """What it says next, None when it says nothing for so long. Raises DiedError."""
+        try:
+            if not self._pipe.poll(within_s):
+                return None
+            said: Said = self._pipe.recv()
+        except (EOFError, OSError) as error:
+            self._process.join(ENDS_WITHIN_S)
+            raise DiedError(self._process.exitcode) from error
+        return said
+
+
+def _work(pipe: Connection, name: str, full: bool) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(NICENESS)
+    threading.Thread(target=_end_with, args=(pipe,), daemon=True).start()
+    pipe.send(_outcome(lambda share, doing: pipe.send(Advance(share, doing)), name, full))
+
+
+def _outcome(tell: Callable[[float, str], None], name: str, full: bool) -> Result | Refused | Mistaken:
+    try:
+        return get_reproduction(name).run(tell, full)
+    except GainlineError as error:
+        return Refused(error.message, error.hint, error.problems)
+    except Exception as error:  # noqa: BLE001 - the edge of the process
+        return Mistaken(f"{type(error).__name__}: {error}")
+
+
+def _end_with(pipe: Connection) -> None:
+    """Nothing is ever said to the process: what arrives is the end of its parent."""
+    pipe.poll(None)
+    os._exit(0)

@@ -1,0 +1,41 @@
+"""Reproductions over HTTP."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Path, status
+
+from app.api.deps import Act, Reader, json_only
+from app.api.figures import FigureCard, Theme, figure_card
+from app.jobs.schemas import Job
+from app.schemas import Page
+from app.studies import service
+from app.studies.schemas import Reproduction, ReproductionSummary, Run
+
+router = APIRouter(prefix="/api/reproductions", tags=["reproductions"], dependencies=[Depends(json_only)])
+
+Name = Annotated[str, Path(max_length=60)]
+
+
+@router.get("")
+def list_reproductions(session: Reader) -> Page[ReproductionSummary]:
+    """The experiments, tables and figures of the paper that can be run here."""
+    found = service.list_reproductions(session)
+    return Page(items=found, total=len(found), next_cursor=None)
+
+
+@router.get("/{name}")
+def get_reproduction(session: Reader, name: Name) -> Reproduction:
+    """One of them with the rows of its newest result: measured, published, and their ratio."""
+    return service.get_reproduction(session, name)
+
+
+@router.post("/{name}/run", status_code=status.HTTP_202_ACCEPTED)
+def run_reproduction(act: Act, name: Name, body: Run | None = None) -> Job:
+    """Have it run. While it waits or runs already, the answer is that job."""
+    return act(Job, lambda session: service.request_run(session, name, full=(body or Run()).full))
+
+
+@router.get("/{name}/figures/{figure}")
+def get_reproduction_figure(session: Reader, name: Name, figure: Name, theme: Theme = "light") -> FigureCard:
+    """A figure of the newest result."""
+    return figure_card(service.figure(session, name, figure, theme))

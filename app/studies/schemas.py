@@ -1,0 +1,72 @@
+"""What a reproduction looks like from outside."""
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+from app.jobs.schemas import Job
+from app.schemas import Gains, Request
+
+
+class Run(Request):
+    """How to run a reproduction."""
+
+    full: Annotated[bool, Field(description="the long form, where there is one")] = False
+
+
+class ReproductionFigure(BaseModel):
+    """A drawing of a reproduction, and what the paper calls it."""
+
+    name: str
+    title: str
+
+
+class LatestRun(BaseModel):
+    """The newest finished run; its job says when it was started."""
+
+    job_id: int
+    full: bool
+    finished_at: datetime
+    seconds: float
+
+
+class ReproductionSummary(BaseModel):
+    """One experiment, table or figure of the paper. `line` says what is done here, `paper` what the paper shows.
+
+    `job` is the newest run that waits, runs, or failed after the `latest` one.
+    """
+
+    name: str
+    title: str
+    line: str
+    paper: str
+    long_form: Annotated[str, Field(description="what the long form does; empty where there is none")]
+    figures: list[ReproductionFigure]
+    job: Job | None
+    latest: LatestRun | None
+
+
+class ReproductionRow(BaseModel):
+    """One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is what this program is held
+    to. `overruled` says why gains were flown that the gate refuses."""
+
+    group: str
+    label: str
+    unit: str
+    digits: int
+    measured: float
+    paper: float | None
+    reference: float | None
+    ratio: float | None
+    note: str
+    gains: Gains
+    numbers: Annotated[dict[str, float], Field(description="further figures of the row, units in their names")]
+    overruled: str
+
+
+class Reproduction(ReproductionSummary):
+    """A reproduction with the rows of its newest result, empty before the first."""
+
+    rows: list[ReproductionRow]
+    notes: list[str]

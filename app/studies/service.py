@@ -1,0 +1,144 @@
+"""What people and scripts do with reproductions: have one run, read what came of it."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from pydantic import TypeAdapter, ValidationError
+from sqlalchemy.orm import Session
+
+from app.db.models import JobRow
+from app.errors import GainlineError, NotFoundError
+from app.figures.base import Card, card_of
+from app.figures.panels import PanelsFigure
+from app.figures.theme import ThemeName
+from app.jobs import service as jobs
+from app.jobs.schemas import Job
+from app.jobs.states import JobState
+from app.studies import schemas
+from app.studies.reproductions import REPRODUCTIONS, Reproduction
+from app.studies.results import Result, result_from_json
+
+REPRODUCTION_JOB: Final = "reproduction"
+UNDER_WAY: Final = (JobState.QUEUED, JobState.RUNNING)
+CAME_TO_NOTHING: Final = (JobState.FAILED, JobState.CANCELLED)
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What a job of this kind is to do."""
+
+    name: str
+    full: bool = False
+
+
+_ORDER: Final = TypeAdapter(Order)
+
+
+def read_order(order: object) -> Order:
+    """Raises GainlineError for a job of another version of the program."""
+    try:
+        found = _ORDER.validate_python(order)
+    except ValidationError as error:
+        raise GainlineError(f"The order {order!r} cannot be read.", hint="Run the reproduction anew.") from error
+    if found.name not in REPRODUCTIONS:
+        raise GainlineError(f"There is no reproduction {found.name} any more.", hint="Run another one.")
+    return found
+
+
+def list_reproductions(session: Session) -> list[schemas.ReproductionSummary]:
+    """All there are, in the order of the registry, without their rows."""
+    return [schemas.ReproductionSummary.model_validate(_summary(session, each)) for each in REPRODUCTIONS.values()]
+
+
+def get_reproduction(session: Session, name: str) -> schemas.Reproduction:
+    """One with the rows of its newest result. Raises NotFoundError."""
+    each = _registered(name)
+    result = _result(session, name)
+    return schemas.Reproduction.model_validate(
+        {
+            **_summary(session, each),
+            "rows": [] if result is None else list(result.rows),
+            "notes": [] if result is None else list(result.notes),
+        },
+        from_attributes=True,
+    )
+
+
+def request_run(session: Session, name: str, *, full: bool) -> Job:
+    """Have it run; one that waits or runs already serves for this too. Raises NotFoundError."""
+    _registered(name)
+    row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, UNDER_WAY) or jobs.enqueue_job(
+        session, REPRODUCTION_JOB, order={"name": name, "full": full}
+    )
+    return jobs.job_view(row)
+
+
+def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> Card:
+    """A figure of the newest result, or a card that waits for one. Raises NotFoundError."""
+    each = _registered(name)
+    if figure_name not in each.figures:
+        raise NotFoundError(f"figure {figure_name} of", name, hint=f"There are: {', '.join(each.figures)}.")
+    title, result = each.figures[figure_name], _result(session, name)
+    if result is None or figure_name not in result.figures:
+        return Card(name=figure_name, title=title, state="waiting", reason="Run this reproduction to see its figures.")
+    card = card_of(PanelsFigure(result.figures[figure_name], theme))
+    return Card(
+        name=figure_name,
+        title=f"{title}: {card.title}",
+        state=card.state,
+        summary=card.summary,
+        reason=card.reason,
+        figure=card.figure,
+        table=card.table,
+    )
+
+
+def _registered(name: str) -> Reproduction:
+    if name not in REPRODUCTIONS:
+        raise NotFoundError("reproduction", name, hint=f"There are: {', '.join(REPRODUCTIONS)}.")
+    return REPRODUCTIONS[name]
+
+
+def _summary(session: Session, each: Reproduction) -> dict[str, object]:
+    latest = jobs.latest_result(session, REPRODUCTION_JOB, each.name)
+    return {
+        "name": each.name,
+        "title": each.title,
+        "line": each.line,
+        "paper": each.paper,
+        "long_form": each.long_form,
+        "figures": [{"name": figure_name, "title": title} for figure_name, title in each.figures.items()],
+        "job": _open_job(session, each, latest),
+        "latest": None if latest is None else _latest_run(latest),
+    }
+
+
+def _open_job(session: Session, each: Reproduction, latest: JobRow | None) -> Job | None:
+    """What a page has to show beside the result: the run under way, or a later one that came to nothing."""
+    if (row := jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, UNDER_WAY)) is None:
+        row = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, CAME_TO_NOTHING)
+        if row is None or (latest is not None and row.id < latest.id):
+            return None
+    return jobs.job_view(row)
+
+
+def _latest_run(row: JobRow) -> schemas.LatestRun | None:
+    if row.started_at is None or row.finished_at is None:
+        return None
+    return schemas.LatestRun(
+        job_id=row.id,
+        full=read_order(row.order).full,
+        finished_at=row.finished_at,
+        seconds=(row.finished_at - row.started_at).total_seconds(),
+    )
+
+
+def _result(session: Session, name: str) -> Result | None:
+    """The newest result; one that this version of the program cannot read counts as none."""
+    row = jobs.latest_result(session, REPRODUCTION_JOB, name)
+    if row is None:
+        return None
+    try:
+        return result_from_json(row.result)
+    except ValueError:
+        return None

@@ -1,0 +1,96 @@
+"""Carrying out reproductions: each in a process of its own, watched until its result is stored."""
+
+import threading
+from concurrent.futures import CancelledError
+from time import monotonic
+from typing import Final, NoReturn
+
+import structlog
+
+from app.db.session import Database
+from app.errors import GainlineError
+from app.jobs import service as jobs
+from app.jobs.tasks import Claimed, mistake
+from app.studies.process import Advance, DiedError, Mistaken, Refused, Said, StudyProcess
+from app.studies.results import Result
+from app.studies.service import read_order
+
+LOOK_S: Final = 0.5
+"""How often at most progress is stored, and how soon a cancelled job is noticed."""
+
+_log = structlog.get_logger(__name__)
+
+
+class Reproducer:
+    """What a desk for reproductions performs. `closing` ends what is under way; it runs again with the next worker."""
+
+    def __init__(self, database: Database, *, worker: str, lease_s: float, closing: threading.Event) -> None:
+        self._database = database
+        self._worker = worker
+        self._lease_s = lease_s
+        self._closing = closing
+
+    def __call__(self, job: Claimed) -> None:
+        """From the stored order to the stored result. Raises GainlineError for a person, and CancelledError when the
+        worker ends."""
+        order, started_s = read_order(job.order), monotonic()
+        with StudyProcess(order.name, full=order.full) as process:
+            try:
+                result = self._watch(job, process)
+            except DiedError as death:
+                _log.warning("the process that computed died", name=order.name, exit_code=death.args[0])
+                with self._database.write() as session:
+                    jobs.give_up_job(session, job.id, worker=self._worker)
+                return
+        if result is None:
+            _log.info("reproduction cancelled", name=order.name)
+            return
+        with self._database.write() as session:
+            jobs.finish_job(session, job.id, worker=self._worker, result=result.as_json())
+        _log.info("reproduction stored", name=order.name, seconds=round(monotonic() - started_s, 1))
+
+    def _watch(self, job: Claimed, process: StudyProcess) -> Result | None:
+        """Until it has a result, storing how far it is; None when the job was cancelled meanwhile."""
+        latest, stored = Advance(0.0, "starting"), Advance(0.0, "")
+        due_s = 0.0
+        while True:
+            said = process.listen(max(due_s - monotonic(), 0.0))
+            if isinstance(said, Advance):
+                latest = said
+            elif said is not None:
+                return _checked(said)
+            if monotonic() < due_s:
+                continue
+            due_s = monotonic() + LOOK_S
+            if self._closing.is_set():
+                self._put_back(job)
+            if not self._still_wanted(job, latest, is_news=latest != stored):
+                return None
+            stored = latest
+
+    def _put_back(self, job: Claimed) -> NoReturn:
+        with self._database.write() as session:
+            jobs.put_back_job(session, job.id, worker=self._worker)
+        raise CancelledError
+
+    def _still_wanted(self, job: Claimed, latest: Advance, *, is_news: bool) -> bool:
+        """Whether the job is still this worker's; what is news is stored, and told to the browsers by that."""
+        with self._database.write() as session:
+            if not is_news:
+                return jobs.heartbeat_job(session, job.id, worker=self._worker, lease_s=self._lease_s)
+            return jobs.report_progress(
+                session, job.id, latest.share, latest.doing, worker=self._worker, lease_s=self._lease_s
+            )
+
+
+def _checked(said: Said) -> Result:
+    """The result. Raises GainlineError when the process met with an error."""
+    match said:
+        case Result():
+            return said
+        case Refused(message, hint, problems):
+            raise GainlineError(message, hint=hint, problems=problems)
+        case Mistaken(what):
+            raise mistake(what)
+        case Advance():
+            raise AssertionError

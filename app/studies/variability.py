@@ -1,0 +1,250 @@
+"""The paper's Fig. 12: one policy flown again and again on one battery; how much its errors scatter, and whether the
+battery shows in them.
+
+The paper flew one battery at each of two gain sets. Here many batteries are flown on the twin, so that the scatter of a
+single one can be told from the scatter as such: σ is pooled over the groups, √(Σ (e − ē)² / Σ (n − 1)).
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from app.core.definition import flight_seed
+from app.core.experiments import get_experiment
+from app.core.experiments.base import Matrix, Scatter
+from app.core.policy import Vector
+from app.core.statistics import Group, pooled, trend_of
+from app.figures.panels import Line, Panel, Plot, Style
+from app.studies.gate import overruled_for
+from app.studies.results import OVERRULE, Progress, Result, Row, marks, ratio
+from app.vehicles.base import FlightOrder
+from app.vehicles.open import open_vehicle
+from app.vehicles.twin import TWIN
+
+GROUPS: Final = 200
+REPEATS: Final = 10
+FADING_GROUPS: Final = 40
+FADE: Final = 0.005
+"""By how much of its thrust the control experiment's battery is weaker in the last flight than in the first."""
+CONFIDENCE: Final = 0.9
+SEED: Final = 1
+_NO_PRIOR: Final = Scatter(sd=0.0, degrees_of_freedom=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class RepeatedPolicy:
+    """A gain set that the paper repeated: its published σ, and the error of Table 2's one flight of it, both in m."""
+
+    title: str
+    gains: tuple[int, int, int]
+    paper_sigma: float
+    paper_error: float
+
+    @property
+    def named_gains(self) -> dict[str, float]:
+        return dict(zip(get_experiment("takeoff").space.names, map(float, self.gains), strict=True))
+
+
+POLICIES: Final = (
+    RepeatedPolicy("Default gains 283, 13, 82", (283, 13, 82), 0.0141, 0.5102),
+    RepeatedPolicy("Tuned gains 1624, 1356, 195", (1624, 1356, 195), 0.0066, 0.1218),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    """Errors in m of shape (groups, repeats), in the order of the flights, on steady and on fading batteries;
+    `overruled` says why they were flown although the gate refuses the gains."""
+
+    steady: Matrix
+    fading: Matrix
+    overruled: str
+
+
+def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_groups: int = FADING_GROUPS) -> Result:
+    """Fly both policies `groups` times ten flights; `groups` and `fading_groups` ≥ 1."""
+    per_policy = groups + fading_groups
+    found: list[Repeats] = []
+    for place, policy in enumerate(POLICIES):
+
+        def tell(done: int, place: int = place, policy: RepeatedPolicy = policy) -> None:
+            share = (place * per_policy + done) / (len(POLICIES) * per_policy)
+            on_progress(share, f"{policy.title}: battery {done} of {per_policy} flown")
+
+        found.append(_fly(policy, groups, fading_groups, tell))
+    return Result(
+        rows=tuple(row for policy, flown in zip(POLICIES, found, strict=True) for row in _rows(policy, flown)),
+        figures={"figure12": _plot([flown.steady[0] for flown in found])},
+        notes=(
+            (
+                f"{groups} batteries of {REPEATS} flights each at either gain set, on the twin with the real drone's "
+                "scatter. The scatter is to be within 40 % of the paper's, which comes from a single battery."
+            ),
+            (
+                f"A trend is the slope of the error over the {REPEATS} flights of a battery; it counts as seen when "
+                f"its {_percent(CONFIDENCE)} interval leaves out zero, which chance does on "
+                f"{_percent(1 - CONFIDENCE)} of steady batteries. The fading battery is {_percent(FADE)} weaker in "
+                "its last flight than in its first."
+            ),
+            (
+                "Both gain sets are judged by a campaign's gate first. ki = 1356 can wrap and is flown over its "
+                f"refusal. The reason recorded: {OVERRULE}."
+            ),
+        ),
+    )
+
+
+def repeated_errors(gains: tuple[int, int, int], *, seed: int, group: int, fade: float = 0.0) -> Vector:
+    """Errors of ten flights of one policy on one battery of the twin, shape (10,): what differs is the twin's scatter
+    and, with `fade`, the thrust, which falls from flight to flight by that share in all."""
+    experiment = get_experiment("takeoff")
+    hover = next(float(option.default) for option in TWIN.options if option.name == "hover_throttle")
+    errors = np.empty(REPEATS)
+    for flight in range(REPEATS):
+        weaker = 1.0 - fade * flight / (REPEATS - 1)
+        safe_gains = experiment.space.mapping(experiment.space.default)
+        with open_vehicle("twin", {"hover_throttle": hover / weaker}, safe_gains=safe_gains) as vehicle:
+            vehicle.stage(dict(zip(experiment.space.names, gains, strict=True)))
+            order = FlightOrder(seed=flight_seed(seed, group * REPEATS + flight + 1))
+            record = vehicle.fly(order, on_sample=lambda _: None, should_abort=lambda: None)
+        errors[flight] = experiment.error(record.trajectory)
+    return errors
+
+
+def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable[[int], None]) -> Repeats:
+    overruled = overruled_for(policy.named_gains, "twin")
+    flown: list[Vector] = []
+    for group in range(groups + fading_groups):
+        fade = FADE if group >= groups else 0.0
+        flown.append(repeated_errors(policy.gains, seed=SEED, group=group, fade=fade))
+        tell(len(flown))
+    return Repeats(np.array(flown[:groups]), np.array(flown[groups:]), overruled)
+
+
+def pooled_sigma(errors: Matrix) -> float:
+    """σ in the errors' unit, pooled over the rows of (groups, repeats)."""
+    groups = [Group(gains={}, numbers=(), errors=tuple(row)) for row in errors.tolist()]
+    return pooled(groups, _NO_PRIOR).sigma
+
+
+def share_with_trend(errors: Matrix) -> float:
+    """The share of batteries, rows of (groups, repeats), whose trend is seen."""
+    trends = [trend_of(range(errors.shape[1]), row, CONFIDENCE) for row in errors.tolist()]
+    return float(np.mean([trend is not None and trend.is_resolved for trend in trends]))
+
+
+def _rows(policy: RepeatedPolicy, flown: Repeats) -> Iterator[Row]:
+    yield _sigma_row(policy, flown)
+    mean = float(flown.steady.mean())
+    yield Row(
+        group=policy.title,
+        label="mean error",
+        unit="m",
+        measured=mean,
+        paper=policy.paper_error,
+        ratio=ratio(mean, policy.paper_error),
+        note="published: the one flight of Table 2",
+        gains=policy.named_gains,
+        overruled=flown.overruled,
+    )
+    yield _trend_row(policy, flown.steady)
+    yield Row(
+        group=policy.title,
+        label="steady batteries that show a trend",
+        unit="share",
+        measured=share_with_trend(flown.steady),
+        reference=1.0 - CONFIDENCE,
+        digits=3,
+        note="what chance alone does",
+    )
+    yield Row(
+        group=policy.title,
+        label=f"batteries fading by {_percent(FADE)} that show one",
+        unit="share",
+        measured=share_with_trend(flown.fading),
+        digits=3,
+        note="what ten flights can reveal",
+    )
+
+
+def _sigma_row(policy: RepeatedPolicy, flown: Repeats) -> Row:
+    sigma, own = pooled_sigma(flown.steady), flown.steady.std(axis=1, ddof=1)
+    low, high = np.quantile(own, (0.05, 0.95))
+    return Row(
+        group=policy.title,
+        label="σ of repeated flights",
+        unit="m",
+        measured=sigma,
+        paper=policy.paper_sigma,
+        ratio=ratio(sigma, policy.paper_sigma),
+        note=f"a single battery shows {low:.4f} … {high:.4f} m (5th to 95th of 100)",
+        gains=policy.named_gains,
+        overruled=flown.overruled,
+    )
+
+
+def _trend_row(policy: RepeatedPolicy, errors: Matrix) -> Row:
+    place = np.tile(np.arange(errors.shape[1], dtype=np.float64), len(errors))
+    centred = errors - errors.mean(axis=1, keepdims=True)
+    trend = trend_of(place.tolist(), centred.ravel().tolist(), CONFIDENCE)
+    assert trend is not None
+    return Row(
+        group=policy.title,
+        label="trend over a battery",
+        unit="mm per flight",
+        measured=1000.0 * trend.slope,
+        reference=0.0,
+        digits=3,
+        note=f"{_percent(CONFIDENCE)} interval {_mm(trend.lower)} … {_mm(trend.upper)}; published: none",
+        numbers={"lower_mm": 1000.0 * trend.lower, "upper_mm": 1000.0 * trend.upper},
+    )
+
+
+def _mm(metres: float) -> str:
+    return f"{1000.0 * metres:.3f}".replace("-", "−")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+def _plot(batteries: list[Vector]) -> Plot:
+    """The first battery of each policy, as the paper shows one of each."""
+    spread = [float(errors.std(ddof=1)) for errors in batteries]
+    return Plot(
+        title="ten takeoffs on one battery",
+        summary="Errors of ten flights on one battery, with their mean ± σ: "
+        + "; ".join(
+            f"{policy.title.lower()}: {errors.mean():.4f} ± {sd:.4f} m"
+            for policy, errors, sd in zip(POLICIES, batteries, spread, strict=True)
+        )
+        + ".",
+        x_title="Flight on the battery",
+        x_range=(0.5, REPEATS + 0.5),
+        x_digits=0,
+        panels=tuple(
+            Panel(y_title=f"{title}: error (m)", lines=_lines(errors, sd), digits=4, y_range=_around(errors, sd))
+            for title, errors, sd in zip(("Default", "Tuned"), batteries, spread, strict=True)
+        ),
+    )
+
+
+def _around(errors: Vector, sd: float) -> tuple[float, float]:
+    low, high = min(errors.min(), errors.mean() - sd), max(errors.max(), errors.mean() + sd)
+    return round(float(low - 0.5 * sd), 6), round(float(high + 0.5 * sd), 6)
+
+
+def _lines(errors: Vector, sd: float) -> tuple[Line, ...]:
+    ends, mean = (0.5, REPEATS + 0.5), float(errors.mean())
+
+    def level(name: str, style: Style, value: float) -> Line:
+        return Line(name=name, style=style, x=ends, y=(round(value, 6), round(value, 6)))
+
+    return (
+        level("Mean", "mean", mean),
+        level("Mean − σ", "spread", mean - sd),
+        level("Mean + σ", "spread", mean + sd),
+        marks("Flights", "run 1", np.arange(1.0, len(errors) + 1.0), errors),
+    )

@@ -1,0 +1,56 @@
+"""The gate before a trial: gains of one's own and proposals through it, and refusals that an operator overrules."""
+
+from dataclasses import dataclass
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import proposing
+from app.campaigns.definitions import definition_of
+from app.core.experiments import experiment_of
+from app.core.gate import Gate, check_policy, require_flyable
+from app.core.policy import Gains
+from app.db.models import CampaignRow, JsonObject, ProposalRow
+from app.trials import history
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Gains, complete and in order, that may fly: the gate's answer as it is stored, and why it was overruled, empty
+    where it let them pass."""
+
+    gains: dict[str, float]
+    gate: JsonObject
+    overrule_reason: str
+
+
+def judge_gains(session: Session, campaign: CampaignRow, asked: Gains, *, overrule: str | None = None) -> Judged:
+    """Gains of one's own, judged over what was known of the vehicle when the latest proposal was computed.
+
+    Takes a tenth of a second. Raises GainsError naming what is refused, with what would pass.
+    """
+    definition = definition_of(campaign)
+    experiment, space = experiment_of(definition), proposing.space_of(definition)
+    gains = space.complete(asked)
+    flown = history.flown_gains(history.trials_of(session, campaign.id))
+    searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
+    gate = check_policy(
+        definition,
+        experiment,
+        space,
+        gains,
+        flown,
+        start=proposing.stored_start(session, campaign) if searched else None,
+        spread=proposing.stored_spread(session, campaign, experiment),
+        safe_gains=campaign.vehicle.safe_gains,
+    )
+    return _judged(campaign, gains, gate, overrule)
+
+
+def judge_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> Judged:
+    """A proposal that still holds: it was judged on this very history. Raises GainsError as `judge_gains` does."""
+    return _judged(campaign, proposal.gains, proposing.gate_of(proposal.gate), overrule)
+
+
+def _judged(campaign: CampaignRow, gains: dict[str, float], gate: Gate, overrule: str | None) -> Judged:
+    reason = require_flyable(gate, overrule=overrule or "", is_real=campaign.vehicle.is_real)
+    return Judged(gains, proposing.gate_json(gate), reason)

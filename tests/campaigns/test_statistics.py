@@ -1,0 +1,245 @@
+"""Statistics, advice, intervals, variants and warm starts over HTTP, on flights with known errors."""
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from app.campaigns.proposing import read_history
+from app.core.policy import Gains
+from app.db.session import Database
+from app.vehicles.base import FlightRecord
+from tests.builders import (
+    climb_error,
+    create_campaign,
+    create_flown_trial,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    land,
+    lift_off,
+    problems_of,
+    run_jobs,
+)
+from tests.core.flying import TAKEOFF, TWIN
+
+LONG = {"strategy": "manual", "stop": {"kind": "budget", "max_flights": 50}}
+DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
+OTHER = {"kp": 300, "ki": 60, "kd": 80}
+
+
+def modelled(gains: Gains) -> FlightRecord:
+    """A flight of the twin without scatter."""
+    trajectory = TAKEOFF.simulate(TAKEOFF.space.vector(gains), np.array(TWIN))
+    return FlightRecord(trajectory=trajectory, ending="completed", reason="")
+
+
+def fly(client: TestClient, database: Database, campaign_id: int, settling_s: float, **chosen: object) -> int:
+    trial = create_trial(client, campaign_id, fly={"speed": None}, **chosen)
+    land(database, lift_off(database), create_record(settling_s))
+    run_jobs(database)
+    identity: int = trial["id"]
+    return identity
+
+
+def test_repeats_form_a_group_with_mean_and_standard_error(client: TestClient, database: Database) -> None:
+    """Prior scatter 0.0105 m worth four degrees of freedom, as the experiment says."""
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    for settling_s in (1.0, 1.2):
+        fly(client, database, campaign["id"], settling_s, gains=DEFAULT)
+    last = fly(client, database, campaign["id"], 0.5, gains=OTHER)
+    found = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    first, second = climb_error(1.0), climb_error(1.2)
+    sigma = ((4 * 0.0105**2 + (first - second) ** 2 / 2) / 5) ** 0.5
+    assert found["sigma"] == pytest.approx(sigma, rel=1e-3)
+    assert found["degrees_of_freedom"] == 5
+    baseline, best = found["groups"]
+    assert (baseline["is_baseline"], baseline["is_best"], baseline["trial_numbers"]) == (True, False, [1, 2])
+    assert baseline["mean"] == pytest.approx((first + second) / 2, abs=1e-4)
+    assert baseline["standard_error"] == pytest.approx(sigma / 2**0.5, rel=1e-3)
+    assert (best["is_best"], best["gains"]) == (True, OTHER)
+    assert found["comparison"]["verdict"] == "better"
+    assert found["drift"]["difference"] == pytest.approx(second - first, abs=1e-4)
+    assert found["drift"]["sentence"] in found["notes"]
+    group = get(client, f"/api/trials/{last}")["group"]
+    assert group == {"mean": best["mean"], "standard_error": pytest.approx(sigma, rel=1e-3), "n": 1}
+
+
+def test_a_campaign_without_a_flight_has_the_prior_scatter_only(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    found = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    assert (found["sigma"], found["groups"], found["comparison"], found["notes"]) == (0.0105, [], None, [])
+    assert client.get("/api/campaigns/99/statistics").status_code == 404
+
+
+def test_what_noise_hides_is_unresolved_and_says_how_many_flights_would_decide(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    fly(client, database, campaign["id"], 1.00, gains=DEFAULT)
+    fly(client, database, campaign["id"], 0.95, gains=OTHER)
+    found = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    assert found["comparison"]["verdict"] == "unresolved"
+    further = found["comparison"]["further"]
+    assert further["best"] + further["baseline"] > 0
+    assert found["optimism"] > 0.0
+    assert found["shrunk_error"] == pytest.approx(climb_error(0.95) + found["optimism"], abs=1e-4)
+    seen = get(client, f"/api/campaigns/{campaign['id']}")
+    assert (seen["verdict"], seen["best"]["flights"]) == ("unresolved", 1)
+    assert seen["best"]["standard_error"] == pytest.approx(0.0105)
+    (card,) = get(client, "/api/campaigns")["items"]
+    assert (card["verdict"], card["best"]) == ("unresolved", seen["best"])
+
+
+def test_a_trend_is_told_once_three_flights_of_one_policy_are_there(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    for settling_s in (1.0, 1.1, 1.2, 1.3):
+        fly(client, database, campaign["id"], settling_s, gains=DEFAULT)
+    (trend,) = get(client, f"/api/campaigns/{campaign['id']}/statistics")["trends"]
+    assert trend["against"] == "flight number"
+    assert trend["slope"] == pytest.approx((climb_error(1.3) - climb_error(1.0)) / 3, rel=1e-3)
+    assert trend["lower"] > 0.0
+    assert "changes with" in trend["sentence"]
+
+
+def test_a_flight_of_a_proposal_carries_its_interval_and_is_held_against_it(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database)
+    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
+    assert proposal["advice"]["kind"] == proposal["recommended"] == "baseline"
+    assert proposal["interval"]["lower"] < proposal["predicted_error"] < proposal["interval"]["upper"]
+    flown = create_flown_trial(client, database, campaign["id"], 3.0)
+    assert flown["predicted_interval"] == proposal["interval"]
+    assert flown["inside_interval"]
+    record = get(client, f"/api/campaigns/{campaign['id']}/statistics")["track_record"]
+    assert (record["inside"], record["of"], record["share"]) == (1, 1, 1.0)
+    own = create_trial(client, campaign["id"], gains=DEFAULT)
+    assert (own["predicted_interval"], own["inside_interval"]) == (None, None)
+
+
+def test_a_variant_is_computed_from_the_flights(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 50}})
+    path = f"/api/campaigns/{campaign['id']}/trials"
+    for variant in ("repeat", "baseline", "smaller step"):
+        answer = client.post(path, json={"variant": variant})
+        assert (answer.status_code, "no valid flight" in answer.json()["detail"]) == (409, True)
+    create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), modelled(DEFAULT))
+    run_jobs(database)
+    proposed = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["gains"]
+    answer = client.post(path, json={"variant": "smaller step"})
+    assert answer.status_code == 201, answer.text
+    half = answer.json()
+    assert half["kind"] == "shorter step"
+    assert all(abs(half["gains"][name] - (DEFAULT[name] + proposed[name]) / 2) <= 0.5 for name in DEFAULT)
+    assert half["gate"]["passed"]
+    create_trial(client, campaign["id"], fly={"speed": None}, gains=half["gains"])
+    land(database, lift_off(database), modelled(half["gains"]))
+    run_jobs(database)
+    again = client.post(path, json={"variant": "repeat"}).json()
+    assert (again["kind"], again["gains"]) == ("repeat", half["gains"])
+    first = client.post(path, json={"variant": "baseline"}).json()
+    assert (first["kind"], first["gains"]) == ("baseline", DEFAULT)
+
+
+def test_exactly_one_of_proposal_gains_and_variant_is_taken(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    path = f"/api/campaigns/{campaign['id']}/trials"
+    for body in ({}, {"variant": "repeat", "gains": DEFAULT}):
+        answer = client.post(path, json=body)
+        assert "exactly one of the three" in problems_of(answer)["proposal_id"]
+
+
+def test_half_of_no_step_is_refused(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    fly(client, database, campaign["id"], 1.0)
+    answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"variant": "smaller step"})
+    assert answer.status_code == 409
+    assert "cannot be made smaller" in answer.json()["detail"]
+
+
+def test_a_smaller_step_waits_for_the_proposal_that_it_is_half_of(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 50}})
+    create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), create_record(1.0))
+    answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"variant": "smaller step"})
+    assert (answer.status_code, "not computed yet" in answer.json()["detail"]) == (409, True)
+
+
+@pytest.fixture
+def donor(client: TestClient, database: Database) -> int:
+    """A campaign whose second flight is its best."""
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    fly(client, database, campaign["id"], 2.0)
+    fly(client, database, campaign["id"], 1.0, gains=OTHER)
+    identity: int = campaign["id"]
+    return identity
+
+
+def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
+    client: TestClient, database: Database, donor: int
+) -> None:
+    answer = client.post(f"/api/campaigns/{donor}/clone", json={"warm_start": True, "vehicle": {"kind": "jsbsim"}})
+    assert answer.status_code == 201, answer.text
+    clone = answer.json()
+    start = clone["definition"]["start"]
+    assert (start["kind"], start["gains"]) == ("campaign", OTHER)
+    assert (start["donor"]["campaign_id"], start["donor"]["trial_number"]) == (donor, 2)
+    run_jobs(database)
+    proposal = get(client, f"/api/campaigns/{clone['id']}/proposal")["proposal"]
+    assert proposal["gains"] == OTHER
+    assert proposal["predicted_error"] == pytest.approx(climb_error(1.0), abs=1e-3)
+    assert "best gains of the campaign" in proposal["explanation"]["summary"]
+    again = client.patch(f"/api/campaigns/{clone['id']}", json={"version": 1, "definition": clone["definition"]})
+    assert again.json()["definition"]["start"] == start
+
+
+def test_the_second_proposal_of_a_warm_start_says_what_was_taken_over(
+    client: TestClient, database: Database, donor: int
+) -> None:
+    definition = {**LONG, "strategy": "gradient", "start": {"kind": "campaign", "donor": {"campaign_id": donor}}}
+    campaign = create_ready_campaign(client, database, definition=definition)
+    create_flown_trial(client, database, campaign["id"], 1.0)
+    notes = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["explanation"]["notes"]
+    assert any("agreement 100%" in note for note in notes)
+
+
+def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, database: Database, donor: int) -> None:
+    empty = create_campaign(client)["id"]
+
+    def refusal(donor: dict[str, object], **fields: object) -> dict[str, str]:
+        start = {"kind": "campaign", "donor": donor}
+        answer = client.post("/api/campaigns", json={"name": "Warm", "definition": {"start": start, **fields}})
+        assert answer.status_code == 422, answer.text
+        return problems_of(answer)
+
+    assert "no valid flight" in refusal({"campaign_id": empty})["definition.start.donor.trial_number"]
+    assert (
+        "no valid flight 9" in refusal({"campaign_id": donor, "trial_number": 9})["definition.start.donor.trial_number"]
+    )
+    assert "there is no campaign 99" in refusal({"campaign_id": 99})["definition.start.donor.campaign_id"]
+    assert "leave it out" in refusal({"campaign_id": donor, "checksum": "0" * 64})["definition.start.donor.checksum"]
+    assert "must lie in" in refusal({"campaign_id": donor}, bounds={"kp": (0, 290)})["definition.start.gains.kp"]
+    assert "this one" in refusal({"campaign_id": donor}, experiment="elsewhere")["definition.start.donor.campaign_id"]
+    answer = client.post(
+        "/api/campaigns", json={"name": "Warm", "definition": {"start": {"donor": {"campaign_id": donor}}}}
+    )
+    assert "kind 'campaign' only" in problems_of(answer)["definition.start.donor"]
+
+
+def test_a_donor_flight_serves_on_when_it_is_classed_otherwise_later(
+    client: TestClient, database: Database, donor: int
+) -> None:
+    definition = {"start": {"kind": "campaign", "donor": {"campaign_id": donor}}}
+    campaign = create_campaign(client, definition=definition)
+    best = get(client, f"/api/campaigns/{donor}/trials")["items"][1]
+    body = {"version": best["version"], "outcome": "invalid", "reason": "rain"}
+    assert client.post(f"/api/trials/{best['id']}/classify", json=body).status_code == 200
+    run_jobs(database)
+    assert get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["gains"] == OTHER
+    assert client.delete(f"/api/campaigns/{donor}?version=1").status_code == 409
+    with database.read() as session:
+        flight = read_history(session, campaign["id"]).donor
+    assert flight is not None
+    assert (flight.outcome, flight.error) == ("valid", best["error"])
