@@ -15,11 +15,13 @@ from pathlib import Path
 from typing import Final
 
 from app.campaigns import service as campaigns
+from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.schemas import Definition, NewCampaign, StopRule
-from app.campaigns.tasks import ProposalDesk, prepare
+from app.campaigns.tasks import Proposer, prepare
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
+from app.jobs.tasks import Desk
 from app.pool import Pool
 from app.trials import flights
 from app.trials import service as trials
@@ -32,6 +34,7 @@ WORKER: Final = "bench"
 FLIGHTS: Final = 7
 ROUNDS: Final = 3
 CASES: Final[dict[str, dict[str, object]]] = {
+    "calibrated": {"strategy": "calibrated"},
     "gradient, scaled": {},
     "gradient, raw": {"options": {"scaled": False}},
     "gradient from the simplex start": {"start": {"kind": "simplex"}},
@@ -39,7 +42,7 @@ CASES: Final[dict[str, dict[str, object]]] = {
 }
 
 
-def propose(desk: ProposalDesk) -> float:
+def propose(desk: Desk) -> float:
     """Carry out the waiting job; from its claim to the stored row, s."""
     start = time.perf_counter()
     job = desk.claim()
@@ -67,7 +70,7 @@ def fly(database: Database, campaign_id: int) -> bool:
     return True
 
 
-def one_campaign(database: Database, desk: ProposalDesk, fields: dict[str, object]) -> list[float]:
+def one_campaign(database: Database, desk: Desk, fields: dict[str, object]) -> list[float]:
     """The time of each proposal of a campaign, s."""
     definition = Definition.model_validate({"stop": StopRule(kind="budget", max_flights=FLIGHTS), **fields})
     with database.write() as session:
@@ -87,7 +90,9 @@ def main() -> int:
         database = Database(file)
         cold = time.perf_counter()
         with Pool(1, prepare=prepare) as pool:
-            desk = ProposalDesk(database, pool, worker=WORKER, lease_s=30.0)
+            desk = Desk(
+                database, PROPOSAL_JOB, Proposer(database, pool, worker=WORKER), room=1, worker=WORKER, lease_s=30.0
+            )
             first = one_campaign(database, desk, {"stop": StopRule(kind="budget", max_flights=1)})
             print(
                 f"cold, the start of the process included: {time.perf_counter() - cold:.2f} s ({first[0]:.2f} s first)"

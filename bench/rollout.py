@@ -47,7 +47,7 @@ def in_c(library: Path) -> tuple[Callable[[], int], "np.ndarray[tuple[int], np.d
 
 def in_python() -> tuple[Callable[[], int], "np.ndarray[tuple[int], np.dtype[np.float64]]"]:
     altitude, no_detail = np.empty(SAMPLES), np.empty((len(CHANNELS) - 1, 0))
-    gains, model = np.array(GAINS, dtype=np.int64), np.array([HOVER, 0.0, LAG, DRAG])
+    gains, model = np.array(GAINS, dtype=np.int64), np.array([HOVER, 0.0, LAG, DRAG, 0.0, 0.0, 0.0, 0.0])
     state = np.empty(STATE_SIZE, dtype=np.int64)
     return lambda: rollout(gains, model, TARGET, state, altitude, no_detail), altitude
 

@@ -1,0 +1,113 @@
+"""One tuning of one vehicle: its flights are counted, judged, and stopped at the budget."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Final
+
+import numpy as np
+
+from app.core.definition import Flight, flight_seed
+from app.core.experiments import get_experiment
+from app.core.policy import PolicySpace, Vector
+from app.core.strategies.base import Interval
+from app.studies.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error
+
+EXPERIMENT: Final = get_experiment("takeoff")
+SPACE: Final[PolicySpace] = EXPERIMENT.space
+DEFAULT: Final[Mapping[str, float]] = SPACE.mapping(SPACE.default)
+WORST_M: Final = 100.0
+"""The error that a method is told of a flight that broke down, and the highest that it is told at all."""
+
+
+class BudgetSpentError(Exception):
+    """All flights that a method may ask for are flown."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """One flight: its gains and error (m); `chosen` the gains that the method recommends after it, with their
+    noise-free error; the processor's seconds it took to ask for this flight; and the interval predicted for it."""
+
+    gains: tuple[float, ...]
+    error: float
+    is_unsafe: bool
+    chosen: tuple[float, ...]
+    chosen_error: float
+    compute_s: float
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(kw_only=True)
+class Tuning:
+    """The flights of one method on one vehicle. `recommends_last`: the method stands by the gains it proposed last, not
+    by the best it has observed. Flights depend on the vehicle, the seed and their number, so that every method meets
+    the same scatter."""
+
+    vehicle: SampledVehicle
+    seed: int
+    budget: int
+    recommends_last: bool = False
+    flights: list[Flown] = field(default_factory=list)
+    ended: str = "budget"
+    settled_error: float | None = None
+    _asked_s: float = field(default_factory=time.process_time)
+
+    @property
+    def campaign_seed(self) -> int:
+        """The seed of the method and of its flights."""
+        return int(np.random.SeedSequence((self.seed, self.vehicle.number)).generate_state(1)[0])
+
+    def error(self, gains: Vector) -> float:
+        """Fly the nearest flyable gains; their error (m), at most 100. Raises BudgetSpentError when none are left."""
+        return min(float(self.fly(SPACE.nearest(gains)).error or WORST_M), WORST_M)
+
+    def fly(self, gains: Vector, interval: Interval | None = None) -> Flight:
+        """Fly flyable gains and keep what came of it. Raises BudgetSpentError when no flights are left."""
+        asked_s = time.process_time() - self._asked_s
+        number = len(self.flights) + 1
+        if number > self.budget:
+            raise BudgetSpentError
+        named = SPACE.mapping(gains)
+        record = fly(self.vehicle, named, flight_seed(self.campaign_seed, number))
+        is_number = bool(np.isfinite(record["altitude_m"]).all())
+        error = EXPERIMENT.error(record.as_stored()) if is_number else WORST_M
+        chosen, chosen_error = self._recommended(tuple(named.values()), error)
+        self.flights.append(
+            Flown(
+                gains=tuple(named.values()),
+                error=error,
+                is_unsafe=is_unsafe(record),
+                chosen=chosen,
+                chosen_error=chosen_error,
+                compute_s=asked_s,
+                interval=(interval.lower, interval.upper) if interval else None,
+            )
+        )
+        self._asked_s = time.process_time()
+        return Flight(number=number, gains=named, trajectory=record.as_stored(), error=error, outcome="valid")
+
+    def settle(self, gains: Vector, why: str) -> None:
+        """End before the budget is spent, recommending these gains from now on."""
+        self.ended, self.settled_error = why, noise_free_error(self.vehicle, SPACE.mapping(gains))
+
+    def _recommended(self, gains: tuple[float, ...], error: float) -> tuple[tuple[float, ...], float]:
+        if self.recommends_last or not self.flights or error < min(flight.error for flight in self.flights):
+            return gains, noise_free_error(self.vehicle, dict(zip(SPACE.names, gains, strict=True)))
+        return self.flights[-1].chosen, self.flights[-1].chosen_error
+
+
+Method = Callable[[Tuning], None]
+
+
+def tune(method: Method, tuning: Tuning) -> dict[str, object]:
+    """Let a method fly until it ends or its budget is spent; what is kept of it, as JSON."""
+    try:
+        method(tuning)
+    except BudgetSpentError:
+        tuning.ended = "budget"
+    return {
+        "ended": tuning.ended,
+        "settled_error": tuning.settled_error,
+        "flights": [asdict(flight) for flight in tuning.flights],
+    }

@@ -1,0 +1,195 @@
+"""The table and the figure of the comparison."""
+
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from bench.targets.methods import METHODS
+from bench.targets.report import AT_FLIGHTS, TARGETS, Outcome
+from bench.targets.results import Results
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TITLES: Final[Mapping[str, str]] = {
+    "four-parameter": "Random vehicles that the model can describe",
+    "further-physics": "Random vehicles with physics beyond that",
+    "twin": "The twin of the paper's drone, again and again",
+}
+LINES: Final[Mapping[str, str]] = {
+    "four-parameter": """\
+Hover throttle 0.45 … 0.75, motor lag 0 … 100 ms, start latency 0 … 0.4 s, drag 0 … 0.4 1/s, with the scatter of the
+paper's flights.""",
+    "further-physics": """\
+The same, and a quadratic share of thrust of 0 … 1, ground effect 0 … 25 % fading over 0.2 … 0.6 m, measurement delay
+0 … 40 ms, battery sag 0 … 3 % over the flight; every tenth flies in JSBSim, with gusts of 0.5 … 2 m/s and a noisy
+altimeter instead of the scatter.""",
+    "twin": "One vehicle, with the scatter of the paper's flights, tuned from so many seeds.",
+}
+_INTRODUCTION: Final = """\
+# Flights to the target
+
+How many takeoffs a method needs until the gains that it recommends are within 5 % or 2 % of the best that there are for
+that vehicle.
+
+- All methods start with the default gains, search the same bounds, and meet the same vehicles with the same scatter.
+- Compared is the noise-free error of the gains that a method recommends after so many flights: the best it has
+  observed, or for Gainline the gains it proposed last. The best there are is searched on the vehicle itself, without
+  noise.
+- A flight is unsafe that rises above 3.75 m, is below 2.25 m later than 5 s after the command, or diverges. First
+  flights and default gains flown again do not count.
+- Gainline's proposals pass its gate as in a campaign, and what that takes is counted; a refused proposal ends that
+  tuning as a failure. The other methods have no gate.
+- A method that takes long over each proposal tuned fewer vehicles, the first of each population.
+- A method that ends early, or whose budget of flights is smaller than the number asked about, stands by what it has.
+- Shares carry their Wilson 95 % intervals.
+
+![Share of vehicles within 5 % against flights]({figure})
+
+To make this page again (hours; the second command goes on where it was stopped when it is given `--results FILE`):
+
+    ./dev exec uv pip install --require-hashes -r requirements/bench.txt
+    ./dev exec python -m bench.flights_to_target --vehicles 200 --twins 400 --methods all --seed {seed} --out docs
+
+Seed {seed}; {made}."""
+_COLOURS: Final[Mapping[str, str]] = {
+    "calibrated": "#000000",
+    "gradient": "#0072B2",
+    "gradient-raw": "#56B4E9",
+    "nelder-mead": "#E69F00",
+    "finite-differences": "#8C564B",
+    "tpe": "#009E73",
+    "cma-es": "#D55E00",
+    "gp": "#CC79A7",
+    "bayes-opt": "#7F7F7F",
+}
+"""Okabe and Ito's palette, told apart also by colour-blind readers, with two neutral ones."""
+
+
+def summary(found: Mapping[str, Outcome], target: float) -> list[str]:
+    """The rows of one table."""
+    columns = ["method", "vehicles", "flights", *(f"flight {number}" for number in AT_FLIGHTS), "median"]
+    lines = [f"| {' | '.join(columns)} |", f"| {' | '.join(['---'] * len(columns))} |"]
+    for name, outcome in found.items():
+        shares = [str(outcome.reached(target, number)) for number in AT_FLIGHTS]
+        cells = [
+            METHODS[name].title,
+            str(len(outcome.courses)),
+            str(outcome.budget),
+            *shares,
+            outcome.median_flights(target),
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def safety(found: Mapping[str, Outcome]) -> list[str]:
+    """Unsafe flights and compute time, row by row."""
+    columns = (
+        "method",
+        "unsafe, of all flights after the first",
+        "unsafe flights per vehicle until within 5 %",
+        "processor time of a proposal, median and longest",
+        "ended by a refusal",
+    )
+    lines = [f"| {' | '.join(columns)} |", f"| {' | '.join(['---'] * len(columns))} |"]
+    for name, outcome in found.items():
+        middle, longest = outcome.compute_s
+        lines.append(
+            f"| {METHODS[name].title} | {outcome.unsafe_flights.rounded(1)} | {outcome.unsafe_on_the_way(0.05):.2f} "
+            f"| {_duration(middle)}, {_duration(longest)} | {outcome.refused} |"
+        )
+    return lines
+
+
+def own_lines(outcome: Outcome) -> list[str]:
+    """What is known of Gainline's own proposals beyond the table."""
+    lines = [
+        "Gainline's proposals judged each by itself, later ones not excused by earlier ones: "
+        + "; ".join(
+            f"flight {number} within 5 % {outcome.standing(0.05, number)}, within 2 % {outcome.standing(0.02, number)}"
+            for number in (2, 3)
+        )
+        + "."
+    ]
+    if outcome.coverage.of:
+        lines.append(
+            f"Of its flights {outcome.coverage} of {outcome.coverage.of} fell into the interval that was predicted for "
+            "them with 90 %."
+        )
+    return lines
+
+
+def page(all_found: Mapping[str, Mapping[str, Outcome]], results: Results, seed: int, figure: str) -> str:
+    """The whole page, in Markdown."""
+    lines = [_INTRODUCTION.format(figure=figure, seed=seed, made=_made(results, seed))]
+    for population, found in all_found.items():
+        lines += ["", f"## {TITLES[population]}", "", LINES[population]]
+        for target in TARGETS:
+            lines += ["", f"Within {target:.0%} of the vehicle's own optimum:".replace("%", " %"), ""]
+            lines += summary(found, target)
+        lines += ["", *safety(found)]
+        if "calibrated" in found:
+            lines += ["", *own_lines(found["calibrated"])]
+    return "\n".join([*lines, ""])
+
+
+def _made(results: Results, seed: int) -> str:
+    """When the flights were flown and with what."""
+    made: dict[str, set[str]] = {}
+    for task in results:
+        if task.seed == seed and isinstance(stamp := results[task]["made"], dict):
+            for name, value in stamp.items():
+                made.setdefault(str(name), set()).add(str(value))
+    days = sorted(made.pop("day", set()))
+    libraries = ", ".join(f"{name} {' and '.join(sorted(values))}" for name, values in sorted(made.items()))
+    when = days[0] if len(days) == 1 else f"{days[0]} … {days[-1]}"
+    return f"flown on {when} with Python {platform.python_version()}{', ' if libraries else ''}{libraries}"
+
+
+def _duration(seconds: float) -> str:
+    if seconds != seconds:  # noqa: PLR0124 - no number
+        return "–"
+    return f"{seconds * 1e3:.0f} ms" if seconds < 0.9995 else f"{seconds:.1f} s"
+
+
+def draw(all_found: Mapping[str, Mapping[str, Outcome]], file: Path, target: float = 0.05) -> None:
+    """Share of vehicles within the target against flights, a panel for each population, as SVG."""
+    import matplotlib as mpl  # noqa: PLC0415 - of the group `bench`
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    shown = [name for name in all_found if name != "twin"]
+    with mpl.rc_context({"svg.hashsalt": "flights-to-target", "svg.fonttype": "none", "font.size": 9}):
+        figure = Figure(figsize=(11.0, 4.8), layout="constrained", facecolor="white")
+        panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+        for axes, population in zip(panels, shown, strict=True):
+            _panel(axes, TITLES[population], all_found[population], target)
+        panels[0].set_ylabel(f"vehicles within {target * 100:.0f} % of their own optimum")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(file, format="svg", metadata={"Date": None})
+
+
+def _panel(axes: "Axes", title: str, found: Mapping[str, Outcome], target: float) -> None:
+    for name, outcome in found.items():
+        last = outcome.budget
+        numbers = list(range(1, (60 if name == "calibrated" else last) + 1))
+        shares = [outcome.reached(target, number) for number in numbers]
+        low, high = zip(*(share.interval for share in shares), strict=True)
+        values, colour = [share.value for share in shares], _COLOURS[name]
+        axes.fill_between(numbers, low, high, step="post", color=colour, alpha=0.12, linewidth=0)
+        weight, own = (2.6, last) if name == "calibrated" else (1.5, len(numbers))
+        axes.step(numbers[:own], values[:own], where="post", color=colour, lw=weight, label=METHODS[name].title)
+        axes.step(numbers[own - 1 :], values[own - 1 :], where="post", color=colour, lw=1.0, ls=":")
+    axes.set_xscale("log")
+    axes.set_xlim(1, 60)
+    axes.set_ylim(-0.01, 1.01)
+    ticks = [1, 2, 3, 5, 10, 20, 40, 60]
+    axes.set_xticks(ticks, labels=[str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.0%}".replace("%", " %"))
+    axes.set_xlabel("flights")
+    axes.set_title(title, fontsize=10)
+    axes.grid(alpha=0.25)

@@ -1,0 +1,63 @@
+"""The F-16 experiment's study on a few inaccurate models, and over fifty (slow)."""
+
+from itertools import pairwise
+
+import pytest
+
+from app.studies.f16 import BEST_ERROR, showcase, study
+from tests.core.flying import compiled_only
+
+pytestmark = compiled_only
+
+
+def test_results_do_not_depend_on_how_many_processes_compute_them() -> None:
+    heard: list[tuple[int, int]] = []
+    alone = study(0.45, (10, 11), ("identified",), lambda done, total: heard.append((done, total)), processes=1)
+    assert heard == [(1, 2), (2, 2)]
+    assert study(0.45, (10, 11), ("identified",), processes=2) == alone
+
+
+def test_identified_again_the_optimum_is_flown_second() -> None:
+    (result,) = study(0.45, (10,), ("identified",), processes=1)
+    assert result.share == result.share_by(2) == 1.0
+    assert result.median_flights == 2
+    assert result.campaigns[0].errors[-1] == pytest.approx(BEST_ERROR, abs=2e-4)
+
+
+def test_without_a_model_the_simplex_takes_dozens_of_flights() -> None:
+    (result,) = study(0.45, (10,), ("simplex",), processes=1)
+    assert result.share == 1.0
+    assert 5 < result.flights[0] < 120
+
+
+def test_the_showcase_looks_like_the_papers_campaign() -> None:
+    """The paper: near-optimal after 16 of 27 flights, the largest gain in the first step. Chosen: seed 50, 18 of 25."""
+    shown = showcase()
+    errors = shown.result.errors
+    assert len(errors) == 25
+    assert shown.result.flights_to_optimum == 18
+    gains = [before - after for before, after in pairwise(errors)]
+    assert max(gains) == gains[0]
+    assert shown.best == 25
+    assert len(shown.search_errors) == pytest.approx(300, abs=1)
+    assert shown.search_errors[0] > 5.0 * shown.search_errors[-1]
+    assert shown.model_hand["pitch_rad"].shape == shown.model_start["pitch_rad"].shape
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_over_fifty_models_the_methods_come_in_the_expected_order() -> None:
+    """±45 %: raw < scaled outside < scaled inside < identified again, which is there by the second flight."""
+    results = study(0.45, range(50), ("raw", "outside", "inside", "identified"))
+    raw, outside, inside, identified = (result.share for result in results)
+    assert raw < outside < inside < identified
+    assert results[-1].share_by(2) >= 0.98
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("perturbation", [0.2, 0.8])
+def test_identified_again_49_of_50_models_are_near_by_the_second_flight(perturbation: float) -> None:
+    """At ±45 % the test above says so."""
+    (result,) = study(perturbation, range(50), ("identified",), max_flights=2)
+    assert result.share_by(2) >= 0.98

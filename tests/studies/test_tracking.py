@@ -1,0 +1,97 @@
+"""The F-16 experiment beside the paper: the showcase's numbers and its three figures."""
+
+import pytest
+
+from app.figures.base import card_of
+from app.figures.panels import PanelsFigure
+from app.studies.f16 import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase
+from app.studies.tracking import _BRIEF, _FULL, EXPECTED, _definition, _figures, _method, _methods, _showcase, run_f16
+
+
+@pytest.fixture(scope="module")
+def shown() -> Showcase:
+    return showcase()
+
+
+def test_the_definition_gives_the_errors_it_was_checked_with() -> None:
+    zero, hand, best = _definition()
+    assert zero.measured == pytest.approx(6.66664, abs=1e-4)
+    assert hand.measured == pytest.approx(3.38180, abs=1e-4)
+    assert best.measured == pytest.approx(0.204716, abs=2e-4)
+
+
+def test_the_showcase_comes_near_the_optimum_about_as_fast_as_the_paper(shown: Showcase) -> None:
+    near, first, ratio = _showcase(shown)
+    assert (near.paper, near.reference) == (16.0, 18.0)
+    assert near.measured == pytest.approx(18.0, abs=1.0)
+    assert near.ratio == pytest.approx(near.measured / 16.0)
+    assert "25 flown" in near.note
+    assert first.note.startswith("the largest of all steps")
+    assert 1.0 <= ratio.measured <= 1.05
+
+
+def test_every_figure_draws_what_was_flown(shown: Showcase) -> None:
+    plots = _figures(shown)
+    assert list(plots) == ["figure2-left", "figure2-right", "figure3-left", "figure3-right", "figure4"]
+    assert {card_of(PanelsFigure(plot)).state for plot in plots.values()} == {"ready"}
+    search = plots["figure2-left"].panels[0].lines[0]
+    assert list(search.y) == sorted(search.y, reverse=True), "the lowest so far"
+    gains = plots["figure3-left"].panels[0].lines
+    assert [line.name for line in gains] == ["θ1", "θ2", "θ3", "θ4", "θ5", "θ6"]
+    assert gains[2].y[0] == pytest.approx(shown.flights[0].gains["theta_3"] / 20.0, abs=1e-4)
+    optimum, line, flights = plots["figure3-right"].panels[0].lines
+    assert optimum.y == pytest.approx((BEST_ERROR, BEST_ERROR), abs=1e-4)
+    assert flights.y == pytest.approx([flight.error for flight in shown.flights], abs=1e-6)
+    assert len(line.y) == 25
+    before, after, off = plots["figure4"].panels
+    assert [each.name for each in before.lines] == ["Model's optimum", "Reference"]
+    assert max(before.lines[1].y) == pytest.approx(10.0, abs=0.05), "the reference swings by 10°"
+    assert after.lines[0].name == f"Flight {shown.best}, best"
+    first, best = (max(map(abs, line.y[len(line.y) // 2 :])) for line in off.lines)
+    assert best < first, "in the second half of the minute"
+
+
+def test_a_method_is_told_by_the_share_that_comes_near_and_its_median_flights() -> None:
+    campaigns = tuple(CampaignResult(seed=seed, errors=errors) for seed, errors in enumerate([(1.0, 0.205), (1.0,)]))
+    rows = list(_method(MethodResult(method="identified", title="Identified", perturbation=0.45, campaigns=campaigns)))
+    assert [(row.measured, row.reference, row.note) for row in rows] == [
+        (0.5, 1.0, "1 of 2"),
+        (2.0, 2.0, "of those that came near"),
+    ]
+
+
+def test_the_long_form_identifies_again_at_every_perturbation_and_from_noisy_logs() -> None:
+    brief, noisy, *further = _FULL
+    assert (brief,) == _BRIEF
+    assert noisy.methods == ("identified-noisy", "map-noisy")
+    told: list[float] = []
+    rows = list(_methods(further, (10,), lambda share, _doing: told.append(share)))
+    assert [row.label for row in rows] == ["1 models at ±20 %", "1 models at ±45 %", "1 models at ±80 %"]
+    assert [(row.measured, row.reference) for row in rows] == [(1.0, 0.98)] * 3
+    assert told == pytest.approx([0.4 + 0.2 * done for done in (1, 2, 3)])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_noisy_logs_are_what_the_maximum_a_posteriori_form_is_for() -> None:
+    near = [row for row in _methods(_FULL[1:2], (10, 11), lambda _share, _doing: None) if row.unit == "of models"]
+    squares, posteriori = near
+    assert (squares.reference, posteriori.reference) == (0.55, 1.0)
+    assert squares.measured <= posteriori.measured == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_the_brief_form_has_every_row_with_the_methods_in_their_order() -> None:
+    """The order of the expected table: raw < outside < inside < identified; the starts within 2 % of theirs."""
+    told: list[float] = []
+    result = run_f16(lambda share, _doing: told.append(share), False)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    starts = [row for row in result.rows if row.group.startswith("The model's optimum")]
+    assert [row.measured for row in starts] == pytest.approx([1.15, 1.90, 7.2], rel=0.02)
+    shares = [row.measured for row in result.rows if row.label.endswith("near the optimum") and row.unit == "of models"]
+    assert len(shares) == len(EXPECTED)
+    raw, outside, inside, identified, simplex = shares
+    assert raw <= outside <= inside < identified
+    assert (identified, simplex) == (1.0, 1.0)
