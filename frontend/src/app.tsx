@@ -3,8 +3,10 @@ import { AppFrame } from "./components/AppFrame";
 import { CampaignPage } from "./pages/CampaignPage";
 import { CampaignsPage } from "./pages/CampaignsPage";
 import { FlightPage } from "./pages/FlightPage";
+import { JobsPage } from "./pages/JobsPage";
 import { NewCampaignPage } from "./pages/NewCampaignPage";
 import { NotFoundPage } from "./pages/NotFoundPage";
+import { ReproductionsPage } from "./pages/ReproductionsPage";
 
 export function App() {
   return (
@@ -14,6 +16,8 @@ export function App() {
         <Route path="new" element={<NewCampaignPage />} />
         <Route path="campaigns/:campaignId" element={<CampaignPage />} />
         <Route path="campaigns/:campaignId/flights/:trialId" element={<FlightPage />} />
+        <Route path="reproductions" element={<ReproductionsPage />} />
+        <Route path="jobs" element={<JobsPage />} />
         <Route path="*" element={<NotFoundPage />} />
       </Route>
     </Routes>

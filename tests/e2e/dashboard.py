@@ -22,9 +22,16 @@ CHARTS: Final = {"takeoffs": "Takeoff curves", "errors": "Error per flight", "ga
 _READ_TRACES: Final = """
 gd => gd.data.map(trace => ({
   meta: trace.meta, name: trace.name, x: Array.from(trace.x ?? []), y: Array.from(trace.y ?? []),
-  dash: trace.line?.dash, width: trace.line?.width,
+  dash: trace.line?.dash, width: trace.line?.width, bar: trace.error_y?.value, bars: trace.error_y?.array,
 }))
 """
+
+
+def printed(value: float, uncertainty: float, unit: str = "m") -> str:
+    """`0.105 ± 0.012 m`: two digits of an uncertainty that begins with less than 3.55, else one."""
+    power = int(np.floor(np.log10(uncertainty)))
+    digits = max(0, 1 - power if uncertainty / 10.0**power < 3.55 else -power)
+    return f"{value:.{digits}f} ± {uncertainty:.{digits}f} {unit}"
 
 
 class Dashboard:
@@ -38,7 +45,7 @@ class Dashboard:
 
     def open(self, path: str = "/") -> None:
         self.page.goto(path)
-        expect(self.page.get_by_text("Live", exact=True)).to_be_visible()
+        expect(self.page.get_by_text("Live", exact=True)).to_be_visible(timeout=40_000)
 
     def open_campaign(self, campaign_id: int) -> None:
         self.open(f"/campaigns/{campaign_id}")
@@ -63,12 +70,17 @@ class Dashboard:
         self.page.get_by_role("radiogroup", name="Simulated at").get_by_text(label, exact=True).click()
 
     def fly(self) -> None:
-        self.button("Fly next trial").click()
+        self.fly_button.click()
+
+    @property
+    def fly_button(self) -> Locator:
+        """Flies what the strategy proposes, whether or not that is what is recommended."""
+        return self.page.get_by_role("button", name=re.compile("^(Fly next trial|Fly the step|Fly these gains)$"))
 
     # ---- charts
 
     def plot(self, chart: str) -> Locator:
-        group = self.page.get_by_role("group", name=re.compile(rf"^{CHARTS[chart]}"))
+        group = self.page.get_by_role("group", name=re.compile(rf"^{CHARTS.get(chart, chart)}"))
         return group.locator(".js-plotly-plot")
 
     def traces(self, chart: str) -> list[Json]:
@@ -124,6 +136,19 @@ class Dashboard:
 
     def _classed(self, campaign_id: int, number: int) -> bool:
         return any(trial["number"] == number and trial["state"] == "valid" for trial in self.trials(campaign_id))
+
+    def reproduce(self, name: str) -> None:
+        """Run a reproduction over the API, to its end."""
+        self.post(f"/reproductions/{name}/run")
+        self.until(lambda: bool(self.get(f"/reproductions/{name}")["rows"]))
+
+    def fly_headless_body(self, campaign_id: int, body: Json) -> Json:
+        """Fly gains or a variant at full speed, over the API; the trial as it then is."""
+        self.when_ready(campaign_id)
+        trial = self.post(f"/campaigns/{campaign_id}/trials", {**body, "fly": {"speed": None}})
+        self.until(lambda: self.get(f"/trials/{trial['id']}")["state"] not in {"planned", "staged", "flying"})
+        found: Json = self.get(f"/trials/{trial['id']}")
+        return found
 
     def record(self, trial_id: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Time and altitude of a flight as the API gives them."""

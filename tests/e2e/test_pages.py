@@ -34,6 +34,7 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
     first = dashboard.trials(under_way)[0]
     dashboard.post(f"/trials/{first['id']}/classify",
                    {"version": first["version"], "outcome": "invalid", "reason": "Wind gust"})  # fmt: skip
+    dashboard.reproduce("controller")
     paths = {
         "list": "/",
         "new": "/new",
@@ -41,11 +42,32 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
         "under-way": f"/campaigns/{dashboard.when_ready(under_way)}",
         "finished": f"/campaigns/{finished}",
         "elsewhere": f"/campaigns/{dashboard.create('import')}",
+        "overruled": f"/campaigns/{create_overruled(dashboard)}",
+        "pitch": f"/campaigns/{create_pitch(dashboard)}",
         "flight": f"/campaigns/{under_way}/flights/{dashboard.trials(under_way)[2]['id']}",
+        "reproductions": "/reproductions",
+        "jobs": "/jobs",
         "missing": "/no/such/page",
     }
     context.close()
     return paths
+
+
+def create_overruled(dashboard: Dashboard) -> int:
+    """Calibrated, with a repeat, and a flight that the checks had refused."""
+    campaign_id = dashboard.create("twin", strategy="calibrated", seed=3, stop={"kind": "budget", "max_flights": 20})
+    dashboard.fly_headless(campaign_id, 2)
+    dashboard.fly_headless_body(campaign_id, {"variant": "repeat"})
+    gains = {"kp": 283, "ki": 1356, "kd": 82}
+    dashboard.fly_headless_body(campaign_id, {"gains": gains, "overrule": "the paper flew these gains"})
+    return dashboard.when_ready(campaign_id)
+
+
+def create_pitch(dashboard: Dashboard) -> int:
+    """The F-16, with six gains that are no whole numbers."""
+    campaign_id = dashboard.create("lti", experiment="pitch-tracking", strategy="identified")
+    dashboard.fly_headless(campaign_id, 2)
+    return dashboard.when_ready(campaign_id)
 
 
 def when_drawn(dashboard: Dashboard) -> None:
@@ -70,8 +92,11 @@ def test_every_page_can_be_read_by_everybody_and_fits_its_screen(
         wide = dashboard.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
         refused += [f"{name} scrolls sideways by {wide} px"] if wide else []
         dashboard.page.screenshot(path=SCREENSHOTS / f"{name}-{size}-{theme}.png", full_page=True)
-        for button in dashboard.page.locator("button[aria-expanded=false]:visible").all():
+        for button in dashboard.page.locator("button[aria-expanded=false]:not([aria-haspopup]):visible").all():
             button.click()
+        dashboard.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+        for question in dashboard.page.locator("button[aria-haspopup=dialog]:visible").all()[:1]:
+            question.click()
         found = Axe().run(dashboard.page, options={"runOnly": {"type": "tag", "values": RULES}})
         refused += [f"{name}: {found.generate_report()}"] if found.violations_count else []
     assert refused == []

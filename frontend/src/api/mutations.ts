@@ -133,14 +133,20 @@ export function useArchive(campaignId: number) {
   });
 }
 
+export interface Cloning {
+  /** Another vehicle's kind; without it the same vehicle with its settings. */
+  vehicle?: string;
+  warmStart: boolean;
+}
+
 export function useClone(campaignId: number) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: (vehicleKind?: string) =>
+    mutationFn: ({ vehicle, warmStart }: Cloning) =>
       answer(
         cloneCampaign({
           path: { campaign_id: campaignId },
-          body: vehicleKind === undefined ? {} : { vehicle: { kind: vehicleKind } },
+          body: { warm_start: warmStart, ...(vehicle === undefined ? {} : { vehicle: { kind: vehicle } }) },
         }),
       ),
     onSuccess: settled.campaign,

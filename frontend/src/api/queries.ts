@@ -9,6 +9,7 @@ import {
   getCatalogue,
   getFlightFigure,
   getProposal,
+  getStatistics,
   getTrial,
   listCampaigns,
   listTrials,
@@ -55,6 +56,14 @@ export function useProposal(campaignId: number) {
   return useQuery({
     queryKey: ["campaign", campaignId, "proposal"],
     queryFn: () => answer(getProposal({ path: { campaign_id: campaignId } })),
+  });
+}
+
+export function useStatistics(campaignId: number) {
+  return useQuery({
+    queryKey: ["campaign", campaignId, "statistics"],
+    queryFn: () => answer(getStatistics({ path: { campaign_id: campaignId } })),
+    placeholderData: keepPreviousData,
   });
 }
 

@@ -1,9 +1,11 @@
-import { SegmentedControl, Switch } from "@mantine/core";
+import { SegmentedControl } from "@mantine/core";
 import type { ReactNode } from "react";
-import type { Catalogue } from "../api/types";
-import { type CampaignForm, gainsOf, type OptionValue, type StopKind } from "../lib/newCampaign";
+import type { Catalogue, OptionInfo } from "../api/types";
+import { type CampaignForm, gainsOf, type OptionValue, optionsOf, type StopKind } from "../lib/newCampaign";
+import { unitsOf } from "../lib/units";
 import classes from "./AdvancedFields.module.css";
 import { Entry } from "./Entry";
+import { OptionField } from "./OptionField";
 
 interface Props {
   form: CampaignForm;
@@ -23,24 +25,62 @@ function Group({ title, children }: { title: string; children: ReactNode }) {
 
 /** Settings that have a good default each. */
 export function AdvancedFields(props: Props) {
+  const { form, catalogue, reasons, set } = props;
+  const options = optionsOf(form, catalogue);
+  const titled = (things: readonly { name: string; title: string }[], name: string): string =>
+    things.find((thing) => thing.name === name)?.title ?? name;
   return (
     <div className={classes["all"]}>
       <StopFields {...props} />
-      <StrategyOptions {...props} />
+      <OptionGroup
+        title={`Strategy: ${titled(catalogue.strategies, form.strategy)}`}
+        options={options.strategy}
+        chosen={form.strategyOptions}
+        reasons={reasons}
+        prefix="definition.options"
+        onChange={(strategyOptions) => set({ strategyOptions })}
+      />
+      <OptionGroup
+        title={`Experiment: ${titled(catalogue.experiments, form.experiment)}`}
+        options={options.experiment}
+        chosen={form.experimentOptions}
+        reasons={reasons}
+        prefix="experiment_options"
+        onChange={(experimentOptions) => set({ experimentOptions })}
+      />
       <BoundFields {...props} />
-      <VehicleOptions {...props} />
+      <OptionGroup
+        title={`Vehicle: ${titled(catalogue.vehicle_kinds, form.vehicle)}`}
+        options={options.vehicle}
+        chosen={form.vehicleOptions}
+        reasons={reasons}
+        prefix="vehicle.options"
+        onChange={(vehicleOptions) => set({ vehicleOptions })}
+      />
       <Group title="Chance">
         <Entry
           label="Seed"
           description="The same seed gives the same scatter"
-          value={props.form.seed}
-          error={props.reasons["seed"]}
-          onChange={(seed) => props.set({ seed })}
+          value={form.seed}
+          error={reasons["seed"]}
+          onChange={(seed) => set({ seed })}
         />
       </Group>
     </div>
   );
 }
+
+const STOPS: Record<StopKind, { label: string; line: string }> = {
+  paper: {
+    label: "Not improving",
+    line: "Ends after two flights in a row that are not clearly better than the best, as the paper did.",
+  },
+  noise: {
+    label: "Nothing but noise left",
+    line: "Ends when no further step could be told from noise, after the best has been flown again against the first gains.",
+  },
+  budget: { label: "All flights", line: "Flies until the budget is used." },
+};
 
 function StopFields({ form, reasons, set }: Props) {
   return (
@@ -51,11 +91,9 @@ function StopFields({ form, reasons, set }: Props) {
         className={classes["wide"]}
         value={form.stop}
         onChange={(value) => set({ stop: value as StopKind })}
-        data={[
-          { value: "paper", label: "When it stops improving" },
-          { value: "budget", label: "After all flights" },
-        ]}
+        data={Object.entries(STOPS).map(([value, { label }]) => ({ value, label }))}
       />
+      <p className={classes["note"]}>{STOPS[form.stop].line}</p>
       <Entry
         label="Flights at most"
         value={form.maxFlights}
@@ -71,25 +109,47 @@ function StopFields({ form, reasons, set }: Props) {
           onChange={(improvementPercent) => set({ improvementPercent })}
         />
       )}
+      {form.stop === "noise" && (
+        <Entry
+          label="Sure enough with a confidence of"
+          suffix=" %"
+          value={form.confidencePercent}
+          error={reasons["stop.confidence"]}
+          onChange={(confidencePercent) => set({ confidencePercent })}
+        />
+      )}
+      <Entry
+        label="Stop when a flight ends below"
+        placeholder="no battery limit"
+        suffix=" V"
+        value={form.minBatteryV}
+        error={reasons["stop.min_battery_v"]}
+        onChange={(minBatteryV) => set({ minBatteryV })}
+      />
     </Group>
   );
 }
 
-function StrategyOptions({ form, catalogue, set }: Props) {
-  const strategy = catalogue.strategies.find(({ name }) => name === form.strategy);
-  if (!strategy || strategy.options.length === 0) return null;
-  const choose = (name: string, value: OptionValue): void =>
-    set({ strategyOptions: { ...form.strategyOptions, [name]: value } });
+interface OptionsProps {
+  title: string;
+  options: readonly OptionInfo[];
+  chosen: Record<string, OptionValue>;
+  reasons: Record<string, string>;
+  prefix: string;
+  onChange: (chosen: Record<string, OptionValue>) => void;
+}
+
+function OptionGroup({ title, options, chosen, reasons, prefix, onChange }: OptionsProps) {
+  if (options.length === 0) return null;
   return (
-    <Group title={`Strategy: ${strategy.title}`}>
-      {strategy.options.map((option) => (
-        <Switch
+    <Group title={title}>
+      {options.map((option) => (
+        <OptionField
           key={option.name}
-          size="md"
-          className={classes["wide"]}
-          label={option.title}
-          checked={(form.strategyOptions[option.name] ?? option.default) === true}
-          onChange={(event) => choose(option.name, event.currentTarget.checked)}
+          option={option}
+          value={chosen[option.name]}
+          error={reasons[`${prefix}.${option.name}`]}
+          onChange={(value) => onChange({ ...chosen, [option.name]: value })}
         />
       ))}
     </Group>
@@ -99,7 +159,7 @@ function StrategyOptions({ form, catalogue, set }: Props) {
 function BoundFields({ form, catalogue, reasons, set }: Props) {
   return (
     <Group title="Bounds and steps">
-      {gainsOf(catalogue).map((gain) => {
+      {gainsOf(catalogue, form.experiment).map((gain) => {
         const [low, high] = form.bounds[gain.name] ?? [gain.lower, gain.upper];
         const change = (pair: [number | string, number | string]): void =>
           set({ bounds: { ...form.bounds, [gain.name]: pair } });
@@ -131,27 +191,16 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         error={reasons["step_fraction"]}
         onChange={(stepPercent) => set({ stepPercent })}
       />
-    </Group>
-  );
-}
-
-function VehicleOptions({ form, catalogue, reasons, set }: Props) {
-  const kind = catalogue.vehicle_kinds.find(({ name }) => name === form.vehicle);
-  if (!kind || kind.options.length === 0) return null;
-  const choose = (name: string, value: OptionValue): void =>
-    set({ vehicleOptions: { ...form.vehicleOptions, [name]: value } });
-  return (
-    <Group title={`Vehicle: ${kind.title}`}>
-      {kind.options.map((option) => (
+      {unitsOf(catalogue, form.experiment).output === "m" && (
         <Entry
-          key={option.name}
-          label={option.title}
-          description={option.lower === null ? undefined : `${option.lower} … ${option.upper} ${option.unit}`}
-          value={Number(form.vehicleOptions[option.name] ?? option.default)}
-          error={reasons[`vehicle.options.${option.name}`]}
-          onChange={(value) => choose(option.name, value === "" ? option.default : Number(value))}
+          label="Ceiling of the checks"
+          description="Gains that might rise higher are refused"
+          suffix=" m"
+          value={form.ceilingM}
+          error={reasons["ceiling_m"]}
+          onChange={(ceilingM) => set({ ceilingM })}
         />
-      ))}
+      )}
     </Group>
   );
 }

@@ -9,6 +9,7 @@ import { liveFlightsNow } from "../live/store";
 import { ConnectionNotice, ConnectionState } from "./ConnectionState";
 import { FlyingBar } from "./FlyingBar";
 import classes from "./Frame.module.css";
+import { MainNav } from "./MainNav";
 import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleBadge } from "./VehicleBadge";
 
@@ -72,6 +73,7 @@ export function AppFrame() {
             <img src="/icon.svg" alt="" width={32} height={32} />
             <span className={classes["homeName"]}>Gainline</span>
           </Link>
+          <MainNav />
           <div className={classes["vehicle"]}>
             {campaignId !== null && Number.isInteger(campaignId) && <CampaignVehicle campaignId={campaignId} />}
           </div>

@@ -1,16 +1,19 @@
 import { Link } from "react-router";
 import type { CampaignSummary } from "../api/types";
 import { progress } from "../lib/campaigns";
-import { count, withUnit } from "../lib/format";
+import { count } from "../lib/format";
 import { campaignWords } from "../lib/states";
+import { plusMinus } from "../lib/uncertainty";
 import classes from "./CampaignCard.module.css";
 import { Sparkline } from "./Sparkline";
 import { StateBadge } from "./StateBadge";
+import { useUnits } from "./useUnits";
 import { VehicleBadge } from "./VehicleBadge";
 
 /** A campaign at a glance: what it reached, how its curves look, what to do next. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
   const { id, name, state, outcome, vehicle, best, flights, next_action, spark } = campaign;
+  const unit = useUnits(campaign.experiment).error;
   return (
     <li className={classes["card"]}>
       <div className={classes["top"]}>
@@ -25,14 +28,11 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
       <dl className={`${classes["figures"]} numbers`}>
         <div>
           <dt>Best error</dt>
-          <dd>{withUnit(best?.error, "m")}</dd>
+          <dd>{plusMinus(best?.mean, best?.standard_error, unit)}</dd>
         </div>
         <div>
           <dt>{count(flights, "flight")}</dt>
-          <dd
-            className={classes["progress"]}
-            data-better={(best?.error ?? 0) < (campaign.first_error ?? 0) || undefined}
-          >
+          <dd className={classes["progress"]} data-better={campaign.verdict === "better" || undefined}>
             {progress(campaign) ?? " "}
           </dd>
         </div>

@@ -12,7 +12,7 @@ function cell(value: string | number | null, digits: number | null): string {
 export function DataTable({ table, label, height }: { table: FigureTable; label: string; height: number }) {
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={classes["scroll"]} style={{ height }} aria-label={label} tabIndex={0}>
+    <section className={`${classes["scroll"]} sideways`} style={{ height }} aria-label={label} tabIndex={0}>
       <table className={classes["table"]}>
         <thead>
           <tr>

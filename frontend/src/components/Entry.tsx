@@ -1,12 +1,37 @@
-import { NumberInput, type NumberInputProps } from "@mantine/core";
+import { TextInput, type TextInputProps } from "@mantine/core";
+import { useState } from "react";
 import type { Entry as Value } from "../lib/newCampaign";
+import { readNumber, typed } from "../lib/numbers";
 
-interface Props extends Omit<NumberInputProps, "value" | "onChange"> {
+interface Props extends Omit<TextInputProps, "value" | "onChange"> {
   value: Value;
   onChange: (value: Value) => void;
+  suffix?: string;
+  /** What an empty field stands for; a field without it has to be filled or says so by `required`. */
+  empty?: number;
 }
 
-/** A number to type: it takes what is written, the server says whether it can be used. */
-export function Entry(props: Props) {
-  return <NumberInput hideControls inputMode="decimal" {...props} />;
+/** A number to type. What reads as one is passed on as a number, anything else as the text it is, with the reason. */
+export function Entry({ value, onChange, suffix, empty, error, required = false, ...props }: Props) {
+  const written = typeof value === "number" ? typed(value) : value;
+  const [text, setText] = useState(written);
+  const meant = (typing: string): Value =>
+    typing.trim() === "" ? (empty ?? "") : (readNumber(typing).value ?? typing);
+  const shown = meant(text) === value ? text : written;
+  const wrong = shown.trim() === "" && !required ? undefined : readNumber(shown).reason;
+  return (
+    <TextInput
+      inputMode="decimal"
+      autoComplete="off"
+      placeholder={empty === undefined ? undefined : typed(empty)}
+      value={shown}
+      error={wrong ?? error}
+      rightSection={suffix?.trim()}
+      onChange={(event) => {
+        setText(event.currentTarget.value);
+        onChange(meant(event.currentTarget.value));
+      }}
+      {...props}
+    />
+  );
 }

@@ -1,16 +1,17 @@
-import { Button, Select } from "@mantine/core";
-import { IconArchive, IconCopy } from "@tabler/icons-react";
-import { useState } from "react";
-import { useNavigate } from "react-router";
-import { useArchive, useClone } from "../api/mutations";
-import { useCatalogue } from "../api/queries";
+import { Button } from "@mantine/core";
+import { IconArchive } from "@tabler/icons-react";
+import { useArchive } from "../api/mutations";
 import type { Campaign, Trial } from "../api/types";
-import { against, percentChange, withUnit } from "../lib/format";
+import { against, gainText, percentChange, withUnit } from "../lib/format";
 import { bestOf } from "../lib/nextStep";
 import { campaignWords } from "../lib/states";
+import { plusMinus } from "../lib/uncertainty";
+import { VERDICTS } from "../lib/verdict";
+import { CloneForm } from "./CloneForm";
 import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
 import { Trouble } from "./Trouble";
+import { useUnits } from "./useUnits";
 
 interface Props {
   campaign: Campaign;
@@ -20,33 +21,33 @@ interface Props {
 
 /** The campaign's result, and what to do with it. */
 export function FinishedCard({ campaign, trials, onChoose }: Props) {
-  const navigate = useNavigate();
-  const [vehicle, setVehicle] = useState(campaign.vehicle.kind);
-  const clone = useClone(campaign.id);
   const archive = useArchive(campaign.id);
-  const kinds = useCatalogue().data?.vehicle_kinds ?? [];
+  const unit = useUnits(campaign.definition.experiment ?? "").error;
   const best = bestOf(campaign, trials);
   const first = trials.find((trial) => trial.state === "valid");
   const title = campaignWords("finished", campaign.outcome).word;
-  const change = percentChange(best?.error, first?.error);
+  const change = percentChange(campaign.best?.mean, first?.error);
   return (
     <Panel title={title}>
       <div className={classes["stack"]}>
         {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && (
           <p className={classes["quiet"]}>{campaign.stop_reason}</p>
         )}
-        {best !== null && (
+        {best !== null && campaign.best !== null && (
           <div className={`${classes["best"]} numbers`}>
             <p>Best: flight {best.number}</p>
-            <p className={classes["figure"]}>{withUnit(best.error, "m")}</p>
+            <p className={classes["figure"]}>{plusMinus(campaign.best.mean, campaign.best.standard_error, unit)}</p>
+            <p>± standard error</p>
+            {campaign.best.flights > 1 && <p>mean of {campaign.best.flights} flights</p>}
             <p>
               {Object.entries(best.gains)
-                .map(([name, value]) => `${name} ${value}`)
+                .map(([name, value]) => `${name} ${gainText(value)}`)
                 .join("  ·  ")}
             </p>
             {first && change !== null && best.id !== first.id && (
               <p>
-                {against(change, `flight ${first.number}`)} ({withUnit(first.error, "m")})
+                {against(change, `flight ${first.number}`)} ({withUnit(first.error, unit)})
+                {campaign.verdict && <strong> · {VERDICTS[campaign.verdict].toLowerCase()}</strong>}
               </p>
             )}
           </div>
@@ -56,27 +57,11 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             Look at flight {best.number}
           </Button>
         )}
-        <div className={classes["clone"]}>
-          <Select
-            label="Same settings again, on"
-            allowDeselect={false}
-            data={kinds.map(({ name, title }) => ({ value: name, label: title }))}
-            value={vehicle}
-            onChange={(kind) => setVehicle(kind ?? vehicle)}
-          />
-          <Button
-            leftSection={<IconCopy size={20} aria-hidden />}
-            loading={clone.isPending}
-            onClick={() =>
-              // The same vehicle keeps its settings, another one starts from its own defaults.
-              clone.mutate(vehicle === campaign.vehicle.kind ? undefined : vehicle, {
-                onSuccess: ({ id }) => void navigate(`/campaigns/${id}`),
-              })
-            }
-          >
-            Clone
-          </Button>
-        </div>
+        <p className={classes["quiet"]}>
+          This campaign takes no more flights. To fly on, clone it; with “Start from flight” on, the clone begins at the
+          best gains found here.
+        </p>
+        <CloneForm campaign={campaign} />
         {campaign.actions.includes("archive") && (
           <Button
             variant="subtle"
@@ -89,7 +74,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             Archive
           </Button>
         )}
-        <Trouble error={clone.error ?? archive.error} />
+        <Trouble error={archive.error} />
       </div>
     </Panel>
   );

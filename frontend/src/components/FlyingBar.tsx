@@ -1,6 +1,7 @@
 import { IconOctagonFilled } from "@tabler/icons-react";
 import type { FlyingCampaign, useAbort } from "../api/flying";
 import { withUnit } from "../lib/format";
+import { readingOf } from "../lib/live";
 import { useLiveFlight } from "../live/store";
 import classes from "./Frame.module.css";
 
@@ -9,6 +10,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
   const live = useLiveFlight(flying.trialId);
   const asked = abort.asked.has(flying.trialId);
   const time = live?.timeS.at(-1);
+  const reading = readingOf(live?.channel ?? "");
   return (
     <section className={classes["flight"]} aria-label={`Flying: ${flying.name}`}>
       <span className={classes["flightName"]} title={flying.name}>
@@ -20,7 +22,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
           <span>{live?.phase === "staging" ? "setting gains" : "flying"}</span>
         ) : (
           <>
-            <span className={classes["big"]}>{withUnit(live?.altitudeM.at(-1), "m", 2)}</span>
+            <span className={classes["big"]}>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</span>
             <span>{withUnit(time, "s", 1)}</span>
           </>
         )}

@@ -1,9 +1,13 @@
 import type { Campaign, Trial } from "../api/types";
 import { withUnit } from "../lib/format";
 import { gainsInBrackets } from "../lib/gains";
+import { readingOf } from "../lib/live";
+import { predictedText } from "../lib/uncertainty";
 import { useLiveFlight } from "../live/store";
+import { Marks } from "./Marks";
 import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
+import { useUnits } from "./useUnits";
 
 interface Props {
   campaign: Campaign;
@@ -18,6 +22,8 @@ function share(value: number | null | undefined): string {
 /** What the flight under way says about itself. ABORT stands in the bar above, on every page. */
 export function FlyingCard({ campaign, trial, step }: Props) {
   const live = useLiveFlight(step.trialId);
+  const unit = useUnits(campaign.definition.experiment ?? "").error;
+  const reading = readingOf(live?.channel ?? "altitude_m");
   const stage =
     live === null || live.timeS.length === 0
       ? trial?.state === "planned"
@@ -25,29 +31,34 @@ export function FlyingCard({ campaign, trial, step }: Props) {
         : "Setting the gains"
       : "Flying";
   return (
-    <Panel title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}>
+    <Panel
+      title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
+      tools={trial === undefined ? undefined : <Marks trial={trial} />}
+    >
       <div className={classes["stack"]}>
         <dl className={`${classes["big"]} numbers`}>
           <div className={classes["reading"]} data-wide>
-            <dt>Altitude</dt>
-            <dd>{withUnit(live?.altitudeM.at(-1), "m", 2)}</dd>
+            <dt>{reading.title}</dt>
+            <dd>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Error so far</dt>
-            <dd>{withUnit(live?.errorSoFar, "m")}</dd>
+            <dd>{withUnit(live?.errorSoFar, unit)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Predicted error</dt>
-            <dd>{withUnit(trial?.predicted_error, "m")}</dd>
+            <dd>{predictedText(trial?.predicted_error, trial?.predicted_interval, unit)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Time</dt>
             <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
           </div>
-          <div className={classes["reading"]}>
-            <dt>Thrust</dt>
-            <dd>{share(live?.thrust)}</dd>
-          </div>
+          {live?.thrust !== null && (
+            <div className={classes["reading"]}>
+              <dt>Thrust</dt>
+              <dd>{share(live?.thrust)}</dd>
+            </div>
+          )}
         </dl>
         {trial && (
           <p className={`${classes["quiet"]} numbers`}>

@@ -1,10 +1,13 @@
-import { Button, NumberInput } from "@mantine/core";
+import { Button, TextInput } from "@mantine/core";
+import { IconAlertTriangle } from "@tabler/icons-react";
 import { useState } from "react";
 import { useCreateTrial } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import type { Campaign } from "../api/types";
+import { gainText } from "../lib/format";
 import type { Speed } from "../lib/nextStep";
-import { problemOf, reasonsByField } from "../lib/problems";
+import { readNumber, typed, typedGain } from "../lib/numbers";
+import { isGateRefusal, offersOf, type Problem, problemOf, reasonsByField, reasonsByWeight } from "../lib/problems";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
 
@@ -15,18 +18,37 @@ interface Props {
   onClose: () => void;
 }
 
-/** The operator's own gains, through the same checks as proposed ones. */
+/** The operator's own gains, through the same checks as proposed ones. Only what reads as numbers can be flown. */
 export function ManualGains({ campaign, start, speed, onClose }: Props) {
-  const [values, setValues] = useState<Record<string, number | string>>(start);
+  const names = Object.keys(start);
+  const [texts, setTexts] = useState(() =>
+    Object.fromEntries(Object.entries(start).map(([name, value]) => [name, typedGain(value)])),
+  );
   const create = useCreateTrial(campaign.id);
   const experiment = useCatalogue().data?.experiments.find(({ name }) => name === campaign.definition.experiment);
-  const names = Object.keys(start);
-  const reasons = reasonsByField(problemOf(create.error), names);
-  function submit(): void {
-    const gains = Object.fromEntries(
-      Object.entries(values).flatMap(([name, value]) => (value === "" ? [] : [[name, Number(value)]])),
+  const problem = problemOf(create.error);
+  const refused = isGateRefusal(problem);
+  const reasons = reasonsByField(problem, names);
+  const readings = names.map((name) => ({ name, ...readNumber(texts[name] ?? "") }));
+  const unread = readings.filter(({ reason }) => reason !== undefined).map(({ name }) => name);
+  const gains = Object.fromEntries(
+    readings.flatMap(({ name, value }) => (value === undefined ? [] : [[name, value] as const])),
+  );
+  const act = campaign.vehicle.can_fly ? "Fly" : "Plan";
+  const change = (name: string, text: string): void => {
+    setTexts({ ...texts, [name]: text });
+    create.reset();
+  };
+  function submit(overrule?: string): void {
+    if (unread.length > 0) return;
+    create.mutate(
+      {
+        gains,
+        ...(overrule === undefined ? {} : { overrule }),
+        ...(campaign.vehicle.can_fly ? { fly: { speed } } : {}),
+      },
+      { onSuccess: onClose },
     );
-    create.mutate({ gains, ...(campaign.vehicle.can_fly ? { fly: { speed } } : {}) }, { onSuccess: onClose });
   }
   return (
     <form
@@ -37,27 +59,110 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
         submit();
       }}
     >
-      {names.map((name) => {
+      {readings.map(({ name, reason }) => {
         const gain = experiment?.gains.find((one) => one.name === name);
         return (
-          <NumberInput
+          <TextInput
             key={name}
             label={`${name}${gain ? ` · ${gain.title}` : ""}`}
-            description={gain && `${gain.lower} … ${gain.upper} ${gain.unit}`}
-            value={values[name] ?? ""}
-            onChange={(value) => setValues({ ...values, [name]: value })}
-            error={reasons[name]}
-            {...(gain ? { step: Math.max(1, Math.round(gain.scale / 10)) } : {})}
+            description={gain && `${gainText(gain.lower)} … ${gainText(gain.upper)} ${gain.unit}`}
+            inputMode={gain?.integer && gain.lower >= 0 ? "numeric" : "text"}
+            autoComplete="off"
+            value={texts[name] ?? ""}
+            onChange={(event) => change(name, event.currentTarget.value)}
+            error={reason ?? (reasons[name] === undefined ? undefined : refused ? "Refused, see below" : reasons[name])}
           />
         );
       })}
-      <Button type="submit" size="lg" loading={create.isPending}>
-        {campaign.vehicle.can_fly ? "Fly these gains" : "Plan these gains"}
+      {refused && problem !== null && (
+        <Refusal
+          problem={problem}
+          offers={offersOf(problem).filter(([name]) => names.includes(name))}
+          onUse={(name, value) => change(name, typed(value))}
+        />
+      )}
+      {refused && !campaign.vehicle.is_real && <Overrule pending={create.isPending} onFly={submit} />}
+      <p className={`${classes["quiet"]} numbers`} aria-live="polite">
+        {unread.length > 0
+          ? `Nothing can be flown before ${unread.join(", ")} ${unread.length === 1 ? "reads as a number" : "read as numbers"}.`
+          : `${act === "Fly" ? "Flies" : "Plans"} ${Object.entries(gains)
+              .map(([name, value]) => `${name} ${typed(value).replace("-", "−")}`)
+              .join(" · ")}`}
+      </p>
+      <Button type="submit" size="lg" disabled={unread.length > 0} loading={create.isPending}>
+        {act} these gains
       </Button>
       <Button variant="default" onClick={onClose}>
         Back to the proposal
       </Button>
-      <Trouble error={create.error} shown={names} />
+      {!refused && <Trouble error={create.error} shown={names} />}
     </form>
+  );
+}
+
+interface RefusalProps {
+  problem: Problem;
+  offers: [gain: string, value: number][];
+  onUse: (gain: string, value: number) => void;
+}
+
+/** What would happen, in a sentence, and what would pass; the other checks folded. */
+function Refusal({ problem, offers, onUse }: RefusalProps) {
+  const [first, ...others] = reasonsByWeight(problem);
+  return (
+    <div className={`${classes["failed"]} ${classes["stack"]}`} role="alert">
+      <div>
+        <strong>{problem.title}</strong>
+        <p>{first}</p>
+      </div>
+      {offers.map(([name, value]) => (
+        <Button key={name} variant="light" onClick={() => onUse(name, value)}>
+          Use {name} {gainText(value)}
+        </Button>
+      ))}
+      {others.length > 0 && (
+        <details className={classes["more"]}>
+          <summary>All checks: {others.length} more refused</summary>
+          <ul className={classes["gate"]}>
+            {others.map((reason) => (
+              <li key={reason}>{reason}</li>
+            ))}
+          </ul>
+        </details>
+      )}
+    </div>
+  );
+}
+
+/** Only where nothing can break: fly what the checks refuse, with a reason that stays with the flight. */
+function Overrule({ pending, onFly }: { pending: boolean; onFly: (reason: string) => void }) {
+  const [reason, setReason] = useState("");
+  return (
+    <details className={classes["more"]}>
+      <summary>Overrule with a reason</summary>
+      <div className={classes["stack"]}>
+        <p className={classes["quiet"]}>
+          This vehicle is simulated, so the refused gains may fly all the same. The reason is kept with the flight and
+          shown wherever it is. On a real vehicle nobody can do this.
+        </p>
+        <TextInput
+          label="Reason"
+          placeholder="For example: the paper flew these gains"
+          value={reason}
+          maxLength={500}
+          onChange={(event) => setReason(event.currentTarget.value)}
+        />
+        <Button
+          color="red"
+          variant="outline"
+          leftSection={<IconAlertTriangle size={20} aria-hidden />}
+          disabled={reason.trim() === ""}
+          loading={pending}
+          onClick={() => onFly(reason.trim())}
+        >
+          Fly in spite of the refusal
+        </Button>
+      </div>
+    </details>
   );
 }

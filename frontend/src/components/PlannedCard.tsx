@@ -2,13 +2,16 @@ import { Button } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../api/mutations";
 import type { Campaign, Trial } from "../api/types";
-import { gainText, withUnit } from "../lib/format";
+import { gainText } from "../lib/format";
 import { speedOf } from "../lib/nextStep";
+import { predictedText } from "../lib/uncertainty";
 import { ImportRecord } from "./ImportRecord";
+import { Marks } from "./Marks";
 import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { Trouble } from "./Trouble";
+import { useUnits } from "./useUnits";
 
 interface Props {
   campaign: Campaign;
@@ -19,10 +22,11 @@ interface Props {
 /** A trial that is planned and has not flown: fly it, hand in its record, or give it up. */
 export function PlannedCard({ campaign, trial, upload }: Props) {
   const [speed, setSpeed] = useSpeed();
+  const unit = useUnits(campaign.definition.experiment ?? "").error;
   const fly = useFlyTrial(campaign.id);
   const cancel = useCancelTrial();
   return (
-    <Panel title={`Flight ${trial.number} is planned`}>
+    <Panel title={`Flight ${trial.number} is planned`} tools={<Marks trial={trial} />}>
       <div className={classes["stack"]}>
         <dl className={`${classes["big"]} numbers`}>
           {Object.entries(trial.gains).map(([name, value]) => (
@@ -31,9 +35,9 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
               <dd>{gainText(value)}</dd>
             </div>
           ))}
-          <div className={classes["reading"]}>
+          <div className={classes["reading"]} data-row>
             <dt>Predicted error</dt>
-            <dd>{withUnit(trial.predicted_error, "m")}</dd>
+            <dd>{predictedText(trial.predicted_error, trial.predicted_interval, unit)}</dd>
           </div>
         </dl>
         {trial.flight?.problem && <Trouble error={new Error(trial.flight.problem)} />}

@@ -1,19 +1,24 @@
 import { Button } from "@mantine/core";
-import { IconPencil, IconPlaneDeparture, IconRepeat } from "@tabler/icons-react";
+import { IconPencil, IconPlaneDeparture } from "@tabler/icons-react";
 import { useState } from "react";
 import { type RecordUpload, useCreateTrial } from "../api/mutations";
+import { useCatalogue } from "../api/queries";
 import type { Campaign, Proposal, Trial } from "../api/types";
-import { against, percentChange, withUnit } from "../lib/format";
-import { bestOf, speedOf } from "../lib/nextStep";
+import { speedOf } from "../lib/nextStep";
+import { advised, choicesFor, KINDS, type Variant } from "../lib/proposal";
 import { GainTable } from "./GainTable";
+import { GateChecks } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
 import { ManualGains } from "./ManualGains";
 import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
+import { Predicted } from "./Predicted";
+import { Recommendation } from "./Recommendation";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { StopCampaign } from "./StopCampaign";
 import { Trouble } from "./Trouble";
-import { GateChecks, Why } from "./Why";
+import { useUnits } from "./useUnits";
+import { Why } from "./Why";
 
 interface Props {
   campaign: Campaign;
@@ -22,74 +27,79 @@ interface Props {
   upload: RecordUpload;
 }
 
-const KINDS: Record<Proposal["kind"], string> = {
-  start: "Start",
-  step: "Step",
-  manual: "By hand",
-  "shorter step": "Shorter step",
-  none: "Nothing better found",
-};
-
-/** The proposed flight: gains now and next, what it should bring and why, and one button that flies it. */
+/** The proposed flight: what to do and why, gains now and next, what it should bring, and one button that flies it. */
 export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const [editing, setEditing] = useState(false);
   const [speed, setSpeed] = useSpeed();
   const create = useCreateTrial(campaign.id);
+  const units = useUnits(campaign.definition.experiment ?? "");
+  const experiment = useCatalogue().data?.experiments.find(({ name }) => name === campaign.definition.experiment);
+  const titles = Object.fromEntries((experiment?.gains ?? []).map(({ name, title }) => [name, title]));
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
-  const fly = { speed: speedOf(speed) };
-  const best = bestOf(campaign, trials);
+  const order = campaign.vehicle.can_fly ? { fly: { speed: speedOf(speed) } } : {};
+  const advice = advised(proposal);
+  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order });
   if (editing) {
     return (
       <Panel title={`Flight ${number}, gains of your own`}>
-        <ManualGains campaign={campaign} start={proposal.gains} onClose={() => setEditing(false)} speed={fly.speed} />
+        <ManualGains
+          campaign={campaign}
+          start={proposal.gains}
+          onClose={() => setEditing(false)}
+          speed={speedOf(speed)}
+        />
       </Panel>
     );
   }
   return (
     <Panel title={`Next flight: ${number}`} tools={<span className={classes["quiet"]}>{KINDS[proposal.kind]}</span>}>
       <div className={classes["stack"]}>
-        {proposal.kind === "none" && <p className={classes["quiet"]}>{proposal.stop_verdict.sentence}</p>}
-        <GainTable changes={proposal.changes} />
-        <Predicted proposal={proposal} best={campaign.best?.error ?? null} />
+        {trials.length > 0 && <Recommendation advice={advice} />}
+        {advice.variant !== null && (
+          <FlyButton
+            label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
+            loading={create.isPending}
+            onClick={() => advice.variant !== null && flyVariant(advice.variant)}
+          />
+        )}
+        <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
+        <Predicted proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />
         {campaign.vehicle.can_fly ? (
           <>
-            <Button
-              fullWidth
-              size="lg"
-              leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+            <FlyButton
+              label={flyLabel(advice.variant === null, proposal)}
+              quiet={advice.variant !== null || advice.kind === "stop"}
               loading={create.isPending}
               disabled={!proposal.gate.passed}
-              onClick={() => create.mutate({ proposal_id: proposal.id, fly })}
-            >
-              Fly next trial
-            </Button>
+              onClick={() => create.mutate({ proposal_id: proposal.id, ...order })}
+            />
             <SpeedSwitch value={speed} onChange={setSpeed} />
           </>
         ) : (
           <ImportRecord upload={upload} proposalId={proposal.id} />
         )}
-        <Trouble error={create.error} />
-        <div>
-          <Why explanation={proposal.explanation} unit="m" />
-          <GateChecks gate={proposal.gate} />
-        </div>
         <div className={classes["row"]}>
+          {choicesFor(campaign, proposal, trials)
+            .filter(({ variant }) => variant !== advice.variant)
+            .map(({ variant, label, hint }) => (
+              <Button
+                key={variant}
+                variant="default"
+                title={hint}
+                disabled={create.isPending}
+                onClick={() => flyVariant(variant)}
+              >
+                {label}
+              </Button>
+            ))}
           <Button variant="default" leftSection={<IconPencil size={18} aria-hidden />} onClick={() => setEditing(true)}>
             Edit gains
           </Button>
-          <Button
-            variant="default"
-            leftSection={<IconRepeat size={18} aria-hidden />}
-            disabled={best === null || create.isPending}
-            title={
-              best === null ? "There is no valid flight to repeat yet" : `Fly the gains of flight ${best.number} again`
-            }
-            onClick={() =>
-              best !== null && create.mutate({ gains: best.gains, ...(campaign.vehicle.can_fly ? { fly } : {}) })
-            }
-          >
-            Repeat best
-          </Button>
+        </div>
+        <Trouble error={create.error} />
+        <div>
+          <Why explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
+          <GateChecks gate={proposal.gate} />
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
       </div>
@@ -97,15 +107,31 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   );
 }
 
-function Predicted({ proposal, best }: { proposal: Proposal; best: number | null }) {
-  const change = percentChange(proposal.predicted_error, best);
+function flyLabel(recommended: boolean, { kind }: Proposal): string {
+  if (recommended) return "Fly next trial";
+  return kind === "none" ? "Fly these gains" : "Fly the step";
+}
+
+interface FlyProps {
+  label: string;
+  loading: boolean;
+  onClick: () => void;
+  quiet?: boolean;
+  disabled?: boolean;
+}
+
+function FlyButton({ label, loading, onClick, quiet = false, disabled = false }: FlyProps) {
   return (
-    <div className={`${classes["predicted"]} numbers`}>
-      <span>Predicted error</span>
-      <span>
-        <strong>{withUnit(proposal.predicted_error, "m")}</strong>
-        {change !== null && <small>{against(change, "the best")}</small>}
-      </span>
-    </div>
+    <Button
+      fullWidth
+      size="lg"
+      variant={quiet ? "default" : "filled"}
+      leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+      loading={loading}
+      disabled={disabled}
+      onClick={onClick}
+    >
+      {label}
+    </Button>
   );
 }

@@ -2,7 +2,9 @@ import { IconStarFilled } from "@tabler/icons-react";
 import type { Campaign, Trial } from "../api/types";
 import { gainText, NOTHING, withUnit } from "../lib/format";
 import { trialWords, wasFlown } from "../lib/states";
+import { rangeText } from "../lib/uncertainty";
 import { sentenceOf } from "../lib/verdict";
+import { Kept, Marks } from "./Marks";
 import { StateBadge } from "./StateBadge";
 import classes from "./TrialsTable.module.css";
 
@@ -10,15 +12,16 @@ interface Props {
   campaign: Campaign;
   trials: readonly Trial[];
   shown: number | null;
+  unit: string;
   onChoose: (trialNumber: number) => void;
 }
 
 /** The campaign's flights like the paper's Table 1: gains, error, prediction, and what came of each. */
-export function TrialsTable({ campaign, trials, shown, onChoose }: Props) {
+export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) {
   const names = Object.keys(trials[0]?.gains ?? {});
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={classes["scroll"]} aria-label="All flights" tabIndex={0}>
+    <section className={`${classes["scroll"]} sideways`} aria-label="All flights" tabIndex={0}>
       <table className={classes["table"]}>
         <thead>
           <tr>
@@ -61,10 +64,19 @@ export function TrialsTable({ campaign, trials, shown, onChoose }: Props) {
                 {names.map((name) => (
                   <td key={name}>{gainText(trial.gains[name] ?? Number.NaN)}</td>
                 ))}
-                <td className={classes["error"]}>{withUnit(trial.error, "m")}</td>
-                <td>{withUnit(trial.predicted_error, "m")}</td>
+                <td className={classes["error"]}>{withUnit(trial.error, unit)}</td>
+                <td>
+                  <span className={classes["predicted"]}>
+                    {withUnit(trial.predicted_error, unit)}
+                    {trial.predicted_interval && <small>({rangeText(trial.predicted_interval, unit)})</small>}
+                    <Kept trial={trial} brief />
+                  </span>
+                </td>
                 <td className={classes["text"]}>
-                  <StateBadge words={trialWords(trial.state)} />
+                  <span className={classes["state"]}>
+                    <StateBadge words={trialWords(trial.state)} />
+                    <Marks trial={trial} />
+                  </span>
                 </td>
                 <td className={`${classes["text"]} ${classes["verdict"]}`}>{sentenceOf(trial) || NOTHING}</td>
               </tr>

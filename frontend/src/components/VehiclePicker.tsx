@@ -1,6 +1,5 @@
 import { Radio } from "@mantine/core";
 import type { VehicleKindInfo } from "../api/types";
-import { vehicleOrder } from "../lib/newCampaign";
 import { VehicleBadge } from "./VehicleBadge";
 import classes from "./VehiclePicker.module.css";
 
@@ -15,7 +14,7 @@ export function VehiclePicker({ kinds, value, error, onChange }: Props) {
   return (
     <Radio.Group size="md" label="Vehicle" value={value} onChange={onChange} error={error}>
       <div className={classes["cards"]}>
-        {vehicleOrder(kinds).map((kind) => (
+        {kinds.map((kind) => (
           <Radio.Card key={kind.name} value={kind.name} className={classes["card"]}>
             <span className={classes["top"]}>
               <VehicleBadge isReal={kind.is_real} />

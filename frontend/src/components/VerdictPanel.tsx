@@ -1,12 +1,17 @@
 import { Anchor, Button } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
+import type { ReactNode } from "react";
 import { Link } from "react-router";
-import { recordCsv } from "../api/queries";
+import { recordCsv, useStatistics } from "../api/queries";
 import type { Trial } from "../api/types";
 import { gainText, percentChange, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
-import { bestBeforeOf, sentenceOf } from "../lib/verdict";
+import { intervalText, plusMinus } from "../lib/uncertainty";
+import { askedFor, bestBeforeOf, sentenceOf } from "../lib/verdict";
 import { Classify } from "./Classify";
+import { Comparisons } from "./Comparisons";
+import { Glitches } from "./Glitches";
+import { Kept, Marks } from "./Marks";
 import { Panel } from "./Panel";
 import { StateBadge } from "./StateBadge";
 import { Time } from "./Time";
@@ -16,15 +21,16 @@ interface Props {
   trial: Trial;
   trials: readonly Trial[];
   isBest: boolean;
+  unit: string;
   /** On the flight's own page there is no link to that page. */
   own?: boolean;
 }
 
 /** `error` against `other`; two that print alike are the same. */
-function Change({ error, other }: { error: number | null; other: number | null | undefined }) {
+function Change({ error, other, unit }: { error: number | null; other: number | null | undefined; unit: string }) {
   const percent = percentChange(error, other);
   if (percent === null) return null;
-  if (withUnit(error, "m") === withUnit(other, "m")) return <small>the same</small>;
+  if (withUnit(error, unit) === withUnit(other, unit)) return <small>the same</small>;
   const size = Math.abs(percent).toFixed(0);
   const lower = percent < 0;
   return (
@@ -34,53 +40,72 @@ function Change({ error, other }: { error: number | null; other: number | null |
   );
 }
 
+function Fact({ title, wide = false, children }: { title: string; wide?: boolean; children: ReactNode }) {
+  return (
+    <div className={wide ? classes["wide"] : undefined}>
+      <dt>{title}</dt>
+      <dd>{children}</dd>
+    </div>
+  );
+}
+
 /** What happened in a flight: against the best before it, against its prediction, and what it counts for. */
-export function VerdictPanel({ trial, trials, isBest, own = false }: Props) {
+export function VerdictPanel({ trial, trials, isBest, unit, own = false }: Props) {
   const bestBefore = bestBeforeOf(trial, trials);
+  const statistics = useStatistics(trial.campaign_id).data;
+  const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
+  const asked = askedFor(trial);
+  const scatter = trial.state === "valid" ? statistics?.sigma : null;
   return (
     <Panel
       title={`Flight ${trial.number}${isBest && trial.state === "valid" ? " · best so far" : ""}`}
       tools={
         <span className={classes["when"]}>
           <Time at={trial.flown_at} />
+          <Marks trial={trial} />
           <StateBadge words={trialWords(trial.state)} />
         </span>
       }
     >
-      <p className={classes["sentence"]}>{sentenceOf(trial)}</p>
+      {asked && <p className={classes["sentence"]}>{asked}</p>}
+      <p className={asked ? classes["reason"] : classes["sentence"]}>{sentenceOf(trial)}</p>
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
       )}
+      <Comparisons trial={trial} unit={unit} />
+      {trial.overrule_reason && (
+        <p className={classes["overruled"]}>
+          <strong>The checks refused these gains, and were overruled:</strong> {trial.overrule_reason}
+        </p>
+      )}
       <dl className={`${classes["figures"]} numbers`}>
-        <div>
-          <dt>Error</dt>
-          <dd>{withUnit(trial.error, "m")}</dd>
-        </div>
-        <div>
-          <dt>Predicted</dt>
-          <dd>
-            {withUnit(trial.predicted_error, "m")} <Change error={trial.error} other={trial.predicted_error} />
-          </dd>
-        </div>
-        <div>
-          <dt>{bestBefore ? `Best before, flight ${bestBefore.number}` : "Best before"}</dt>
-          <dd>
-            {withUnit(bestBefore?.error, "m")} <Change error={trial.error} other={bestBefore?.error} />
-          </dd>
-        </div>
-        <div>
-          <dt>Overshoot</dt>
-          <dd>{withUnit(trial.overshoot_m, "m", 2)}</dd>
-        </div>
-        <div className={classes["wide"]}>
-          <dt>Gains</dt>
-          <dd className={classes["gains"]}>
+        <Fact title="Error">
+          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(scatter of one flight)</small> : null}
+        </Fact>
+        <Fact title="Predicted">
+          {withUnit(trial.predicted_error, unit)}{" "}
+          {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
+          <Kept trial={trial} />
+        </Fact>
+        <Fact title={bestBefore ? `Best before, flight ${bestBefore.number}` : "Best before"}>
+          {withUnit(bestBefore?.error, unit)}{" "}
+          {!asked && <Change error={trial.error} other={bestBefore?.error} unit={unit} />}
+        </Fact>
+        {group !== undefined && group.errors.length > 1 && (
+          <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`}>
+            {plusMinus(group.mean, group.standard_error, unit)} <small>(standard error)</small>
+          </Fact>
+        )}
+        {trial.overshoot_m !== null && <Fact title="Overshoot">{withUnit(trial.overshoot_m, "m", 2)}</Fact>}
+        <Fact title="Gains" wide>
+          <span className={classes["gains"]}>
             {Object.entries(trial.gains)
               .map(([name, value]) => `${name} ${gainText(value)}`)
               .join(" · ")}
-          </dd>
-        </div>
+          </span>
+        </Fact>
       </dl>
+      <Glitches trial={trial} unit={unit} />
       <div className={classes["acts"]}>
         <Classify key={`${trial.id} ${trial.state}`} trial={trial} />
         {trial.record !== null && (

@@ -1,78 +1,121 @@
-import { IconCircleCheck, IconCircleX } from "@tabler/icons-react";
-import type { Explanation, Gate } from "../api/types";
-import { count, gainText, withUnit } from "../lib/format";
+import type { Explanation, FittedParameter } from "../api/types";
+import { gainText, NOTHING, withUnit } from "../lib/format";
 import { gainsInBrackets } from "../lib/gains";
+import { percent, plusMinus } from "../lib/uncertainty";
+import { Help } from "./Help";
 import classes from "./NextFlight.module.css";
 
-/** Why these gains: the sentence, the gradient, the ladder of steps tried, and what a limit stopped. */
-export function Why({ explanation, unit }: { explanation: Explanation; unit: string }) {
-  const { gradient = {}, ladder = [], clipped = [], notes = [], chosen_length: chosen } = explanation;
+interface Props {
+  explanation: Explanation;
+  unit: string;
+  gains: Readonly<Record<string, number>>;
+}
+
+/** Why these gains: the sentence, what was learned of the vehicle, what held the step back, and what it will teach. */
+export function Why({ explanation, unit, gains }: Props) {
+  const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
   return (
-    <details className={classes["more"]}>
-      <summary>Why these gains</summary>
-      <div className={classes["stack"]}>
-        <span>{explanation.summary}</span>
-        {Object.keys(gradient).length > 0 && (
-          <span className="numbers">
-            Gradient of the error:{" "}
-            {Object.entries(gradient)
-              .map(([name, value]) => `${name} ${value.toPrecision(2)}`)
-              .join(", ")}{" "}
-            {unit} per count.
-          </span>
-        )}
-        {clipped.length > 0 && <span>Stopped by a limit: {clipped.join(", ")}.</span>}
-        {notes.map((note) => (
-          <span key={note}>{note}</span>
-        ))}
-        {ladder.length > 0 && (
-          <table className={classes["ladder"]}>
-            <caption className="visually-hidden">Steps tried on the model</caption>
-            <thead>
-              <tr>
-                <th scope="col">Step</th>
-                <th scope="col">Gains</th>
-                <th scope="col">Predicted</th>
-              </tr>
-            </thead>
-            <tbody>
-              {ladder.map((step) => (
-                <tr key={step.length} data-chosen={step.length === chosen || undefined}>
-                  <td>{gainText(step.length)}</td>
-                  <td>{gainsInBrackets(step.gains)}</td>
-                  <td>{withUnit(step.predicted_error, unit, 4)}</td>
-                </tr>
-              ))}
-            </tbody>
-          </table>
-        )}
-      </div>
-    </details>
+    <>
+      <details className={classes["more"]}>
+        <summary>Why these gains</summary>
+        <div className={classes["stack"]}>
+          <span>{explanation.summary}</span>
+          {lesson && (
+            <span>
+              <strong>What it will teach:</strong> {lesson}
+            </span>
+          )}
+          {trust !== null && (
+            <span className="numbers">
+              Trusted region: {percent(trust)} of each gain's range
+              <Help question="What is the trusted region?">
+                <p>
+                  How far a step may go from the best gains flown. It grows when predictions hold, and shrinks when a
+                  flight disagrees or is aborted.
+                </p>
+              </Help>
+            </span>
+          )}
+          {clipped.length > 0 && <span>Stopped by a limit: {clipped.join(", ")}.</span>}
+          {notes.map((note) => (
+            <span key={note}>{note}</span>
+          ))}
+          {fitted.length > 0 && <Fitted parameters={fitted} />}
+        </div>
+      </details>
+      <Tried explanation={explanation} unit={unit} gains={gains} />
+    </>
   );
 }
 
-/** What was checked before the flight: one line when all is well, each check when opened or when one refused. */
-export function GateChecks({ gate }: { gate: Gate }) {
-  const refused = gate.checks.filter((check) => !check.passed).length;
-  const said =
-    refused === 0
-      ? `${count(gate.checks.length, "check")} passed`
-      : `${refused} of ${gate.checks.length} checks refused`;
+function withOwnUnit(text: string, unit: string): string {
+  return unit === "" || unit === "1" ? text : `${text} (${unit})`;
+}
+
+/** What the flights say of the vehicle, beside what was known before them. */
+function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   return (
-    <details className={classes["more"]} open={refused > 0}>
-      <summary>{said}</summary>
-      <div>
-        <ul className={classes["gate"]}>
-          {gate.checks.map((check) => {
-            const Icon = check.passed ? IconCircleCheck : IconCircleX;
-            return (
-              <li key={`${check.name} ${check.sentence}`} data-failed={!check.passed || undefined}>
-                <Icon size={19} aria-label={check.passed ? "passed" : "refused"} />
-                <span>{check.sentence}</span>
-              </li>
-            );
-          })}
-        </ul>
+    <table className={classes["ladder"]}>
+      <caption>The vehicle as the flights have it (± standard error)</caption>
+      {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
+        <tbody key={name}>
+          <tr>
+            <th colSpan={2} scope="rowgroup">
+              {withOwnUnit(title, unit)}
+            </th>
+          </tr>
+          <tr className={classes["fitted"]}>
+            <td>
+              now <strong>{plusMinus(value, standard_error, "")}</strong>
+            </td>
+            <td>before {plusMinus(nominal, prior_sd, "")}</td>
+          </tr>
+        </tbody>
+      ))}
+    </table>
+  );
+}
+
+/** The gradient and the steps tried along it, for those who want to follow the arithmetic. */
+function Tried({ explanation, unit, gains }: Props) {
+  const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
+  const slopes = Object.entries(gradient);
+  if (slopes.length === 0 && ladder.length === 0) return null;
+  return (
+    <details className={classes["more"]}>
+      <summary>Steps tried on the model</summary>
+      <div className={classes["stack"]}>
+        {slopes.length > 0 && (
+          <span className="numbers">
+            Gradient of the error: {slopes.map(([name, value]) => `${name} ${value.toPrecision(2)}`).join(", ")} {unit}{" "}
+            per unit of the gain.
+          </span>
+        )}
+        {ladder.length > 0 && (
+          // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+          <section className={`${classes["wide"]} sideways`} aria-label="Steps tried on the model" tabIndex={0}>
+            <table className={classes["ladder"]}>
+              <thead>
+                <tr>
+                  <th scope="col">Step</th>
+                  <th scope="col">[{Object.keys(gains).join(" ")}]</th>
+                  <th scope="col">Predicted</th>
+                  <th scope="col">Limit</th>
+                </tr>
+              </thead>
+              <tbody>
+                {ladder.map((step) => (
+                  <tr key={step.length} data-chosen={step.length === chosen || undefined}>
+                    <td>{gainText(step.length)}</td>
+                    <td>{gainsInBrackets(step.gains)}</td>
+                    <td>{withUnit(step.predicted_error, unit, 4)}</td>
+                    <td>{step.clipped?.join(", ") || NOTHING}</td>
+                  </tr>
+                ))}
+              </tbody>
+            </table>
+          </section>
+        )}
       </div>
     </details>
   );

@@ -36,8 +36,8 @@ export function drawLive(chart: HTMLElement, trace: number, trialId: number): ()
   const drawing = paced(async () => {
     if (latest === null || latest.timeS.length === 0) return;
     const plotly = await loadPlotly();
-    const change = { x: [latest.timeS], y: [latest.altitudeM], showlegend: true };
-    const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.altitudeM);
+    const change = { x: [latest.timeS], y: [latest.measured], showlegend: true };
+    const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.measured);
     await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, [trace]);
   }, SHORTEST_REDRAW_MS);
   const unfollow = onLive(trialId, (flight) => {

@@ -2,12 +2,26 @@ import { expect, test } from "vitest";
 import type { CampaignSummary } from "../api/types";
 import { progress, statesFor } from "./campaigns";
 
-const summary = (best: number | null, first: number | null, flights: number): CampaignSummary =>
-  ({ best: best === null ? null : { error: best }, first_error: first, flights }) as unknown as CampaignSummary;
+const summary = (
+  best: number | null,
+  first: number | null,
+  flights: number,
+  verdict: CampaignSummary["verdict"] = null,
+): CampaignSummary =>
+  ({
+    best: best === null ? null : { error: best, mean: best },
+    first_error: first,
+    flights,
+    verdict,
+  }) as unknown as CampaignSummary;
 
 test("progress is told against the first flight", () => {
-  expect(progress(summary(0.0933, 0.3267, 5))).toBe("71 % below the first");
+  expect(progress(summary(0.0933, 0.3267, 5, "better"))).toBe("71 % below the first");
   expect(progress(summary(0.3267, 0.3267, 3))).toBe("none better yet");
+});
+
+test("a difference within the noise is no progress that could be claimed", () => {
+  expect(progress(summary(0.32, 0.3267, 5, "unresolved"))).toBe("not told apart from the first");
 });
 
 test("one flight is no progress yet", () => {

@@ -23,9 +23,11 @@ export function statesFor(filter: StateFilter): CampaignState[] {
   return STATES[filter];
 }
 
-/** The best flight against the first, in words; null before there are two. */
-export function progress({ best, first_error, flights }: CampaignSummary): string | null {
-  const change = percentChange(best?.error, first_error);
+/** The best gains against the first flight's, in words; null before there are two flights. */
+export function progress({ best, first_error, flights, verdict }: CampaignSummary): string | null {
+  const change = percentChange(best?.mean, first_error);
   if (best === null || change === null || flights < 2) return null;
-  return change === 0 ? "none better yet" : against(change, "the first");
+  if (verdict === null) return "none better yet";
+  if (verdict === "unresolved") return "not told apart from the first";
+  return against(change, "the first");
 }

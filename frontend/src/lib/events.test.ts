@@ -10,6 +10,11 @@ test("a changed trial makes its campaign, the lists and what flies doubtful", ()
   ]);
 });
 
+test("a changed job makes the jobs doubtful, and one without a campaign the reproductions", () => {
+  expect(doubtful({ topic: "job", entity_id: 3, campaign_id: null })).toEqual([["jobs"], ["reproductions"]]);
+  expect(doubtful({ topic: "job", entity_id: 3, campaign_id: 4 })).toEqual([["jobs"], ["campaign", 4]]);
+});
+
 test("many changes together ask for each answer once", () => {
   const changes = [
     { topic: "proposal", entity_id: 1, campaign_id: 4 },

@@ -27,9 +27,10 @@ export function signed(value: number, digits = 0): string {
   return `${value > 0 ? "+" : "−"}${text}`;
 }
 
-/** A gain: whole numbers as they are, others with at most four digits after the point. */
+/** A gain: whole numbers as they are, others in four digits, with a true minus. */
 export function gainText(value: number): string {
-  return Number.isInteger(value) ? String(value) : String(Number(value.toFixed(4)));
+  const text = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(4)));
+  return text.replace(/^-/, "−");
 }
 
 /** Date and time here; the year only when it is not this one. */

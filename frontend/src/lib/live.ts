@@ -4,7 +4,9 @@ export interface LiveFlight {
   campaignId: number;
   trialId: number;
   timeS: number[];
-  altitudeM: number[];
+  /** The scored channel: its name, and its value at each of `timeS`. */
+  channel: string;
+  measured: number[];
   thrust: number | null;
   batteryV: number | null;
   errorSoFar: number | null;
@@ -15,7 +17,8 @@ export interface Telemetry {
   campaign_id: number;
   trial_id: number;
   time_s: number;
-  /** Rows of seconds, altitude, climb rate, set point, reference, share of full thrust, battery volts. */
+  /** What each row holds: the seconds first, then the scored channel, then whatever else is worth watching. */
+  columns: string[];
   samples: number[][];
   error_so_far: number | null;
 }
@@ -25,7 +28,8 @@ export function begun(campaignId: number, trialId: number): LiveFlight {
     campaignId,
     trialId,
     timeS: [],
-    altitudeM: [],
+    channel: "altitude_m",
+    measured: [],
     thrust: null,
     batteryV: null,
     errorSoFar: null,
@@ -36,21 +40,33 @@ export function begun(campaignId: number, trialId: number): LiveFlight {
 /** The flight with the new samples; samples not newer than the last (sent twice after a reconnect) are dropped. */
 export function extended(flight: LiveFlight, news: Telemetry): LiveFlight {
   const timeS = [...flight.timeS];
-  const altitudeM = [...flight.altitudeM];
-  for (const [time, altitude] of news.samples) {
-    if (time === undefined || altitude === undefined || time <= (timeS.at(-1) ?? Number.NEGATIVE_INFINITY)) continue;
+  const measured = [...flight.measured];
+  for (const [time, value] of news.samples) {
+    if (time === undefined || value === undefined || time <= (timeS.at(-1) ?? Number.NEGATIVE_INFINITY)) continue;
     timeS.push(time);
-    altitudeM.push(altitude);
+    measured.push(value);
   }
   const last = news.samples.at(-1);
+  const latest = (column: string): number | undefined => last?.[news.columns.indexOf(column)];
   return {
     ...flight,
     timeS,
-    altitudeM,
-    thrust: last?.[5] ?? flight.thrust,
-    batteryV: last?.[6] ?? flight.batteryV,
+    channel: news.columns[1] ?? flight.channel,
+    measured,
+    thrust: latest("thrust") ?? flight.thrust,
+    batteryV: latest("battery_v") ?? flight.batteryV,
     errorSoFar: news.error_so_far ?? flight.errorSoFar,
   };
+}
+
+/** How a channel is read out: what it is called, its unit, and the digits that matter. */
+const CHANNELS: Record<string, { title: string; unit: string; digits: number }> = {
+  altitude_m: { title: "Altitude", unit: "m", digits: 2 },
+  pitch_error_rad: { title: "Pitch error", unit: "rad", digits: 3 },
+};
+
+export function readingOf(channel: string): { title: string; unit: string; digits: number } {
+  return CHANNELS[channel] ?? { title: channel, unit: "", digits: 3 };
 }
 
 const OVER = new Set(["landed", "ended"]);
@@ -75,12 +91,14 @@ function isRow(value: unknown): value is number[] {
 export function telemetryFrom(json: string): Telemetry | null {
   const parsed: unknown = JSON.parse(json);
   if (typeof parsed !== "object" || parsed === null) return null;
-  const { campaign_id, trial_id, time_s, samples, error_so_far } = parsed as Record<string, unknown>;
+  const { campaign_id, trial_id, time_s, columns, samples, error_so_far } = parsed as Record<string, unknown>;
   if (typeof campaign_id !== "number" || typeof trial_id !== "number" || !Array.isArray(samples)) return null;
+  if (!Array.isArray(columns)) return null;
   return {
     campaign_id,
     trial_id,
     time_s: typeof time_s === "number" ? time_s : 0,
+    columns: columns.map(String),
     samples: samples.filter(isRow),
     error_so_far: typeof error_so_far === "number" ? error_so_far : null,
   };

@@ -1,6 +1,15 @@
 import { expect, test } from "vitest";
-import type { Catalogue } from "../api/types";
-import { fieldsOf, firstPreset, requestFrom, startingForm, vehicleOrder, withVehicle } from "./newCampaign";
+import type { CampaignSummary, Catalogue } from "../api/types";
+import {
+  fieldsOf,
+  firstPreset,
+  kindsFor,
+  requestFrom,
+  startingForm,
+  strategiesFor,
+  withExperiment,
+  withVehicle,
+} from "./newCampaign";
 
 const gain = (name: string, upper: number, value: number) => ({
   name,
@@ -14,14 +23,34 @@ const gain = (name: string, upper: number, value: number) => ({
 });
 
 const catalogue = {
-  experiments: [{ name: "takeoff", gains: [gain("kp", 4000, 283), gain("ki", 1073, 13), gain("kd", 409, 82)] }],
+  experiments: [
+    {
+      name: "takeoff",
+      title: "Takeoff to 3 m",
+      gains: [gain("kp", 4000, 283), gain("ki", 1073, 13), gain("kd", 409, 82)],
+      options: [],
+    },
+    {
+      name: "pitch-tracking",
+      title: "Pitch tracking",
+      gains: [gain("theta_3", 0, -15)],
+      options: [{ name: "perturbation", title: "Model off by", default: 0.45, choices: [] }],
+    },
+  ],
   strategies: [
-    { name: "gradient", options: [{ name: "scaled", title: "Scaled", default: true, choices: [true, false] }] },
+    { name: "calibrated", options: [], experiments: ["takeoff"] },
+    {
+      name: "gradient",
+      options: [{ name: "scaled", title: "Scaled", default: true, choices: [true, false] }],
+      experiments: [],
+    },
+    { name: "identified", options: [], experiments: ["pitch-tracking"] },
   ],
   vehicle_kinds: [
-    { name: "import", can_fly: false, options: [] },
-    { name: "twin", can_fly: true, options: [] },
-    { name: "jsbsim", can_fly: true, options: [{ name: "mass_kg" }] },
+    { name: "import", can_fly: false, options: [], experiments: ["takeoff"] },
+    { name: "lti", can_fly: true, options: [], experiments: ["pitch-tracking"] },
+    { name: "twin", can_fly: true, options: [], experiments: ["takeoff"] },
+    { name: "jsbsim", can_fly: true, options: [{ name: "mass_kg" }], experiments: ["takeoff"] },
   ],
   presets: [
     { name: "twin", title: "Twin takeoff", campaign: { vehicle: { kind: "twin" } } },
@@ -29,20 +58,22 @@ const catalogue = {
   ],
 } as unknown as Catalogue;
 
-test("the form as it comes creates the paper's campaign on the simulation", () => {
+test("the form as it comes creates the recommended campaign on the simulation", () => {
   const form = startingForm(catalogue);
   expect(requestFrom(form, catalogue)).toEqual({
     name: "Simulated takeoff",
     vehicle: { kind: "jsbsim", options: {} },
     definition: {
       experiment: "takeoff",
-      strategy: "gradient",
+      experiment_options: {},
+      strategy: "calibrated",
       options: {},
       start: { kind: "default" },
       bounds: {},
       first_step_fraction: 0.25,
       step_fraction: 1,
-      stop: { kind: "paper", max_flights: 7, improvement: 0.05 },
+      ceiling_m: 4.5,
+      stop: { kind: "paper", max_flights: 7, improvement: 0.05, confidence: 0.9, min_battery_v: null },
       seed: 1,
     },
   });
@@ -62,7 +93,7 @@ test("given start gains leave out what is empty, so that the server names it", (
 
 test("a wrong number is sent as it is, for the server to refuse", () => {
   const form = { ...startingForm(catalogue), maxFlights: -3, improvementPercent: 7.5 };
-  expect(requestFrom(form, catalogue).definition?.stop).toEqual({ kind: "paper", max_flights: -3, improvement: 0.075 });
+  expect(requestFrom(form, catalogue).definition?.stop).toMatchObject({ max_flights: -3, improvement: 0.075 });
 });
 
 test("a name follows the vehicle until somebody has changed it", () => {
@@ -72,13 +103,51 @@ test("a name follows the vehicle until somebody has changed it", () => {
   expect(withVehicle({ ...form, vehicleOptions: { mass_kg: 0.5 } }, catalogue, "twin").vehicleOptions).toEqual({});
 });
 
+test("a warm start names the other campaign, and nothing until one is chosen", () => {
+  const form = { ...startingForm(catalogue), start: "campaign" as const };
+  expect(requestFrom(form, catalogue).definition?.start).toEqual({ kind: "campaign", donor: null });
+  const donor = { id: 12, name: "Yesterday's" } as CampaignSummary;
+  expect(requestFrom({ ...form, donor }, catalogue).definition?.start).toEqual({
+    kind: "campaign",
+    donor: { campaign_id: 12 },
+  });
+});
+
+test("stopping on noise carries its confidence and the battery's limit", () => {
+  const form = { ...startingForm(catalogue), stop: "noise" as const, confidencePercent: 95, minBatteryV: 10.8 };
+  expect(requestFrom(form, catalogue).definition?.stop).toMatchObject({
+    kind: "noise",
+    confidence: 0.95,
+    min_battery_v: 10.8,
+  });
+});
+
 test("the simulation is offered first, flights made elsewhere last", () => {
-  expect(vehicleOrder(catalogue.vehicle_kinds).map(({ name }) => name)).toEqual(["jsbsim", "twin", "import"]);
+  expect(kindsFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["jsbsim", "twin", "import"]);
   expect(firstPreset(catalogue)?.name).toBe("ardrone");
 });
 
+test("an experiment is offered the vehicles and strategies that fit it", () => {
+  expect(kindsFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual(["lti"]);
+  expect(strategiesFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["calibrated", "gradient"]);
+  expect(strategiesFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual(["gradient", "identified"]);
+});
+
+test("another experiment begins with its own gains, vehicle and strategy, and keeps the stop rule", () => {
+  const form = withExperiment({ ...startingForm(catalogue), maxFlights: 25 }, catalogue, "pitch-tracking");
+  expect(form).toMatchObject({
+    experiment: "pitch-tracking",
+    vehicle: "lti",
+    strategy: "gradient",
+    startGains: { theta_3: -15 },
+    maxFlights: 25,
+    name: "Pitch tracking, lti",
+  });
+  expect(requestFrom(form, catalogue).definition?.bounds).toEqual({});
+});
+
 test("every refusable field has its place in the form", () => {
-  const form = startingForm(catalogue);
+  const form = { ...startingForm(catalogue), strategy: "gradient" };
   expect(fieldsOf(form, catalogue).plain).not.toContain("start.gains.kp");
   expect(fieldsOf({ ...form, start: "given" }, catalogue).plain).toContain("start.gains.kp");
   expect(fieldsOf(form, catalogue).advanced).toEqual(

@@ -1,5 +1,15 @@
 import { expect, test } from "vitest";
-import { ApiError, otherProblems, problemFrom, problemOf, reasonsByField, retries } from "./problems";
+import {
+  ApiError,
+  isGateRefusal,
+  offersOf,
+  otherProblems,
+  problemFrom,
+  problemOf,
+  reasonsByField,
+  reasonsByWeight,
+  retries,
+} from "./problems";
 
 const refused = problemFrom(422, {
   title: "These gains cannot be flown.",
@@ -44,4 +54,42 @@ test("a reading is tried again while the server is away, and never after a refus
   expect(retries(0, new ApiError(problemFrom(503, {})))).toBe(true);
   expect(retries(3, new ApiError(problemFrom(503, {})))).toBe(false);
   expect(retries(0, new ApiError(refused))).toBe(false);
+});
+
+test("values that would pass are read from the refusals that have any", () => {
+  const problem = problemFrom(422, {
+    title: "The gate refuses these gains.",
+    problems: [
+      { field: "gains.ki", reason: "can wrap", offer: { ki: 1073 } },
+      { field: "gains", reason: "too far", offer: {} },
+      { field: "gains.kd", reason: "can wrap", offer: { kd: 409, odd: "x" } },
+    ],
+  });
+  expect(offersOf(problem)).toEqual([
+    ["ki", 1073],
+    ["kd", 409],
+  ]);
+  expect(offersOf(null)).toEqual([]);
+});
+
+test("only refused gains can be overruled, no other mistake", () => {
+  const gains = { field: "gains.ki", reason: "can wrap" };
+  expect(isGateRefusal(problemFrom(422, { problems: [gains, { field: "gains", reason: "too far" }] }))).toBe(true);
+  expect(isGateRefusal(problemFrom(422, { problems: [gains, { field: "overrule", reason: "only simulated" }] }))).toBe(
+    false,
+  );
+  expect(isGateRefusal(problemFrom(undefined, null))).toBe(false);
+});
+
+test("the reason that harms in flight comes first, and sentences are joined by a space", () => {
+  const problem = problemFrom(422, {
+    problems: [
+      { field: "gains.ki", reason: "The step is too large." },
+      { field: "gains.ki", reason: "The vehicle can be stuck on the ground." },
+      { field: "gains", reason: "The product can wrap." },
+    ],
+  });
+  expect(reasonsByWeight(problem)[0]).toBe("The vehicle can be stuck on the ground.");
+  expect(reasonsByWeight(problem)).toHaveLength(3);
+  expect(reasonsByField(problem, ["ki"])["ki"]).toBe("The step is too large. The vehicle can be stuck on the ground.");
 });

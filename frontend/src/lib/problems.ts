@@ -3,6 +3,8 @@
 export interface FieldProblem {
   field: string;
   reason: string;
+  /** Values of gains that would pass, where the server knows them. */
+  offer?: Record<string, number>;
 }
 
 export interface Problem {
@@ -39,9 +41,28 @@ function fieldProblems(value: unknown): FieldProblem[] {
   if (!Array.isArray(value)) return [];
   return value.flatMap((entry: unknown) => {
     if (typeof entry !== "object" || entry === null) return [];
-    const { field, reason } = entry as Record<string, unknown>;
-    return typeof field === "string" && typeof reason === "string" ? [{ field, reason }] : [];
+    const { field, reason, offer } = entry as Record<string, unknown>;
+    if (typeof field !== "string" || typeof reason !== "string") return [];
+    const offered = offeredBy(offer);
+    return [{ field, reason, ...(Object.keys(offered).length > 0 ? { offer: offered } : {}) }];
   });
+}
+
+function offeredBy(value: unknown): Record<string, number> {
+  if (typeof value !== "object" || value === null) return {};
+  return Object.fromEntries(Object.entries(value).filter(([, number]) => typeof number === "number"));
+}
+
+/** Whether it was gains that were refused, and not something else about the request. */
+export function isGateRefusal(problem: Problem | null): boolean {
+  const fields = (problem?.problems ?? []).map(({ field }) => field.replace(/^body\./, ""));
+  return fields.length > 0 && fields.every((field) => field === "gains" || field.startsWith("gains."));
+}
+
+/** Every gain's value that would pass, of all refusals together. */
+export function offersOf(problem: Problem | null): [gain: string, value: number][] {
+  const all = Object.assign({}, ...(problem?.problems ?? []).map(({ offer }) => offer ?? {})) as Record<string, number>;
+  return Object.entries(all);
 }
 
 /** Whatever a failed request brought, as a problem that can be shown. */
@@ -70,9 +91,27 @@ export function reasonsByField(problem: Problem | null, fields: readonly string[
     const owner = fields
       .filter((name) => field === name || field.endsWith(`.${name}`) || `.${field}.`.includes(`.${name}.`))
       .sort((one, other) => other.length - one.length)[0];
-    if (owner !== undefined) reasons[owner] = reasons[owner] ? `${reasons[owner]}; ${reason}` : reason;
+    if (owner !== undefined) reasons[owner] = reasons[owner] ? joined(reasons[owner], reason) : reason;
   }
   return reasons;
+}
+
+/** Sentences stand side by side; words that are none are kept apart by a semicolon. */
+function joined(one: string, other: string): string {
+  return /[.!?]$/.test(one) ? `${one} ${other}` : `${one}; ${other}`;
+}
+
+/** What decides first: harm in flight, the worst first, before mere limits. */
+const WEIGHT = [/stuck on the ground/, /wrap/, /ceiling|diverge|rise/];
+
+/** The reason that a person has to read of a refusal of gains, and the other ones. */
+export function reasonsByWeight(problem: Problem | null): string[] {
+  const rank = (reason: string): number => {
+    const found = WEIGHT.findIndex((words) => words.test(reason));
+    return found === -1 ? WEIGHT.length : found;
+  };
+  const reasons = new Set((problem?.problems ?? []).map(({ reason }) => reason));
+  return [...reasons].sort((one, other) => rank(one) - rank(other));
 }
 
 /** The refused fields that none of `fields` shows. */

@@ -44,6 +44,23 @@ test("every setting that a proposal depends on is said in words", () => {
   expect(rows["Stop"]).toBe("Two flights in a row less than 5 % better than the best, or 7 flights");
 });
 
+test("a warm start and a stop on noise are said in words", () => {
+  const definition = {
+    ...campaign.definition,
+    start: {
+      kind: "campaign" as const,
+      gains: { kp: 900, ki: 200, kd: 200 },
+      donor: { campaign_id: 4, trial_number: 2, checksum: "ab" },
+    },
+    stop: { kind: "noise" as const, max_flights: 12, improvement: 0.05, confidence: 0.95, min_battery_v: 10.8 },
+  };
+  expect(Object.fromEntries(settingsOf({ ...campaign, definition }, catalogue))).toMatchObject({
+    Start: "[900 200 200], flight 2 of campaign 4",
+    Stop: "When nothing is left that flights could tell from noise with 95 % confidence, or 12 flights",
+    Battery: "Stops below 10.8 V after a flight",
+  });
+});
+
 test("until the catalogue is there, options stand under their names", () => {
   expect(Object.fromEntries(settingsOf(campaign))).toMatchObject({
     mass_kg: "0.42",

@@ -1,12 +1,13 @@
 /** A campaign's settings as title and value, for people. */
 
-import type { Campaign, Catalogue } from "../api/types";
+import type { Campaign, Catalogue, Definition } from "../api/types";
 import { gainsInBrackets } from "./gains";
 
 const STARTS = {
   default: "The vehicle's default gains",
   simplex: "Simplex on the model",
   given: "Given gains",
+  campaign: "The best of another campaign",
 } as const;
 
 const CLOSE_UNITS = ["°", "×"];
@@ -41,25 +42,41 @@ function named(things: readonly Described[] | undefined, name: string): string {
   return things?.find((thing) => thing.name === name)?.title ?? name;
 }
 
+function stopInWords(stop: Definition["stop"]): string {
+  const most = `${stop?.max_flights} flights`;
+  switch (stop?.kind) {
+    case "budget":
+      return `After ${most}`;
+    case "noise":
+      return `When nothing is left that flights could tell from noise with ${percent(stop.confidence ?? 0)} confidence, or ${most}`;
+    default:
+      return `Two flights in a row less than ${percent(stop?.improvement ?? 0)} better than the best, or ${most}`;
+  }
+}
+
+function startInWords(start: Definition["start"]): string {
+  if (start?.donor && start.gains) {
+    return `${gainsInBrackets(start.gains)}, flight ${start.donor.trial_number} of campaign ${start.donor.campaign_id}`;
+  }
+  return start?.gains ? gainsInBrackets(start.gains) : STARTS[start?.kind ?? "default"];
+}
+
 export function settingsOf({ definition, vehicle, definition_digest }: Campaign, catalogue?: Catalogue): Row[] {
   const { stop, start } = definition;
   const kind = catalogue?.vehicle_kinds.find(({ name }) => name === vehicle.kind);
   const strategy = catalogue?.strategies.find(({ name }) => name === definition.strategy);
-  const gains = catalogue?.experiments.find(({ name }) => name === definition.experiment)?.gains;
-  const unitOf = (name: string): string => gains?.find((gain) => gain.name === name)?.unit ?? "";
+  const experiment = catalogue?.experiments.find(({ name }) => name === definition.experiment);
+  const unitOf = (name: string): string => experiment?.gains?.find((gain) => gain.name === name)?.unit ?? "";
   const rows: Row[] = [
     ["Vehicle", vehicle.title],
     ...optionRows(vehicle.options, kind?.options),
     ["Experiment", named(catalogue?.experiments, definition.experiment)],
     ["Strategy", named(catalogue?.strategies, definition.strategy)],
     ...optionRows(definition.options ?? {}, strategy?.options),
-    ["Start", start?.gains ? gainsInBrackets(start.gains) : STARTS[start?.kind ?? "default"]],
-    [
-      "Stop",
-      stop?.kind === "budget"
-        ? `After ${stop.max_flights} flights`
-        : `Two flights in a row less than ${percent(stop?.improvement ?? 0)} better than the best, or ${stop?.max_flights} flights`,
-    ],
+    ...optionRows(definition.experiment_options ?? {}, experiment?.options),
+    ["Start", startInWords(start)],
+    ["Stop", stopInWords(stop)],
+    ...(stop?.min_battery_v ? ([["Battery", `Stops below ${stop.min_battery_v} V after a flight`]] as Row[]) : []),
     ...Object.entries(definition.bounds ?? {}).map(
       ([name, [low, high]]): Row => [`Bounds of ${name}`, said(`${low} … ${high}`, unitOf(name))],
     ),
@@ -67,6 +84,9 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign,
       "Largest step",
       `${percent(definition.first_step_fraction ?? 0)} of each range until a flight is valid, then ${percent(definition.step_fraction ?? 0)}`,
     ],
+    ...(definition.ceiling_m && experiment?.output_unit === "m"
+      ? ([["Ceiling of the checks", `${definition.ceiling_m} m`]] as Row[])
+      : []),
     ["Seed", String(definition.seed)],
   ];
   if (definition_digest) rows.push(["Frozen as", definition_digest.slice(0, 12)]);

@@ -19,7 +19,7 @@ const traces: Trace[] = [
 ];
 
 test("the live trace takes what has been measured, and only that trace", () => {
-  const flight = { ...begun(1, 5), timeS: [0.1, 0.2], altitudeM: [0, 0.05] };
+  const flight = { ...begun(1, 5), timeS: [0.1, 0.2], measured: [0, 0.05] };
   const drawn = withLive(traces, flight);
   expect(drawn[3]).toMatchObject({ x: [0.1, 0.2], y: [0, 0.05], showlegend: true });
   expect(drawn.slice(0, 3)).toEqual(traces.slice(0, 3));

@@ -31,7 +31,7 @@ export function traceWithRole(traces: readonly Trace[], role: string): number {
 export function withLive(traces: readonly Trace[], flight: LiveFlight | null): Trace[] {
   if (flight === null || flight.timeS.length === 0) return [...traces];
   return traces.map((trace) =>
-    trace.meta?.role === "live" ? { ...trace, x: flight.timeS, y: flight.altitudeM, showlegend: true } : trace,
+    trace.meta?.role === "live" ? { ...trace, x: flight.timeS, y: flight.measured, showlegend: true } : trace,
   );
 }
 

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Trial } from "../api/types";
-import { bestBeforeOf, otherClasses, sentenceOf, shownTrial } from "./verdict";
+import { askedFor, bestBeforeOf, keptPrediction, marksOf, otherClasses, sentenceOf, shownTrial } from "./verdict";
 
 const trial = (number: number, state: Trial["state"], error: number | null, predicted_error: number | null = null) =>
   ({ number, state, error, predicted_error, actions: ["classify"] }) as unknown as Trial;
@@ -39,4 +39,30 @@ test("what a flight may be classed as follows from what it is", () => {
   expect(otherClasses(stopped)).toEqual(["aborted"]);
   expect(otherClasses(trial(6, "captured", 0.2))).toEqual(["valid", "aborted", "invalid"]);
   expect(otherClasses({ ...first, actions: [] })).toEqual([]);
+});
+
+test("an error lies inside of, above or below what was predicted", () => {
+  const expected = { ...third, predicted_interval: { lower: 0.18, upper: 0.22, confidence: 0.9 } };
+  expect(keptPrediction(expected)).toBe("inside");
+  expect(keptPrediction({ ...expected, error: 0.23 })).toBe("above");
+  expect(keptPrediction({ ...expected, error: 0.1 })).toBe("below");
+  expect(keptPrediction({ ...expected, error: null })).toBeNull();
+  expect(keptPrediction(third)).toBeNull();
+});
+
+test("an overruled flight and one with glitches are marked", () => {
+  const gap = { kind: "gap" as const, start_s: 3, end_s: 3.4, sentence: "Nothing was recorded for 0.4 s." };
+  expect(marksOf({ ...third, overrule_reason: "the paper flew it", glitches: [gap, gap] })).toEqual([
+    "Overruled",
+    "2 glitches",
+  ]);
+  expect(marksOf(third)).toEqual([]);
+});
+
+test("a flight that repeats gains on purpose is held against its own prediction", () => {
+  const interval = { lower: 0.3, upper: 0.4, confidence: 0.9 };
+  const again = { ...first, kind: "baseline", predicted_interval: interval } as Trial;
+  expect(askedFor(again)).toMatch(/^Asked for: the first flight's gains .* inside its prediction/);
+  expect(askedFor({ ...again, error: 0.5 })).toContain("above its prediction");
+  expect(askedFor({ ...again, kind: "step" })).toBe("");
 });

@@ -3,6 +3,44 @@
 import type { Trial } from "../api/types";
 import { wasFlown } from "./states";
 
+export const VERDICTS = { better: "Better", worse: "Worse", unresolved: "Unresolved" } as const;
+
+/** Where the error came to lie against what was predicted; null without an interval or an error. */
+export function keptPrediction(trial: Trial): "inside" | "above" | "below" | null {
+  const { predicted_interval: interval, error } = trial;
+  if (!interval || error === null) return null;
+  if (error < interval.lower) return "below";
+  return error > interval.upper ? "above" : "inside";
+}
+
+const ASKED: Partial<Record<Trial["kind"], string>> = {
+  baseline: "Asked for: the first flight's gains once more, to see whether the vehicle has changed.",
+  repeat: "Asked for: gains flown before once more, to see how much flights scatter.",
+};
+
+const KEPT = {
+  inside: "It ended inside its prediction: nothing has changed.",
+  above: "It ended above its prediction: worth a look.",
+  below: "It ended below its prediction: worth a look.",
+} as const;
+
+/** Of a flight that repeats gains on purpose: why, and how it ended against its own prediction; empty for others. */
+export function askedFor(trial: Trial): string {
+  const why = ASKED[trial.kind];
+  if (why === undefined || trial.state !== "valid") return "";
+  const kept = keptPrediction(trial);
+  return kept === null ? why : `${why} ${KEPT[kept]}`;
+}
+
+/** What makes a flight special beside its class, in few words. */
+export function marksOf(trial: Trial): string[] {
+  const glitches = trial.glitches?.length ?? 0;
+  return [
+    trial.overrule_reason ? "Overruled" : "",
+    glitches > 0 ? `${glitches} glitch${glitches === 1 ? "" : "es"}` : "",
+  ].filter((mark) => mark !== "");
+}
+
 /** The valid flight with the lowest error before this one. */
 export function bestBeforeOf(trial: Trial, trials: readonly Trial[]): Trial | null {
   const before = trials.filter((one) => one.state === "valid" && one.number < trial.number && one.error !== null);

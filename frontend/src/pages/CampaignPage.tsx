@@ -8,9 +8,11 @@ import { FigurePanel } from "../components/FigurePanel";
 import { Missing } from "../components/Missing";
 import { NextFlightCard } from "../components/NextFlightCard";
 import { Panel } from "../components/Panel";
+import { StatisticsPanel } from "../components/StatisticsPanel";
 import { TrialsTable } from "../components/TrialsTable";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
+import { useUnits } from "../components/useUnits";
 import { VerdictPanel } from "../components/VerdictPanel";
 import { type PlotlyFigure, withChosen, withTimeRange } from "../lib/traces";
 import { shownTrial } from "../lib/verdict";
@@ -37,6 +39,9 @@ function CampaignById({ campaignId }: { campaignId: number }) {
   );
 }
 
+/** Height of the lower charts: enough for a panel of each gain. */
+const LOWER_PX = 300;
+const PANEL_PX = 84;
 const FIRST_SECONDS = [-0.3, 8] as const;
 
 function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure) => PlotlyFigure {
@@ -57,6 +62,8 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
   const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme);
   const errors = useCampaignFigure(campaign.id, "errors", theme);
   const gains = useCampaignFigure(campaign.id, "gains", theme);
+  const unit = useUnits(campaign.definition.experiment ?? "takeoff").error;
+  const lower = Math.max(LOWER_PX, PANEL_PX * Object.keys(trials[0]?.gains ?? {}).length);
   const shown = shownTrial(trials, chosen);
   const choose = useCallback((number: number) => setChosen((before) => (before === number ? null : number)), []);
   return (
@@ -68,7 +75,7 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
         <div className={classes["flown"]}>
           <FigurePanel
-            title="Takeoff curves"
+            title={takeoffs.data?.title ?? "Curves"}
             card={takeoffs.data}
             error={takeoffs.error}
             height={440}
@@ -89,7 +96,7 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
             }
           />
           {shown !== null && (
-            <VerdictPanel trial={shown} trials={trials} isBest={shown.id === campaign.best?.trial_id} />
+            <VerdictPanel trial={shown} trials={trials} isBest={shown.id === campaign.best?.trial_id} unit={unit} />
           )}
         </div>
         <div className={classes["next"]}>
@@ -101,8 +108,17 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
         </div>
       </div>
       <div className={classes["halves"]}>
-        <FigurePanel title="Error per flight" card={errors.data} error={errors.error} height={300} onChoose={choose} />
-        <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={300} />
+        <FigurePanel
+          title="Error per flight"
+          card={errors.data}
+          error={errors.error}
+          height={lower}
+          onChoose={choose}
+        />
+        <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={lower} />
+      </div>
+      <div className={classes["row"]}>
+        <StatisticsPanel campaignId={campaign.id} />
       </div>
       <Panel title="All flights" className={classes["row"]}>
         {trials.length === 0 ? (
@@ -110,7 +126,13 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
             Nothing has flown yet. The first flight will stand here with its gains and error.
           </p>
         ) : (
-          <TrialsTable campaign={campaign} trials={trials} shown={shown?.number ?? null} onChoose={choose} />
+          <TrialsTable
+            campaign={campaign}
+            trials={trials}
+            shown={shown?.number ?? null}
+            unit={unit}
+            onChoose={choose}
+          />
         )}
       </Panel>
     </>

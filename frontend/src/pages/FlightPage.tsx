@@ -2,10 +2,11 @@ import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
 import { Link, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../api/queries";
 import { FigurePanel } from "../components/FigurePanel";
+import { GateChecks } from "../components/GateChecks";
 import { Missing } from "../components/Missing";
 import { useTitle } from "../components/useTitle";
+import { useUnits } from "../components/useUnits";
 import { VerdictPanel } from "../components/VerdictPanel";
-import { GateChecks } from "../components/Why";
 import classes from "./FlightPage.module.css";
 import { NotFoundPage } from "./NotFoundPage";
 
@@ -23,6 +24,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const trial = useTrial(trialId);
   const trials = useTrials(campaignId).data ?? [];
   const figure = useFlightFigure(trialId, theme);
+  const unit = useUnits(campaign?.definition.experiment ?? "takeoff").error;
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <Missing error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
@@ -35,7 +37,13 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
       <h1 className={classes["name"]}>Flight {number}</h1>
       <FigurePanel title="Record" card={figure.data} error={figure.error} height={480} />
       <div className={classes["row"]}>
-        <VerdictPanel trial={trial.data} trials={trials} isBest={trialId === campaign?.best?.trial_id} own />
+        <VerdictPanel
+          trial={trial.data}
+          trials={trials}
+          isBest={trialId === campaign?.best?.trial_id}
+          unit={unit}
+          own
+        />
       </div>
       <div className={classes["facts"]}>
         {record !== null && (

@@ -6,6 +6,7 @@ import { useCreateCampaign } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import type { Catalogue } from "../api/types";
 import { AdvancedFields } from "../components/AdvancedFields";
+import { DonorPicker } from "../components/DonorPicker";
 import { Entry } from "../components/Entry";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
@@ -14,9 +15,13 @@ import {
   type CampaignForm,
   fieldsOf,
   gainsOf,
+  kindsFor,
   requestFrom,
   type StartKind,
   startingForm,
+  strategiesFor,
+  unreadable,
+  withExperiment,
   withVehicle,
 } from "../lib/newCampaign";
 import { problemOf, reasonsByField } from "../lib/problems";
@@ -38,6 +43,7 @@ export function NewCampaignPage() {
 const STARTS: { value: StartKind; label: string }[] = [
   { value: "default", label: "The vehicle's default gains" },
   { value: "simplex", label: "Best gains on the model (simplex)" },
+  { value: "campaign", label: "Best of another campaign" },
   { value: "given", label: "Gains of my own" },
 ];
 
@@ -50,7 +56,10 @@ function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
   const [opened, setOpened] = useState<string | null>(null);
   const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
   const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
-  const strategy = catalogue.strategies.find(({ name }) => name === form.strategy);
+  const strategies = strategiesFor(catalogue, form.experiment);
+  const strategy = strategies.find(({ name }) => name === form.strategy);
+  const recommended = strategies[0]?.name;
+  const unread = unreadable(form, catalogue);
   return (
     <form
       noValidate
@@ -60,8 +69,18 @@ function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
         create.mutate(requestFrom(form, catalogue), { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
       }}
     >
+      {catalogue.experiments.length > 1 && (
+        <Select
+          label="Experiment"
+          data={catalogue.experiments.map(({ name, title }) => ({ value: name, label: title }))}
+          value={form.experiment}
+          allowDeselect={false}
+          error={reasons["definition.experiment"]}
+          onChange={(value) => setForm(withExperiment(form, catalogue, value ?? form.experiment))}
+        />
+      )}
       <VehiclePicker
-        kinds={catalogue.vehicle_kinds}
+        kinds={kindsFor(catalogue, form.experiment)}
         value={form.vehicle}
         error={reasons["vehicle.kind"]}
         onChange={(vehicle) => setForm(withVehicle(form, catalogue, vehicle))}
@@ -84,21 +103,31 @@ function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
         />
         <Select
           label="Strategy"
-          description={strategy?.line}
+          description={`${form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
           inputWrapperOrder={["label", "input", "description", "error"]}
-          data={catalogue.strategies.map(({ name, title }) => ({ value: name, label: title }))}
+          data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
           value={form.strategy}
           allowDeselect={false}
           error={reasons["strategy"]}
-          onChange={(value) => set({ strategy: value ?? "gradient", strategyOptions: {} })}
+          onChange={(value) => set({ strategy: value ?? form.strategy, strategyOptions: {} })}
         />
       </div>
+      {form.start === "campaign" && (
+        <DonorPicker
+          experiment={form.experiment}
+          donor={form.donor}
+          error={reasons["start.donor"]}
+          onChange={(donor) => set({ donor })}
+        />
+      )}
       {form.start === "given" && (
         <fieldset className={classes["gains"]}>
           <legend>Start gains</legend>
-          {gainsOf(catalogue).map((gain) => (
+          {gainsOf(catalogue, form.experiment).map((gain) => (
             <Entry
               key={gain.name}
+              required
+              withAsterisk={false}
               label={gain.name}
               description={`${gain.lower} … ${gain.upper} ${gain.unit}`}
               value={form.startGains[gain.name] ?? ""}
@@ -122,9 +151,11 @@ function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
         </Accordion.Item>
       </Accordion>
       <Trouble error={create.error} shown={[...plain, ...advanced]} />
+      {unread.length > 0 && <p role="status">Not a number yet: {unread.join(", ")}.</p>}
       <Button
         type="submit"
         size="lg"
+        disabled={unread.length > 0}
         loading={create.isPending}
         leftSection={<IconPlus size={22} aria-hidden />}
         className={classes["create"]}

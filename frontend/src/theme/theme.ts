@@ -60,7 +60,6 @@ export const theme = createTheme({
     Button: { defaultProps: { size: "md" }, styles: { root: { minHeight: TOUCH_TARGET_PX } } },
     ActionIcon: { defaultProps: { size: TOUCH_TARGET_PX, variant: "subtle" } },
     TextInput: tall,
-    NumberInput: tall,
     Select: tall,
     Textarea: { defaultProps: { size: "md" } },
     FileInput: tall,

@@ -2,7 +2,7 @@
 
 import type { Client, ClientMeta, Options as Options2, RequestResult, ServerSentEventsResult, TDataShape } from './client';
 import { client } from './client.gen';
-import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RetryJobData, RetryJobErrors, RetryJobResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
+import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
 
 export type Options<TData extends TDataShape = TDataShape, ThrowOnError extends boolean = boolean, TResponse = unknown> = Options2<TData, ThrowOnError, TResponse> & {
     /**
@@ -113,6 +113,13 @@ export const cloneCampaign = <ThrowOnError extends boolean = false>(options: Opt
         ...options.headers
     }
 });
+
+/**
+ * Get Statistics
+ *
+ * What the flights say about the gains: repeats, scatter, better or worse, drift, and how well predictions held.
+ */
+export const getStatistics = <ThrowOnError extends boolean = false>(options: Options<GetStatisticsData, ThrowOnError>): RequestResult<GetStatisticsResponses, GetStatisticsErrors, ThrowOnError> => (options.client ?? client).get<GetStatisticsResponses, GetStatisticsErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/statistics', ...options });
 
 /**
  * Get Proposal
@@ -307,6 +314,41 @@ export const cancelJob = <ThrowOnError extends boolean = false>(options: Options
  * Let a failed or cancelled job run again.
  */
 export const retryJob = <ThrowOnError extends boolean = false>(options: Options<RetryJobData, ThrowOnError>): RequestResult<RetryJobResponses, RetryJobErrors, ThrowOnError> => (options.client ?? client).post<RetryJobResponses, RetryJobErrors, ThrowOnError>({ url: '/api/jobs/{job_id}/retry', ...options });
+
+/**
+ * List Reproductions
+ *
+ * The experiments, tables and figures of the paper that can be run here.
+ */
+export const listReproductions = <ThrowOnError extends boolean = false>(options?: Options<ListReproductionsData, ThrowOnError>): RequestResult<ListReproductionsResponses, ListReproductionsErrors, ThrowOnError> => (options?.client ?? client).get<ListReproductionsResponses, ListReproductionsErrors, ThrowOnError>({ url: '/api/reproductions', ...options });
+
+/**
+ * Get Reproduction
+ *
+ * One of them with the rows of its newest result: measured, published, and their ratio.
+ */
+export const getReproduction = <ThrowOnError extends boolean = false>(options: Options<GetReproductionData, ThrowOnError>): RequestResult<GetReproductionResponses, GetReproductionErrors, ThrowOnError> => (options.client ?? client).get<GetReproductionResponses, GetReproductionErrors, ThrowOnError>({ url: '/api/reproductions/{name}', ...options });
+
+/**
+ * Run Reproduction
+ *
+ * Have it run. While it waits or runs already, the answer is that job.
+ */
+export const runReproduction = <ThrowOnError extends boolean = false>(options: Options<RunReproductionData, ThrowOnError>): RequestResult<RunReproductionResponses, RunReproductionErrors, ThrowOnError> => (options.client ?? client).post<RunReproductionResponses, RunReproductionErrors, ThrowOnError>({
+    url: '/api/reproductions/{name}/run',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Get Reproduction Figure
+ *
+ * A figure of the newest result.
+ */
+export const getReproductionFigure = <ThrowOnError extends boolean = false>(options: Options<GetReproductionFigureData, ThrowOnError>): RequestResult<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError> => (options.client ?? client).get<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError>({ url: '/api/reproductions/{name}/figures/{figure}', ...options });
 
 /**
  * Get Campaign Figure

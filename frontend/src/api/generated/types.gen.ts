@@ -38,9 +38,33 @@ export type AbortAnswer = {
 };
 
 /**
+ * Advice
+ *
+ * The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
+ * first flight, or its gains once more.
+ */
+export type Advice = {
+    /**
+     * Kind
+     */
+    kind: 'step' | 'repeat' | 'baseline' | 'stop';
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Why
+     */
+    why: string;
+};
+
+/**
  * BestTrial
  *
- * The valid trial with the lowest error.
+ * The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
+ * from the scatter pooled over the campaign.
  */
 export type BestTrial = {
     /**
@@ -61,6 +85,18 @@ export type BestTrial = {
     gains: {
         [key: string]: number | number;
     };
+    /**
+     * Mean
+     */
+    mean: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
+    /**
+     * Flights
+     */
+    flights: number;
 };
 
 /**
@@ -100,6 +136,12 @@ export type Campaign = {
      */
     parent_id: number | null;
     best: BestTrial | null;
+    /**
+     * Verdict
+     *
+     * the best gains against the first flight's; null while they are the same, or nothing has flown
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | null;
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
@@ -156,6 +198,55 @@ export type CampaignEdit = {
 export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finished' | 'archived';
 
 /**
+ * CampaignStatistics
+ *
+ * What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
+ * repeats and the experiment's prior; `optimism` by how much the best is expected to look better than it is, for
+ * having been chosen, and `shrunk_error` its error without that.
+ */
+export type CampaignStatistics = {
+    /**
+     * Error Unit
+     */
+    error_unit: string;
+    /**
+     * Confidence
+     */
+    confidence: number;
+    /**
+     * Sigma
+     */
+    sigma: number;
+    /**
+     * Degrees Of Freedom
+     */
+    degrees_of_freedom: number;
+    /**
+     * Groups
+     */
+    groups: Array<RepeatGroup>;
+    comparison: Comparison | null;
+    drift: Drift | null;
+    /**
+     * Trends
+     */
+    trends: Array<Trend>;
+    /**
+     * Optimism
+     */
+    optimism: number;
+    /**
+     * Shrunk Error
+     */
+    shrunk_error: number | null;
+    track_record: TrackRecord;
+    /**
+     * Notes
+     */
+    notes: Array<string>;
+};
+
+/**
  * CampaignSummary
  *
  * A campaign as one card of the list. `spark` holds the first flight, the best and the latest, at most 7.
@@ -189,6 +280,12 @@ export type CampaignSummary = {
      * First Error
      */
     first_error: number | null;
+    /**
+     * Verdict
+     *
+     * the best gains against the first flight's; null while they are the same, or nothing has flown
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | null;
     /**
      * Next Action
      */
@@ -265,7 +362,8 @@ export type Catalogue = {
 /**
  * Check
  *
- * One check of the gate: its worst number and the limit, where it has them.
+ * One check of the gate: its worst number and the limit, where it has them, and the gain and the case that gave it.
+ * `offer` holds the nearest values of refused gains that would pass.
  */
 export type Check = {
     /**
@@ -288,6 +386,20 @@ export type Check = {
      * Limit
      */
     limit: number | null;
+    /**
+     * Gain
+     */
+    gain?: string;
+    /**
+     * Case
+     */
+    case?: string;
+    /**
+     * Offer
+     */
+    offer?: {
+        [key: string]: number | number;
+    };
 };
 
 /**
@@ -315,7 +427,8 @@ export type Classification = {
 /**
  * Clone
  *
- * A new campaign with the same definition, perhaps on another vehicle, linked to this one.
+ * A new campaign with the same definition, perhaps on another vehicle, linked to this one. With `warm_start` it
+ * starts from this one's best flight.
  */
 export type Clone = {
     /**
@@ -323,6 +436,40 @@ export type Clone = {
      */
     name?: string | null;
     vehicle?: VehicleChoiceInput | null;
+    /**
+     * Warm Start
+     */
+    warm_start?: boolean;
+};
+
+/**
+ * Comparison
+ *
+ * The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
+ * direction, with the allowance for having chosen the best among several.
+ */
+export type Comparison = {
+    /**
+     * Verdict
+     */
+    verdict: 'better' | 'worse' | 'unresolved';
+    /**
+     * Confidence
+     */
+    confidence: number;
+    /**
+     * Difference
+     */
+    difference: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
+    further: FlightsToDecide | null;
+    /**
+     * Sentence
+     */
+    sentence: string;
 };
 
 /**
@@ -331,13 +478,20 @@ export type Clone = {
  * Everything that a proposal depends on, beside the flights. Frozen at the first flight.
  *
  * `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change as shares of
- * its range, before and after the first valid flight.
+ * its range, before and after the first valid flight; `ceiling_m` is the highest altitude that the gate lets a model
+ * run reach.
  */
 export type DefinitionInput = {
     /**
      * Experiment
      */
     experiment?: string;
+    /**
+     * Experiment Options
+     */
+    experiment_options?: {
+        [key: string]: boolean | number | number | string;
+    };
     /**
      * Strategy
      */
@@ -366,6 +520,10 @@ export type DefinitionInput = {
      * Step Fraction
      */
     step_fraction?: number;
+    /**
+     * Ceiling M
+     */
+    ceiling_m?: number;
     stop?: StopRuleInput;
     /**
      * Seed
@@ -379,13 +537,20 @@ export type DefinitionInput = {
  * Everything that a proposal depends on, beside the flights. Frozen at the first flight.
  *
  * `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change as shares of
- * its range, before and after the first valid flight.
+ * its range, before and after the first valid flight; `ceiling_m` is the highest altitude that the gate lets a model
+ * run reach.
  */
 export type DefinitionOutput = {
     /**
      * Experiment
      */
     experiment: string;
+    /**
+     * Experiment Options
+     */
+    experiment_options: {
+        [key: string]: boolean | number | number | string;
+    };
     /**
      * Strategy
      */
@@ -414,11 +579,89 @@ export type DefinitionOutput = {
      * Step Fraction
      */
     step_fraction: number;
+    /**
+     * Ceiling M
+     */
+    ceiling_m: number;
     stop: StopRuleOutput;
     /**
      * Seed
      */
     seed: number;
+};
+
+/**
+ * Donor
+ *
+ * The flight of another campaign that a warm start comes from, with the checksum of its record. Without a trial
+ * number it is the best valid one; the checksum is filled in.
+ */
+export type DonorInput = {
+    /**
+     * Campaign Id
+     */
+    campaign_id: number;
+    /**
+     * Trial Number
+     */
+    trial_number?: number | null;
+    /**
+     * Checksum
+     */
+    checksum?: string;
+};
+
+/**
+ * Donor
+ *
+ * The flight of another campaign that a warm start comes from, with the checksum of its record. Without a trial
+ * number it is the best valid one; the checksum is filled in.
+ */
+export type DonorOutput = {
+    /**
+     * Campaign Id
+     */
+    campaign_id: number;
+    /**
+     * Trial Number
+     */
+    trial_number: number | null;
+    /**
+     * Checksum
+     */
+    checksum: string;
+};
+
+/**
+ * Drift
+ *
+ * The first gains' last flight against their first: `confidence` that anything has changed.
+ */
+export type Drift = {
+    /**
+     * First Trial
+     */
+    first_trial: number;
+    /**
+     * Last Trial
+     */
+    last_trial: number;
+    /**
+     * Difference
+     */
+    difference: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
+    /**
+     * Confidence
+     */
+    confidence: number;
+    /**
+     * Sentence
+     */
+    sentence: string;
 };
 
 /**
@@ -440,6 +683,10 @@ export type ExperimentInfo = {
      */
     output: string;
     /**
+     * Output Unit
+     */
+    output_unit: string;
+    /**
      * Error Unit
      */
     error_unit: string;
@@ -447,12 +694,19 @@ export type ExperimentInfo = {
      * Gains
      */
     gains: Array<GainInfo>;
+    /**
+     * Options
+     */
+    options: Array<OptionInfo>;
 };
 
 /**
  * Explanation
  *
  * Why these gains: sentences for a person, and the numbers behind them.
+ *
+ * `lesson` says what the flight is expected to teach; `fitted` is empty for strategies that fit nothing;
+ * `trust_fraction` is the share of each gain's range that the step was allowed, None without a trust region.
  */
 export type Explanation = {
     /**
@@ -491,6 +745,18 @@ export type Explanation = {
      * Notes
      */
     notes?: Array<string>;
+    /**
+     * Lesson
+     */
+    lesson?: string;
+    /**
+     * Fitted
+     */
+    fitted?: Array<FittedParameter>;
+    /**
+     * Trust Fraction
+     */
+    trust_fraction?: number | null;
 };
 
 /**
@@ -583,6 +849,43 @@ export type Finish = {
 };
 
 /**
+ * FittedParameter
+ *
+ * A number of the model as the flights have it, with its standard error; `nominal` and `prior_sd` are what was
+ * known before them.
+ */
+export type FittedParameter = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Value
+     */
+    value: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
+    /**
+     * Nominal
+     */
+    nominal: number;
+    /**
+     * Prior Sd
+     */
+    prior_sd: number;
+};
+
+/**
  * FlightBrief
  *
  * The last order to the vehicle for this trial. `problem` says why it failed.
@@ -620,6 +923,22 @@ export type FlightOrder = {
  * └──→ cancelled
  */
 export type FlightState = 'requested' | 'running' | 'landed' | 'aborted' | 'failed' | 'lost' | 'cancelled';
+
+/**
+ * FlightsToDecide
+ *
+ * Further flights after which a difference that stays as it is would be decided.
+ */
+export type FlightsToDecide = {
+    /**
+     * Best
+     */
+    best: number;
+    /**
+     * Baseline
+     */
+    baseline: number;
+};
 
 /**
  * FlyingTrial
@@ -752,6 +1071,51 @@ export type GivenGains = {
 };
 
 /**
+ * Glitch
+ *
+ * What the record cannot have seen: between the last good sample before it and the first good one after.
+ */
+export type Glitch = {
+    /**
+     * Kind
+     */
+    kind: 'acceleration' | 'frozen' | 'gap' | 'disagreement';
+    /**
+     * Start S
+     */
+    start_s: number;
+    /**
+     * End S
+     */
+    end_s: number;
+    /**
+     * Sentence
+     */
+    sentence: string;
+};
+
+/**
+ * GroupBrief
+ *
+ * The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
+ * campaign.
+ */
+export type GroupBrief = {
+    /**
+     * Mean
+     */
+    mean: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
+    /**
+     * N
+     */
+    n: number;
+};
+
+/**
  * Health
  */
 export type Health = {
@@ -770,9 +1134,29 @@ export type Health = {
 };
 
 /**
+ * Interval
+ *
+ * Where an error is expected, with probability `confidence`.
+ */
+export type Interval = {
+    /**
+     * Lower
+     */
+    lower: number;
+    /**
+     * Upper
+     */
+    upper: number;
+    /**
+     * Confidence
+     */
+    confidence: number;
+};
+
+/**
  * Job
  *
- * Numeric work: a proposal, a study, a report.
+ * Numeric work: a proposal, a reproduction.
  */
 export type Job = {
     /**
@@ -783,12 +1167,36 @@ export type Job = {
      * Kind
      */
     kind: string;
+    /**
+     * Name
+     *
+     * what exactly, for the kinds that have a choice; empty otherwise
+     */
+    name: string;
     state: JobState;
     /**
      * Campaign Id
      */
     campaign_id: number | null;
     problem: Trouble | null;
+    /**
+     * Done Share
+     *
+     * 0 … 1 while it runs, where the kind can tell
+     */
+    done_share: number | null;
+    /**
+     * Doing
+     *
+     * what it is at
+     */
+    doing: string;
+    /**
+     * Remaining S
+     *
+     * seconds that it will still take, at the pace so far
+     */
+    remaining_s: number | null;
     /**
      * Attempts
      */
@@ -854,6 +1262,30 @@ export type LadderStep = {
 };
 
 /**
+ * LatestRun
+ *
+ * The newest finished run; its job says when it was started.
+ */
+export type LatestRun = {
+    /**
+     * Job Id
+     */
+    job_id: number;
+    /**
+     * Full
+     */
+    full: boolean;
+    /**
+     * Finished At
+     */
+    finished_at: string;
+    /**
+     * Seconds
+     */
+    seconds: number;
+};
+
+/**
  * NewCampaign
  *
  * A campaign to be created; what is left out has a working default.
@@ -884,7 +1316,9 @@ export type NewCampaignOutput = {
 /**
  * NewTrial
  *
- * A trial of a proposal, or of gains of one's own: exactly one of the two. With `fly` it is flown at once.
+ * A trial of a proposal, of gains of one's own, or of a variant: exactly one of the three. With `fly` it is flown
+ * at once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
+ * `baseline`, the first flight's gains again.
  */
 export type NewTrial = {
     /**
@@ -897,6 +1331,16 @@ export type NewTrial = {
     gains?: {
         [key: string]: number;
     } | null;
+    /**
+     * Variant
+     */
+    variant?: 'smaller step' | 'repeat' | 'baseline' | null;
+    /**
+     * Overrule
+     *
+     * why gains that the gate refuses shall fly all the same; simulated vehicles only
+     */
+    overrule?: string | null;
     /**
      * Note
      */
@@ -916,6 +1360,43 @@ export type NextFlight = {
     state: 'computing' | 'ready' | 'failed' | 'none';
     proposal: Proposal | null;
     problem: Trouble | null;
+};
+
+/**
+ * OptionInfo
+ *
+ * A setting of an experiment, a strategy or a vehicle: one of `choices`, or any value of the default's type within
+ * `lower` … `upper` where `choices` is empty.
+ */
+export type OptionInfo = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit?: string;
+    /**
+     * Default
+     */
+    default: boolean | number | number | string;
+    /**
+     * Choices
+     */
+    choices?: Array<boolean | number | number | string>;
+    /**
+     * Lower
+     */
+    lower?: number | null;
+    /**
+     * Upper
+     */
+    upper?: number | null;
 };
 
 /**
@@ -969,6 +1450,24 @@ export type PageJob = {
      * Items
      */
     items: Array<Job>;
+    /**
+     * Total
+     */
+    total: number;
+    /**
+     * Next Cursor
+     */
+    next_cursor: string | null;
+};
+
+/**
+ * Page[ReproductionSummary]
+ */
+export type PageReproductionSummary = {
+    /**
+     * Items
+     */
+    items: Array<ReproductionSummary>;
     /**
      * Total
      */
@@ -1039,7 +1538,8 @@ export type PresetInfo = {
 /**
  * Proposal
  *
- * The next gain set, from one history. Stale as soon as that history has changed.
+ * The next gain set, from one history. Stale as soon as that history has changed. `recommended` is the advice's
+ * kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so.
  */
 export type Proposal = {
     /**
@@ -1053,11 +1553,12 @@ export type Proposal = {
     /**
      * Kind
      */
-    kind: 'start' | 'step' | 'shorter step' | 'manual' | 'none';
+    kind: 'start' | 'step' | 'shorter step' | 'repeat' | 'baseline' | 'manual' | 'none';
     /**
      * Recommended
      */
     recommended: 'step' | 'repeat' | 'baseline' | 'stop';
+    advice: Advice;
     /**
      * Gains
      */
@@ -1074,6 +1575,7 @@ export type Proposal = {
      * Predicted Error
      */
     predicted_error: number | null;
+    interval: Interval | null;
     explanation: Explanation;
     gate: Gate;
     stop_verdict: StopVerdict;
@@ -1148,6 +1650,221 @@ export type Release = {
 };
 
 /**
+ * RepeatGroup
+ *
+ * The valid flights of one gain set.
+ */
+export type RepeatGroup = {
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Trial Numbers
+     */
+    trial_numbers: Array<number>;
+    /**
+     * Errors
+     */
+    errors: Array<number>;
+    /**
+     * Mean
+     */
+    mean: number;
+    /**
+     * Standard Error
+     *
+     * from the pooled scatter
+     */
+    standard_error: number;
+    /**
+     * Is Baseline
+     */
+    is_baseline: boolean;
+    /**
+     * Is Best
+     */
+    is_best: boolean;
+};
+
+/**
+ * Reproduction
+ *
+ * A reproduction with the rows of its newest result, empty before the first.
+ */
+export type Reproduction = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Line
+     */
+    line: string;
+    /**
+     * Paper
+     */
+    paper: string;
+    /**
+     * Long Form
+     *
+     * what the long form does; empty where there is none
+     */
+    long_form: string;
+    /**
+     * Figures
+     */
+    figures: Array<ReproductionFigure>;
+    job: Job | null;
+    latest: LatestRun | null;
+    /**
+     * Rows
+     */
+    rows: Array<ReproductionRow>;
+    /**
+     * Notes
+     */
+    notes: Array<string>;
+};
+
+/**
+ * ReproductionFigure
+ *
+ * A drawing of a reproduction, and what the paper calls it.
+ */
+export type ReproductionFigure = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+};
+
+/**
+ * ReproductionRow
+ *
+ * One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is what this program is held
+ * to. `overruled` says why gains were flown that the gate refuses.
+ */
+export type ReproductionRow = {
+    /**
+     * Group
+     */
+    group: string;
+    /**
+     * Label
+     */
+    label: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Digits
+     */
+    digits: number;
+    /**
+     * Measured
+     */
+    measured: number;
+    /**
+     * Paper
+     */
+    paper: number | null;
+    /**
+     * Reference
+     */
+    reference: number | null;
+    /**
+     * Ratio
+     */
+    ratio: number | null;
+    /**
+     * Note
+     */
+    note: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Numbers
+     *
+     * further figures of the row, units in their names
+     */
+    numbers: {
+        [key: string]: number;
+    };
+    /**
+     * Overruled
+     */
+    overruled: string;
+};
+
+/**
+ * ReproductionSummary
+ *
+ * One experiment, table or figure of the paper. `line` says what is done here, `paper` what the paper shows.
+ *
+ * `job` is the newest run that waits, runs, or failed after the `latest` one.
+ */
+export type ReproductionSummary = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Line
+     */
+    line: string;
+    /**
+     * Paper
+     */
+    paper: string;
+    /**
+     * Long Form
+     *
+     * what the long form does; empty where there is none
+     */
+    long_form: string;
+    /**
+     * Figures
+     */
+    figures: Array<ReproductionFigure>;
+    job: Job | null;
+    latest: LatestRun | null;
+};
+
+/**
+ * Run
+ *
+ * How to run a reproduction.
+ */
+export type Run = {
+    /**
+     * Full
+     *
+     * the long form, where there is one
+     */
+    full?: boolean;
+};
+
+/**
  * Sort
  *
  * Orders of the list of campaigns; `error` begins with the lowest best error.
@@ -1181,50 +1898,56 @@ export type SparkCurve = {
 /**
  * Start
  *
- * Where the first flight's gains come from; `gains` only with kind `given`.
+ * Where the first flight's gains come from; `gains` with kind `given`, `donor` with `campaign`, whose gains are
+ * filled in.
  */
 export type StartInput = {
     /**
      * Kind
      */
-    kind?: 'default' | 'simplex' | 'given';
+    kind?: 'default' | 'simplex' | 'given' | 'campaign';
     /**
      * Gains
      */
     gains?: {
         [key: string]: number;
     } | null;
+    donor?: DonorInput | null;
 };
 
 /**
  * Start
  *
- * Where the first flight's gains come from; `gains` only with kind `given`.
+ * Where the first flight's gains come from; `gains` with kind `given`, `donor` with `campaign`, whose gains are
+ * filled in.
  */
 export type StartOutput = {
     /**
      * Kind
      */
-    kind: 'default' | 'simplex' | 'given';
+    kind: 'default' | 'simplex' | 'given' | 'campaign';
     /**
      * Gains
      */
     gains: {
         [key: string]: number;
     } | null;
+    donor: DonorOutput | null;
 };
 
 /**
  * StopRule
  *
  * `paper`: two flights in a row without `improvement` (a share of the best) on the best so far, or the budget;
- * `budget`: only the number of flights ends the campaign.
+ * `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
+ * the baseline; `budget`: only the number of flights ends the campaign. With every kind a flight that ends below
+ * `min_battery_v` ends it.
  */
 export type StopRuleInput = {
     /**
      * Kind
      */
-    kind?: 'paper' | 'budget';
+    kind?: 'paper' | 'noise' | 'budget';
     /**
      * Max Flights
      */
@@ -1233,19 +1956,29 @@ export type StopRuleInput = {
      * Improvement
      */
     improvement?: number;
+    /**
+     * Confidence
+     */
+    confidence?: number;
+    /**
+     * Min Battery V
+     */
+    min_battery_v?: number | null;
 };
 
 /**
  * StopRule
  *
  * `paper`: two flights in a row without `improvement` (a share of the best) on the best so far, or the budget;
- * `budget`: only the number of flights ends the campaign.
+ * `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
+ * the baseline; `budget`: only the number of flights ends the campaign. With every kind a flight that ends below
+ * `min_battery_v` ends it.
  */
 export type StopRuleOutput = {
     /**
      * Kind
      */
-    kind: 'paper' | 'budget';
+    kind: 'paper' | 'noise' | 'budget';
     /**
      * Max Flights
      */
@@ -1254,6 +1987,14 @@ export type StopRuleOutput = {
      * Improvement
      */
     improvement: number;
+    /**
+     * Confidence
+     */
+    confidence: number;
+    /**
+     * Min Battery V
+     */
+    min_battery_v: number | null;
 };
 
 /**
@@ -1284,6 +2025,8 @@ export type StopVerdict = {
 
 /**
  * StrategyInfo
+ *
+ * `experiments` names those that it works with; empty: with all.
  */
 export type StrategyInfo = {
     /**
@@ -1301,31 +2044,47 @@ export type StrategyInfo = {
     /**
      * Options
      */
-    options: Array<StrategyOption>;
+    options: Array<OptionInfo>;
+    /**
+     * Experiments
+     */
+    experiments: Array<string>;
 };
 
 /**
- * StrategyOption
+ * TrackRecord
  *
- * `choices` is empty when any value of the default's type may be set.
+ * How well the predictions held.
  */
-export type StrategyOption = {
+export type TrackRecord = {
     /**
-     * Name
+     * Inside
      */
-    name: string;
+    inside: number;
     /**
-     * Title
+     * Of
      */
-    title: string;
+    of: number;
     /**
-     * Default
+     * Share
      */
-    default: boolean | number | number | string;
+    share: number | null;
     /**
-     * Choices
+     * Agreeing
      */
-    choices: Array<boolean | number | number | string>;
+    agreeing: number;
+    /**
+     * Disagreeing
+     */
+    disagreeing: number;
+    /**
+     * Trustworthy
+     */
+    trustworthy: boolean;
+    /**
+     * Sentence
+     */
+    sentence: string;
 };
 
 /**
@@ -1375,6 +2134,38 @@ export type Trajectory = {
 };
 
 /**
+ * Trend
+ *
+ * Slope of the error of the gains flown most, with its interval, 90 %.
+ */
+export type Trend = {
+    /**
+     * Against
+     */
+    against: 'flight number' | 'battery voltage';
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Slope
+     */
+    slope: number;
+    /**
+     * Lower
+     */
+    lower: number;
+    /**
+     * Upper
+     */
+    upper: number;
+    /**
+     * Sentence
+     */
+    sentence: string;
+};
+
+/**
  * Trial
  *
  * One flight of one policy. `error` is the performance measure, lower is better.
@@ -1400,7 +2191,7 @@ export type Trial = {
     /**
      * Kind
      */
-    kind: 'start' | 'step' | 'shorter step' | 'repeat' | 'manual';
+    kind: 'start' | 'step' | 'shorter step' | 'repeat' | 'baseline' | 'manual';
     /**
      * Gains
      */
@@ -1425,6 +2216,21 @@ export type Trial = {
      * Predicted Error
      */
     predicted_error: number | null;
+    predicted_interval: Interval | null;
+    /**
+     * Inside Interval
+     *
+     * whether a valid flight's error lay where it was expected
+     */
+    inside_interval: boolean | null;
+    /**
+     * all valid flights of the same gains; null before the first
+     */
+    group: GroupBrief | null;
+    /**
+     * Comparisons
+     */
+    comparisons: Array<TrialComparison>;
     /**
      * Overshoot M
      */
@@ -1446,6 +2252,24 @@ export type Trial = {
      */
     note: string;
     gate: Gate;
+    /**
+     * Overrule Reason
+     *
+     * why the gate's refusal was overruled; empty when it was not
+     */
+    overrule_reason: string;
+    /**
+     * Glitches
+     *
+     * what the record cannot have seen; the record itself stays
+     */
+    glitches: Array<Glitch>;
+    /**
+     * Repaired Error
+     *
+     * the error with straight lines over the glitches; null without any
+     */
+    repaired_error: number | null;
     record: RecordBrief | null;
     flight: FlightBrief | null;
     /**
@@ -1478,6 +2302,39 @@ export type Trial = {
      * what may be done with it now: fly, cancel, abort, upload, …
      */
     actions: Array<string>;
+};
+
+/**
+ * TrialComparison
+ *
+ * The flight's gains against those of another one, each with all their flights. `difference` is this − other;
+ * `confidence` is that of the likelier direction, and decides from 90 % on.
+ */
+export type TrialComparison = {
+    /**
+     * Against
+     */
+    against: 'best before' | 'first';
+    /**
+     * Trial Number
+     */
+    trial_number: number;
+    /**
+     * Verdict
+     */
+    verdict: 'better' | 'worse' | 'unresolved';
+    /**
+     * Confidence
+     */
+    confidence: number;
+    /**
+     * Difference
+     */
+    difference: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
 };
 
 /**
@@ -1651,7 +2508,7 @@ export type VehicleChoiceOutput = {
 /**
  * VehicleKindInfo
  *
- * `can_fly` is false when flights are made elsewhere and uploaded.
+ * `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly.
  */
 export type VehicleKindInfo = {
     /**
@@ -1675,39 +2532,13 @@ export type VehicleKindInfo = {
      */
     can_fly: boolean;
     /**
+     * Experiments
+     */
+    experiments: Array<string>;
+    /**
      * Options
      */
-    options: Array<VehicleOptionInfo>;
-};
-
-/**
- * VehicleOptionInfo
- */
-export type VehicleOptionInfo = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Title
-     */
-    title: string;
-    /**
-     * Unit
-     */
-    unit: string;
-    /**
-     * Default
-     */
-    default: boolean | number | number | string;
-    /**
-     * Lower
-     */
-    lower: number | null;
-    /**
-     * Upper
-     */
-    upper: number | null;
+    options: Array<OptionInfo>;
 };
 
 /**
@@ -1727,7 +2558,8 @@ export type VehicleState = 'disconnected' | 'ready' | 'staged' | 'flying' | 'qua
 /**
  * ProblemField
  *
- * One refused field, dotted as the caller wrote it, and why it was refused.
+ * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds values of gains that
+ * would pass, by name, where any are known.
  */
 export type ProblemField = {
     /**
@@ -1738,6 +2570,12 @@ export type ProblemField = {
      * Reason
      */
     reason: string;
+    /**
+     * Offer
+     */
+    offer?: {
+        [key: string]: number | number;
+    };
 };
 
 /**
@@ -2126,6 +2964,36 @@ export type CloneCampaignResponses = {
 };
 
 export type CloneCampaignResponse = CloneCampaignResponses[keyof CloneCampaignResponses];
+
+export type GetStatisticsData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/statistics';
+};
+
+export type GetStatisticsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetStatisticsError = GetStatisticsErrors[keyof GetStatisticsErrors];
+
+export type GetStatisticsResponses = {
+    /**
+     * Successful Response
+     */
+    200: CampaignStatistics;
+};
+
+export type GetStatisticsResponse = GetStatisticsResponses[keyof GetStatisticsResponses];
 
 export type GetProposalData = {
     body?: never;
@@ -2889,6 +3757,143 @@ export type RetryJobResponses = {
 };
 
 export type RetryJobResponse = RetryJobResponses[keyof RetryJobResponses];
+
+export type ListReproductionsData = {
+    body?: never;
+    path?: never;
+    query?: never;
+    url: '/api/reproductions';
+};
+
+export type ListReproductionsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type ListReproductionsError = ListReproductionsErrors[keyof ListReproductionsErrors];
+
+export type ListReproductionsResponses = {
+    /**
+     * Successful Response
+     */
+    200: PageReproductionSummary;
+};
+
+export type ListReproductionsResponse = ListReproductionsResponses[keyof ListReproductionsResponses];
+
+export type GetReproductionData = {
+    body?: never;
+    path: {
+        /**
+         * Name
+         */
+        name: string;
+    };
+    query?: never;
+    url: '/api/reproductions/{name}';
+};
+
+export type GetReproductionErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetReproductionError = GetReproductionErrors[keyof GetReproductionErrors];
+
+export type GetReproductionResponses = {
+    /**
+     * Successful Response
+     */
+    200: Reproduction;
+};
+
+export type GetReproductionResponse = GetReproductionResponses[keyof GetReproductionResponses];
+
+export type RunReproductionData = {
+    /**
+     * Body
+     */
+    body?: Run | null;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Name
+         */
+        name: string;
+    };
+    query?: never;
+    url: '/api/reproductions/{name}/run';
+};
+
+export type RunReproductionErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type RunReproductionError = RunReproductionErrors[keyof RunReproductionErrors];
+
+export type RunReproductionResponses = {
+    /**
+     * Successful Response
+     */
+    202: Job;
+};
+
+export type RunReproductionResponse = RunReproductionResponses[keyof RunReproductionResponses];
+
+export type GetReproductionFigureData = {
+    body?: never;
+    path: {
+        /**
+         * Name
+         */
+        name: string;
+        /**
+         * Figure
+         */
+        figure: string;
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+    };
+    url: '/api/reproductions/{name}/figures/{figure}';
+};
+
+export type GetReproductionFigureErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetReproductionFigureError = GetReproductionFigureErrors[keyof GetReproductionFigureErrors];
+
+export type GetReproductionFigureResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetReproductionFigureResponse = GetReproductionFigureResponses[keyof GetReproductionFigureResponses];
 
 export type GetCampaignFigureData = {
     body?: never;

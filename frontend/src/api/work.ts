@@ -1,0 +1,85 @@
+/** Numeric work: the jobs that wait and run, and the reproductions of the paper that are some of them. */
+
+import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { answer } from "./client";
+import {
+  cancelJob,
+  getReproduction,
+  getReproductionFigure,
+  type JobState,
+  listJobs,
+  listReproductions,
+  retryJob,
+  runReproduction,
+} from "./generated";
+import type { Theme } from "./queries";
+
+export type { Job, JobState, ReproductionRow, ReproductionSummary } from "./generated";
+
+const PAGE_SIZE = 20;
+
+export function useJobs(state: JobState[]) {
+  return useInfiniteQuery({
+    queryKey: ["jobs", state],
+    queryFn: ({ pageParam }) =>
+      answer(listJobs({ query: { state, limit: PAGE_SIZE, ...(pageParam ? { cursor: pageParam } : {}) } })),
+    initialPageParam: "",
+    getNextPageParam: (page) => page.next_cursor,
+    placeholderData: keepPreviousData,
+  });
+}
+
+export function useReproductions() {
+  return useQuery({ queryKey: ["reproductions"], queryFn: () => answer(listReproductions()) });
+}
+
+/** A result stays what it is: it is read again only when another run, `jobId`, has brought a newer one. */
+export function useReproductionResult(name: string, jobId: number | null) {
+  return useQuery({
+    queryKey: ["reproduction", name, jobId],
+    queryFn: () => answer(getReproduction({ path: { name } })),
+    enabled: jobId !== null,
+    placeholderData: keepPreviousData,
+    staleTime: Infinity,
+  });
+}
+
+export function useReproductionFigure(name: string, figure: string, theme: Theme, jobId: number) {
+  return useQuery({
+    queryKey: ["reproduction", name, "figure", figure, theme, jobId],
+    queryFn: () => answer(getReproductionFigure({ path: { name, figure }, query: { theme } })),
+    placeholderData: keepPreviousData,
+    staleTime: Infinity,
+  });
+}
+
+function useSettled(): () => Promise<unknown> {
+  const queries = useQueryClient();
+  return () =>
+    Promise.all([
+      queries.invalidateQueries({ queryKey: ["jobs"] }),
+      queries.invalidateQueries({ queryKey: ["reproductions"] }),
+    ]);
+}
+
+export function useRunReproduction() {
+  return useMutation({
+    mutationFn: ({ name, full = false }: { name: string; full?: boolean }) =>
+      answer(runReproduction({ path: { name }, body: { full } })),
+    onSettled: useSettled(),
+  });
+}
+
+export function useCancelJob() {
+  return useMutation({
+    mutationFn: (jobId: number) => answer(cancelJob({ path: { job_id: jobId } })),
+    onSettled: useSettled(),
+  });
+}
+
+export function useRetryJob() {
+  return useMutation({
+    mutationFn: (jobId: number) => answer(retryJob({ path: { job_id: jobId } })),
+    onSettled: useSettled(),
+  });
+}

@@ -1,0 +1,186 @@
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { useStatistics } from "../api/queries";
+import type { CampaignStatistics } from "../api/types";
+import { count } from "../lib/format";
+import { gainsInBrackets } from "../lib/gains";
+import { confidenceText, percent, plusMinus } from "../lib/uncertainty";
+import { VERDICTS } from "../lib/verdict";
+import { Help } from "./Help";
+import { Panel } from "./Panel";
+import classes from "./Statistics.module.css";
+import { Trouble } from "./Trouble";
+
+/** What the flights say about the gains, and how sure that is. */
+export function StatisticsPanel({ campaignId }: { campaignId: number }) {
+  const statistics = useStatistics(campaignId);
+  return (
+    <Panel title="How sure is it?">
+      <Trouble error={statistics.error} />
+      {statistics.isPending && <div className={classes["waiting"]} aria-busy="true" />}
+      {statistics.data && statistics.data.groups.length === 0 && (
+        <p className={classes["none"]}>
+          After the first valid flight this says how much errors scatter, whether the best gains are really better, and
+          how well the predictions hold.
+        </p>
+      )}
+      {statistics.data && statistics.data.groups.length > 0 && <Said {...statistics.data} />}
+    </Panel>
+  );
+}
+
+function Said(all: CampaignStatistics) {
+  const { comparison, drift, track_record: record, notes, trends } = all;
+  const said = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
+  return (
+    <div className={classes["said"]}>
+      <div className={classes["facts"]}>
+        <Verdict comparison={comparison} unit={all.error_unit} />
+        <Scatter {...all} />
+        <Predictions record={record} />
+      </div>
+      <Groups {...all} />
+      <ul className={classes["notes"]}>
+        {drift && <li>{drift.sentence}</li>}
+        {trends.map(({ against, sentence }) => (
+          <li key={against}>{sentence}</li>
+        ))}
+        {notes
+          .filter((note) => !said.includes(note))
+          .map((note) => (
+            <li key={note}>{note}</li>
+          ))}
+      </ul>
+    </div>
+  );
+}
+
+function Verdict({ comparison, unit }: { comparison: CampaignStatistics["comparison"]; unit: string }) {
+  if (comparison === null) {
+    return (
+      <div className={classes["fact"]}>
+        <h3>Best against the first</h3>
+        <p className={classes["big"]}>The same gains</p>
+        <p>Nothing to compare: the first flight's gains are the best so far.</p>
+      </div>
+    );
+  }
+  const { verdict, confidence, difference, standard_error, further } = comparison;
+  const more = further === null ? null : further.best + further.baseline;
+  return (
+    <div className={classes["fact"]} data-verdict={verdict}>
+      <h3>
+        Best against the first
+        <Help question="When is a difference real?">
+          <p>
+            Two flights with the same gains differ too. Better or worse is said only when chance alone would hardly do
+            it; the best of many is judged more strictly, because the luckiest of many looks good.
+          </p>
+        </Help>
+      </h3>
+      <p className={classes["big"]}>
+        {VERDICTS[verdict]}
+        <small>{confidenceText(confidence)} confidence</small>
+      </p>
+      <p className="numbers">
+        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
+        {verdict === "unresolved" && more !== null && (
+          <strong className={classes["more"]}>
+            {count(more, "more flight")} would decide: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the
+            first gains
+          </strong>
+        )}
+      </p>
+    </div>
+  );
+}
+
+function Scatter({
+  sigma,
+  degrees_of_freedom: freedom,
+  groups,
+  error_unit: unit,
+  optimism,
+  shrunk_error,
+}: CampaignStatistics) {
+  const repeats = groups.reduce((sum, group) => sum + group.errors.length - 1, 0);
+  return (
+    <div className={classes["fact"]}>
+      <h3>
+        Scatter of one flight
+        <Help question="Where does the scatter come from?">
+          <p>
+            The standard deviation of the error from flight to flight with the same gains. Before anything is repeated
+            it is what such flights are known for; every repeat counts from then on.
+          </p>
+        </Help>
+      </h3>
+      <p className={`${classes["big"]} numbers`}>{plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}</p>
+      <p>
+        {repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`},{" "}
+        worth {Number(freedom.toFixed(1))} repeats in all.
+      </p>
+      {optimism > 0.1 * sigma && shrunk_error !== null && (
+        <p className={`${classes["fine"]} numbers`}>
+          Chosen as the best of {groups.length}, it looks {plusMinus(optimism, null, unit)} better than it is; likely{" "}
+          {plusMinus(shrunk_error, null, unit)}.
+        </p>
+      )}
+    </div>
+  );
+}
+
+function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
+  return (
+    <div className={classes["fact"]} data-verdict={record.trustworthy ? undefined : "worse"}>
+      <h3>
+        Predictions kept
+        <Help question="What is counted here?">
+          <p>
+            How many flights ended inside the 90 % interval that was predicted for them, and how many changed the error
+            in the direction that was predicted.
+          </p>
+        </Help>
+      </h3>
+      <p className={`${classes["big"]} numbers`}>
+        {record.of === 0 ? "None tested yet" : `${record.inside} of ${record.of}`}
+        {record.of > 0 && record.share !== null && <small>{percent(record.share)} inside the 90 % interval</small>}
+      </p>
+      {!record.trustworthy && (
+        <p className={classes["warning"]}>
+          <IconAlertTriangle size={18} aria-hidden /> Gradient not trustworthy
+        </p>
+      )}
+      <p className={classes["fine"]}>{record.sentence}</p>
+    </div>
+  );
+}
+
+/** Flights of the same gains are one line. */
+function Groups({ groups, error_unit: unit }: CampaignStatistics) {
+  const names = Object.keys(groups[0]?.gains ?? {});
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+    <section className={`${classes["scroll"]} sideways`} aria-label="Gain sets flown" tabIndex={0}>
+      <table className={classes["groups"]}>
+        <thead>
+          <tr>
+            <th scope="col">[{names.join(" ")}]</th>
+            <th scope="col">Flights</th>
+            <th scope="col">Mean error</th>
+            <th scope="col">Standing</th>
+          </tr>
+        </thead>
+        <tbody>
+          {groups.map((group) => (
+            <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
+              <th scope="row">{gainsInBrackets(group.gains)}</th>
+              <td>{group.trial_numbers.join(", ")}</td>
+              <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
+              <td>{[group.is_best ? "best" : "", group.is_baseline ? "first" : ""].filter(Boolean).join(", ")}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </section>
+  );
+}

@@ -1,0 +1,24 @@
+/** In which units a campaign's numbers stand, from its experiment. */
+
+import type { Catalogue } from "../api/types";
+
+export interface Units {
+  error: string;
+  output: string;
+  /** Of the gains; empty when they have several. */
+  gains: string;
+}
+
+const TAKEOFF: Units = { error: "m", output: "m", gains: "counts" };
+
+/** Those of the experiment; of the takeoff until the catalogue is there. */
+export function unitsOf(catalogue: Catalogue | undefined, experiment: string): Units {
+  const found = catalogue?.experiments.find(({ name }) => name === experiment);
+  if (found === undefined) return TAKEOFF;
+  const units = new Set(found.gains.map(({ unit }) => unit));
+  return {
+    error: found.error_unit,
+    output: found.output_unit,
+    gains: units.size === 1 ? ([...units][0] ?? "") : "",
+  };
+}

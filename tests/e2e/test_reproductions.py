@@ -1,0 +1,84 @@
+"""The pages of reproductions and of jobs: run, watched, read, cancelled, begun again."""
+
+import re
+
+from playwright.sync_api import expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, Dashboard
+
+FIG6 = "Fig. 6: the replica of the controller"
+FIG12 = "Fig. 12: takeoffs repeated over a battery"
+
+
+def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    dashboard.open("/")
+    page.get_by_role("navigation", name="Pages").get_by_role("link", name="Reproductions").click()
+    card = page.get_by_role("article", name=FIG6)
+    expect(card.get_by_text("Not run yet.")).to_be_visible()
+    dashboard.button(f"Run: {FIG6}").click()
+    expect(card.get_by_role("progressbar")).to_be_visible()
+    expect(dashboard.button(f"Cancel: {FIG6}")).to_be_visible()
+    table = card.get_by_role("table").first
+    expect(table).to_be_visible(timeout=60_000)
+    found = dashboard.get("/reproductions/controller")
+    shown = [row.inner_text().split() for row in table.locator("tbody tr").all()][1:]
+    assert [cells[0] for cells in shown] == [row["label"] for row in found["rows"]]
+    assert {cells[-1] for cells in shown} == {"0"}
+    for figure in found["figures"]:
+        told = dashboard.get(f"/reproductions/controller/figures/{figure['name']}")
+        plot = page.get_by_role("group", name=re.compile(rf"^{re.escape(told['title'])}")).locator(".js-plotly-plot")
+        expect(plot).to_be_visible()
+        drawn = plot.evaluate(
+            "gd => gd.data.map(trace => ({meta: trace.meta, x: Array.from(trace.x), y: Array.from(trace.y)}))"
+        )
+        assert drawn == [{key: trace[key] for key in ("meta", "x", "y")} for trace in told["figure"]["data"]]
+    expect(dashboard.button(f"Run: {FIG6}")).to_be_visible()
+
+
+def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    dashboard.open("/jobs")
+    expect(page.get_by_text("Nothing has been computed yet.")).to_be_visible()
+    job_id = dashboard.post("/reproductions/variability/run")["id"]
+    card = page.get_by_role("listitem").filter(has_text=f"Job {job_id}")
+    expect(card.get_by_role("link", name=FIG12)).to_be_visible()
+    expect(card.get_by_text(re.compile(r"^[1-9]\d? % · .*battery \d+ of 240 flown"))).to_be_visible(timeout=60_000)
+    card.get_by_role("button", name=f"Cancel job {job_id}").click()
+    expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()
+    page.get_by_role("radiogroup", name="Jobs shown").get_by_text("Under way").click()
+    expect(page.get_by_text("Nothing waits and nothing runs.")).to_be_visible()
+    page.get_by_role("radiogroup", name="Jobs shown").get_by_text("All", exact=True).click()
+    card.get_by_role("button", name=f"Retry job {job_id}").click()
+    expect(card.get_by_role("progressbar")).to_be_visible()
+    card.get_by_role("button", name=f"Cancel job {job_id}").click()
+    expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()
+
+
+def test_on_a_phone_the_pages_are_behind_a_menu(open_dashboard: Opener, shared_server: Server) -> None:
+    dashboard = open_dashboard(shared_server.url, viewport=PHONE)
+    dashboard.open("/")
+    dashboard.button("Pages").click()
+    dashboard.page.get_by_role("menuitem", name="Jobs").click()
+    expect(dashboard.page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+
+
+def test_long_lists_of_jobs_come_in_pages(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard: Dashboard = open_dashboard(own_server.url)
+    campaign_id = dashboard.create("twin")
+    for _ in range(22):
+        dashboard.post(f"/campaigns/{campaign_id}/proposal")
+        dashboard.when_ready(campaign_id)
+    dashboard.until(lambda: dashboard.get("/jobs?state=queued&state=running")["total"] == 0)
+    total = dashboard.get("/jobs")["total"]
+    assert total > 20
+    dashboard.open("/jobs")
+    jobs = dashboard.page.get_by_role("list", name="Jobs").get_by_role("listitem")
+    expect(jobs).to_have_count(20)
+    dashboard.button(f"Show more (20 of {total})").click()
+    expect(jobs).to_have_count(total)
+    newest = dashboard.get("/jobs")["items"][0]["id"]
+    expect(jobs.first).to_contain_text(f"Job {newest}")

@@ -1,0 +1,187 @@
+"""What the tuning engine knows, on the screen: intervals, repeats, refusals, glitches, warm starts, experiments."""
+
+import re
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.dashboard import Dashboard, printed
+
+PATIENT = {"kind": "budget", "max_flights": 20}
+WRAPPING = {"kp": 283, "ki": 1356, "kd": 82}
+"""The paper's Table 2: ki·(sum of errors) can wrap at 32 bits."""
+
+
+def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", strategy="calibrated", seed=3, stop=PATIENT)
+    dashboard.fly_headless(campaign_id, 1)
+    dashboard.open_campaign(dashboard.when_ready(campaign_id))
+    curve, lower, upper = (dashboard.trace("takeoffs", *what[:1], **what[1]) for what in (
+        ("prediction", {}), ("band", {"edge": "lower"}), ("band", {"edge": "upper"})))  # fmt: skip
+    assert curve is not None and lower is not None and upper is not None  # noqa: PT018
+    middle = np.interp(curve["x"], lower["x"], lower["y"]), np.interp(curve["x"], upper["x"], upper["y"])
+    assert (middle[0] <= np.array(curve["y"]) + 0.01).all()
+    assert (middle[1] >= np.array(curve["y"]) - 0.01).all()
+    assert (middle[1] - middle[0]).max() > 0.01
+    interval = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["interval"]
+    drawn = dashboard.trace("errors", "interval")
+    assert drawn is not None
+    assert (drawn["x"][-3:-1], drawn["y"][-3:-1]) == (
+        [2, 2],
+        pytest.approx([interval["lower"], interval["upper"]], abs=1e-6),
+    )
+
+
+def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", strategy="calibrated", seed=3, stop=PATIENT)
+    dashboard.fly_headless(campaign_id, 1)
+    dashboard.open_campaign(dashboard.when_ready(campaign_id))
+    why = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["explanation"]
+    card = dashboard.panel("Next flight: 2")
+    card.get_by_text("Why these gains").click()
+    assert len(why["fitted"]) >= 4
+    for one in why["fitted"]:
+        row = card.get_by_role("table", name="The vehicle as").get_by_role("rowgroup").filter(has_text=one["title"])
+        expect(row).to_contain_text(printed(one["value"], one["standard_error"], "").strip())
+    expect(card).to_contain_text(why["lesson"])
+    card.get_by_role("button", name="What is the interval?").click()
+    expect(dashboard.page.get_by_text("Of ten flights, nine should end inside it")).to_be_visible()
+
+
+def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", strategy="gradient", seed=3, stop=PATIENT)
+    dashboard.fly_headless(campaign_id, 2)
+    dashboard.open_campaign(dashboard.when_ready(campaign_id))
+    dashboard.choose_speed("Max")
+    dashboard.page.get_by_role("button", name=re.compile("^Repeat (instead|the best)$")).click()
+    dashboard.until(lambda: [one["state"] for one in dashboard.trials(campaign_id)] == ["valid"] * 3)
+    flown = dashboard.trials(campaign_id)
+    assert flown[2]["gains"] == flown[1]["gains"]
+    said = dashboard.get(f"/campaigns/{campaign_id}/statistics")
+    [group] = [one for one in said["groups"] if len(one["trial_numbers"]) > 1]
+    assert group["mean"] == pytest.approx(np.mean([one["error"] for one in flown[1:]]), abs=1e-9)
+    panel = dashboard.panel("How sure is it?")
+    row = panel.get_by_role("row").filter(has_text="2, 3")
+    expect(row).to_contain_text(printed(group["mean"], group["standard_error"]))
+    dashboard.until(lambda: dashboard.trace("errors", "repeats") is not None)
+    repeats, measured = dashboard.trace("errors", "repeats"), dashboard.trace("errors", "measured")
+    assert repeats is not None and measured is not None  # noqa: PT018
+    assert repeats["y"] == pytest.approx([group["mean"]], abs=1e-6)
+    assert repeats["bars"] == pytest.approx([group["standard_error"]], abs=1e-6)
+    assert measured["bar"] == pytest.approx(said["sigma"], abs=1e-6)
+    expect(panel).to_contain_text(
+        {"better": "Better", "worse": "Worse"}.get(said["comparison"]["verdict"], "Unresolved")
+    )
+    expect(panel).to_contain_text(f"{said['track_record']['inside']} of {said['track_record']['of']}")
+    shown = dashboard.panel("Flight 3")
+    expect(shown).to_contain_text(printed(group["mean"], group["standard_error"]))
+
+
+def refuse(page: Page) -> None:
+    page.get_by_role("button", name="Edit gains").click()
+    for name, value in WRAPPING.items():
+        page.get_by_label(re.compile(f"^{name}")).fill(str(value))
+    page.get_by_role("button", name="Fly these gains").click()
+
+
+def test_a_refusal_offers_the_nearest_value_that_would_pass(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", step_fraction=1.0, first_step_fraction=1.0)
+    dashboard.open_campaign(campaign_id)
+    refuse(dashboard.page)
+    ki = dashboard.page.get_by_label(re.compile("^ki"))
+    expect(ki).to_have_attribute("aria-invalid", "true")
+    expect(dashboard.page.get_by_text(re.compile("stuck on the ground"))).to_be_visible()
+    dashboard.button("Use ki 1073").click()
+    expect(ki).to_have_value("1073")
+    expect(ki).not_to_have_attribute("aria-invalid", "true")
+    assert dashboard.trials(campaign_id) == []
+
+
+def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_with_the_flight(
+    dashboard: Dashboard,
+) -> None:
+    campaign_id = dashboard.create("twin")
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("Max")
+    refuse(dashboard.page)
+    dashboard.page.get_by_text("Overrule with a reason", exact=True).click()
+    fly = dashboard.button("Fly in spite of the refusal")
+    expect(fly).to_be_disabled()
+    dashboard.page.get_by_label("Reason").fill("the paper flew these gains")
+    fly.click()
+    dashboard.until(lambda: [one["state"] for one in dashboard.trials(campaign_id)] in (["valid"], ["captured"]))
+    [trial] = dashboard.trials(campaign_id)
+    assert (trial["gains"]["ki"], trial["overrule_reason"]) == (1356, "the paper flew these gains")
+    verdict = dashboard.panel("Flight 1")
+    expect(verdict.get_by_text("Overruled", exact=True)).to_be_visible()
+    expect(verdict).to_contain_text("the paper flew these gains")
+
+
+def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(dashboard: Dashboard) -> None:
+    time_s = np.arange(0.0, 33.0, 0.02)
+    altitude_m = 3.0 * (1.0 - np.exp(-time_s))
+    altitude_m[500:505] += 1.5
+    content = "time_s,altitude_m\n" + "".join(f"{t:.3f},{z:.5f}\n" for t, z in zip(time_s, altitude_m, strict=True))
+    campaign_id = dashboard.create("import")
+    dashboard.open_campaign(campaign_id)
+    with dashboard.page.expect_file_chooser() as chooser:
+        dashboard.button("Upload flight record").click()
+    chooser.value.set_files({"name": "flight.csv", "mimeType": "text/csv", "buffer": content.encode()})
+    expect(dashboard.page.get_by_text("The record has a glitch")).to_be_visible()
+    [trial] = dashboard.trials(campaign_id)
+    assert trial["glitches"]
+    assert trial["repaired_error"] < trial["error"]
+    told = dashboard.page.get_by_text(f"with the glitches bridged {trial['repaired_error']:.3f} m")
+    expect(told).to_be_visible()
+    dashboard.until(lambda: dashboard.trace("takeoffs", "glitch", trial=1) is not None)
+    drawn = dashboard.trace("takeoffs", "glitch", trial=1)
+    assert drawn is not None
+    seconds = [value for value in drawn["x"] if value is not None]
+    assert min(seconds) == pytest.approx(10.0, abs=0.1)
+    assert max(seconds) == pytest.approx(10.1, abs=0.1)
+
+
+def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard) -> None:
+    donor = dashboard.create("twin", name="Donor of the warm start", strategy="calibrated")
+    dashboard.fly_headless(donor, 2)
+    page = dashboard.page
+    dashboard.open("/new")
+    recommended = dashboard.get("/catalogue")["strategies"][0]
+    expect(page.get_by_role("combobox", name="Strategy")).to_have_value(recommended["title"])
+    page.get_by_role("combobox", name="Start from").click()
+    page.get_by_role("option", name="Best of another campaign").click()
+    page.get_by_role("combobox", name="Campaign", exact=True).fill("Donor of the warm")
+    page.get_by_role("option", name=re.compile("^Donor of the warm start")).click()
+    best = dashboard.get(f"/campaigns/{donor}")["best"]
+    expect(page.get_by_text(f"kp {best['gains']['kp']}")).to_be_visible()
+    page.get_by_role("textbox", name="Name").fill("Warm start")
+    dashboard.button("Create campaign").click()
+    expect(page.get_by_role("heading", name="Warm start")).to_be_visible()
+    start = dashboard.get(f"/campaigns/{dashboard.campaign_id}")["definition"]["start"]
+    assert (start["kind"], start["gains"]) == ("campaign", best["gains"])
+    assert (start["donor"]["campaign_id"], start["donor"]["trial_number"]) == (donor, best["trial_number"])
+
+
+def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dashboard) -> None:
+    page = dashboard.page
+    dashboard.open("/new")
+    page.get_by_role("combobox", name="Experiment").click()
+    experiment = next(one for one in dashboard.get("/catalogue")["experiments"] if one["name"] == "pitch-tracking")
+    page.get_by_role("option", name=experiment["title"]).click()
+    expect(page.get_by_role("radio")).to_have_count(1)
+    page.get_by_role("textbox", name="Name").fill("F-16 by hand")
+    dashboard.button("Create campaign").click()
+    expect(page.get_by_role("heading", name="F-16 by hand")).to_be_visible()
+    campaign_id = dashboard.when_ready(dashboard.campaign_id)
+    dashboard.fly_headless(campaign_id, 1)
+    [trial] = dashboard.trials(campaign_id)
+    unit = experiment["error_unit"]
+    expect(dashboard.panel("Flight 1")).to_contain_text(f"{trial['error']:.3f} {unit}")
+    expect(page.get_by_role("heading", name="Pitch error curves")).to_be_visible()
+    dashboard.until(lambda: dashboard.trace("Pitch error curves", "flight") is not None)
+    drawn = dashboard.trace("Pitch error curves", "flight")
+    assert drawn is not None
+    record = dashboard.get(f"/trials/{trial['id']}/trajectory?points=20000")
+    expected = np.interp(drawn["x"], record["time_s"], record["channels"][experiment["output"]])
+    np.testing.assert_allclose(drawn["y"], expected, atol=2e-4)
