@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Final
 
 from pydantic import TypeAdapter
@@ -12,6 +12,7 @@ from app.campaigns.schemas import Definition as DefinitionIn
 from app.core.checking import check_definition
 from app.core.definition import Definition
 from app.core.errors import InputError, Problem
+from app.core.experiments import get_experiment
 from app.db.models import CampaignRow, JsonObject
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue
@@ -26,13 +27,16 @@ def core_definition(asked: DefinitionIn) -> Definition:
 
 
 def definition_of(row: CampaignRow) -> Definition:
-    """The definition of a stored campaign."""
-    return _ADAPTER.validate_python(row.definition)
+    """The definition of a stored campaign, with its vehicle's safe gains where they are not the experiment's own."""
+    space = get_experiment(row.experiment).space
+    own = dict(row.vehicle.safe_gains)
+    safe_gains = None if own == space.mapping(space.default) else own
+    return replace(_ADAPTER.validate_python(row.definition), safe_gains=safe_gains)
 
 
 def frozen_digest(row: CampaignRow) -> str:
     """SHA-256 over all that is frozen at the first flight: the definition, the vehicle with all its settings, and its
-    safe gains. Proposals carry the narrower digest of the definition alone, because they depend on nothing else."""
+    safe gains. Proposals carry the narrower digest of the definition, because they depend on nothing else."""
     frozen = {
         "definition": definition_of(row).digest(),
         "vehicle": row.vehicle.kind,
@@ -43,8 +47,8 @@ def frozen_digest(row: CampaignRow) -> str:
 
 
 def stored(definition: Definition) -> JsonObject:
-    """For the row."""
-    return asdict(definition)
+    """For the row; safe gains are the vehicle's."""
+    return {name: value for name, value in asdict(definition).items() if name != "safe_gains"}
 
 
 def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definition, dict[str, OptionValue]]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.core.definition import Definition, Flight, flight_seed
+from app.core.envelope import envelope_of
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
@@ -12,7 +13,7 @@ from app.core.gate import check_policy, require_flyable
 from app.core.glitches import find_glitches
 from app.core.predictions import prediction_of
 from app.core.proposing import next_proposal
-from app.core.stopping import judge
+from app.core.stopping import judge, landing_battery_v
 from app.core.strategies.base import Interval, Kind, Proposal
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.errors import VehicleError
@@ -79,33 +80,52 @@ def fly_campaign(
     experiment = experiment_of(definition)
     trials: list[HeadlessTrial] = []
     history: list[Flight] = []
+    battery_v: float | None = None
     while True:
         number = len(trials) + 1
         proposal = next_proposal(definition, history)
-        judged = judge(definition, history, proposal)
-        if judged.stop:
-            return HeadlessCampaign(trials=tuple(trials), stopped_because=judged.why)
-        if len(trials) >= definition.stop.max_flights:
-            unscored = len(trials) - len(history)
-            why = f"All {len(trials)} flights are flown; {unscored} of them could not be scored."
+        if why := _ended_because(definition, trials, history, proposal, battery_v):
             return HeadlessCampaign(trials=tuple(trials), stopped_because=why)
         overruled = _require_flyable(definition, experiment, proposal, history, overrule, get_kind(vehicle).is_real)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
+        battery_v = landing_battery_v(record.trajectory)
         trial = _assess(experiment, number, proposal, record, overruled)
         trials.append(trial)
         watcher.landed(trial)
-        if trial.outcome != "invalid":
-            history.append(
-                Flight(
-                    number=number,
-                    gains=proposal.gains,
-                    trajectory=record.trajectory.as_stored(),
-                    error=trial.error,
-                    outcome=trial.outcome,
-                    predicted=prediction_of(proposal),
-                )
-            )
+        history.extend(_remembered(trial, proposal, record))
+
+
+def _ended_because(
+    definition: Definition,
+    trials: Sequence[HeadlessTrial],
+    history: Sequence[Flight],
+    proposal: Proposal,
+    battery_v: float | None,
+) -> str:
+    """Why nothing more is flown; empty while there is more. `battery_v`: where the last trial ended."""
+    judged = judge(definition, history, proposal, battery_v=battery_v)
+    if judged.stop:
+        return judged.why
+    if len(trials) < definition.stop.max_flights:
+        return ""
+    return f"All {len(trials)} flights are flown; {len(trials) - len(history)} of them could not be scored."
+
+
+def _remembered(trial: HeadlessTrial, proposal: Proposal, record: FlightRecord) -> tuple[Flight, ...]:
+    """The trial as the next proposals see it; nothing where it does not count."""
+    if trial.outcome == "invalid":
+        return ()
+    return (
+        Flight(
+            number=trial.number,
+            gains=trial.gains,
+            trajectory=record.trajectory.as_stored(),
+            error=trial.error,
+            outcome=trial.outcome,
+            predicted=prediction_of(proposal),
+        ),
+    )
 
 
 def _require_no_donor(definition: Definition) -> None:
@@ -140,7 +160,7 @@ def _fly(
     proposal: Proposal,
     watcher: Watcher,
 ) -> FlightRecord:
-    safe_gains = experiment.space.mapping(experiment.space.default)
+    safe_gains = envelope_of(definition, experiment).safe_gains
     with open_vehicle(vehicle, options, safe_gains=safe_gains) as controlled:
         held = controlled.stage(proposal.gains)
         if held != proposal.gains:

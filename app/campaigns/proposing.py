@@ -48,15 +48,15 @@ _UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
     """All that a proposal is computed from. `digest` changes as soon as any of it does. `donor` is the flight that a
-    warm start comes from; the definition holds the checksum of its record. `safe_gains` are what an abort would fly,
-    None for the experiment's default gains."""
+    warm start comes from; the definition holds the checksum of its record. `battery_v` is the voltage, V, at which the
+    last flight ended, one that does not count included."""
 
     campaign_id: int
     definition: Definition
     flights: tuple[Flight, ...]
     digest: str
     donor: Flight | None = None
-    safe_gains: Gains | None = None
+    battery_v: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,14 +76,14 @@ class Computed:
 def read_history(session: Session, campaign_id: int) -> History:
     """The campaign's definition and its flights with their trajectories as stored. Raises NotFoundError."""
     row = repository.get_one(session, campaign_id)
-    definition = definition_of(row)
+    definition, trials = definition_of(row), history.trials_of(session, campaign_id)
     return History(
         campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
-        digest=history.history_digest(definition.digest(), history.trials_of(session, campaign_id)),
+        digest=history.history_digest(definition, trials),
         donor=_donor(session, definition),
-        safe_gains=dict(row.vehicle.safe_gains),
+        battery_v=history.last_battery_v(trials),
     )
 
 
@@ -106,7 +106,7 @@ def compute(past: History) -> Computed:
     definition, flights = past.definition, past.flights
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, flights, past.donor)
-    stop_verdict = judge(definition, flights, proposal)
+    stop_verdict = judge(definition, flights, proposal, battery_v=past.battery_v)
     spread = known(experiment, flights) if proposal.spread is None else proposal.spread
     gate = check_policy(
         definition,
@@ -116,7 +116,6 @@ def compute(past: History) -> Computed:
         flights,
         start=proposal.gains if proposal.kind == "start" else None,
         spread=spread,
-        safe_gains=past.safe_gains,
     )
     return Computed(
         history_digest=past.digest,
@@ -203,7 +202,7 @@ def latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow:
 
 def is_stale(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the campaign's history is no longer the one that the proposal was computed from."""
-    return row.history_digest != history.history_digest(definition_of(campaign).digest(), trials)
+    return row.history_digest != history.history_digest(definition_of(campaign), trials)
 
 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:

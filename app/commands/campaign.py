@@ -8,7 +8,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
-from app.campaigns.definitions import check_campaign
+from app.campaigns.definitions import check_campaign, stored
 from app.campaigns.files import CampaignFile, preset_names, read_campaign_file, read_preset
 from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly_campaign
 from app.campaigns.overrides import override
@@ -151,7 +151,7 @@ def _document(
     return {
         "name": file.name,
         "vehicle": {"kind": file.vehicle.kind, "options": dict(options)},
-        "definition": asdict(definition),
+        "definition": stored(definition),
         "definition_digest": definition.digest(),
         "trials": [{**asdict(trial), "gains": dict(trial.gains)} for trial in campaign.trials],
         "best": None if best is None else best.number,

@@ -52,7 +52,8 @@ class StopRule:
 class Definition:
     """Everything a proposal depends on, beside the flights. `bounds` narrow the experiment's own;
     `first_step_fraction` and `step_fraction` limit a gain's change as shares of its range, before and after the first
-    valid flight; `ceiling_m` is the highest altitude that the gate lets a model run reach."""
+    valid flight; `ceiling_m` is the highest altitude that the gate lets a model run reach. `safe_gains` are what an
+    abort flies, where the vehicle's are not the experiment's default gains."""
 
     experiment: str = "takeoff"
     experiment_options: dict[str, OptionValue] = field(default_factory=dict)
@@ -65,10 +66,14 @@ class Definition:
     ceiling_m: float = 4.5
     stop: StopRule = field(default_factory=StopRule)
     seed: int = 1
+    safe_gains: dict[str, float] | None = None
 
     def digest(self) -> str:
-        """SHA-256 of the canonical JSON, hex."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        """SHA-256 of the canonical JSON, hex; safe gains stand in it only where the vehicle has its own."""
+        fields = asdict(self)
+        if self.safe_gains is None:
+            del fields["safe_gains"]
+        return hashlib.sha256(json.dumps(fields, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

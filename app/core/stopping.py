@@ -25,13 +25,18 @@ class StopVerdict:
     threshold: float | None
 
 
-def judge(definition: Definition, flights: Sequence[Flight], proposal: Proposal) -> StopVerdict:
-    """The campaign's own rule on its flights and on the proposal computed from them."""
+def judge(
+    definition: Definition, flights: Sequence[Flight], proposal: Proposal, *, battery_v: float | None = None
+) -> StopVerdict:
+    """The campaign's own rule on its flights and on the proposal computed from them.
+
+    `battery_v` is the voltage, V, at which the last flight ended, whatever that flight is worth: a low battery is low.
+    """
     return verdict(
         definition.stop,
         [flight.error for flight in flights],
         proposal.kind,
-        battery_v=landing_battery_v(flights[-1].trajectory) if flights else None,
+        battery_v=battery_v,
         because=proposal.explanation.summary,
     )
 

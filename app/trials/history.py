@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.core.definition import Donor, Flight, Prediction
+from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
 from app.db.models import FlightRow, TrajectoryRow, TrialRow
@@ -65,7 +65,16 @@ def counted(trials: Sequence[TrialRow]) -> list[TrialRow]:
     return [row for row in trials if row.state in HISTORY]
 
 
-def history_digest(definition_digest: str, trials: Sequence[TrialRow]) -> str:
+def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
+    """The voltage, V, at which the trial that flew last ended, whatever it is classed as; None where nothing told it.
+
+    Trials need not fly in the order of their numbers.
+    """
+    flown = [(row.flown_at, row.number, row) for row in trials if row.state in FLOWN and row.flown_at is not None]
+    return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
+
+
+def history_digest(definition: Definition, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from; differs as soon as any of it does."""
     flights = [
         [
@@ -79,7 +88,8 @@ def history_digest(definition_digest: str, trials: Sequence[TrialRow]) -> str:
         ]
         for row in counted(trials)
     ]
-    content = json.dumps([definition_digest, flights], sort_keys=True, separators=(",", ":"))
+    battery = [] if definition.stop.min_battery_v is None else [last_battery_v(trials)]
+    content = json.dumps([definition.digest(), flights, *battery], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
 
 

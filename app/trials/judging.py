@@ -41,7 +41,6 @@ def judge_gains(session: Session, campaign: CampaignRow, asked: Gains, *, overru
         flown,
         start=proposing.stored_start(session, campaign) if searched else None,
         spread=proposing.stored_spread(session, campaign, experiment),
-        safe_gains=campaign.vehicle.safe_gains,
     )
     return _judged(campaign, gains, gate, overrule)
 

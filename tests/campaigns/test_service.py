@@ -1,19 +1,28 @@
 """Campaigns over HTTP: what is kept for ever, what is frozen, what a later word on a flight changes."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
+from app.campaigns.definitions import definition_of
+from app.campaigns.proposing import read_history
 from app.db.models import CampaignRow, FlightRow
 from app.db.session import Database
 from app.trials import flights
+from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
     create_campaign,
     create_flown_trial,
     create_ready_campaign,
+    create_record,
     create_trial,
     get,
+    land,
+    lift_off,
     run_jobs,
 )
 from tests.trials.test_service import PATIENT, classify
@@ -64,6 +73,28 @@ def test_the_frozen_digest_covers_the_vehicle(client: TestClient, database: Data
         create_flown_trial(client, database, made["id"])
         digests.add(get(client, f"/api/campaigns/{made['id']}")["definition_digest"])
     assert len(digests) == 3
+
+
+def test_a_vehicles_own_safe_gains_stand_in_the_definition_that_proposals_and_gate_go_by(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database)
+    path = f"/api/campaigns/{campaign['id']}"
+    before = get(client, f"{path}/proposal")["proposal"]
+    own: dict[str, float] = {"kp": 300, "ki": 13, "kd": 82}
+    with database.write() as session:
+        row = session.get_one(CampaignRow, campaign["id"])
+        assert definition_of(row).safe_gains is None
+        row.vehicle.safe_gains = own
+        session.flush()
+        assert definition_of(row).safe_gains == read_history(session, row.id).definition.safe_gains == own
+    assert get(client, f"{path}/proposal")["proposal"]["stale"]
+    client.post(f"{path}/proposal")
+    run_jobs(database)
+    after = get(client, f"{path}/proposal")["proposal"]
+    assert not after["stale"]
+    assert after["history_digest"] != before["history_digest"]
+    assert get(client, path)["definition"] == campaign["definition"]
 
 
 def test_a_finished_campaign_says_why_it_is_over_in_the_light_of_its_flights(
@@ -133,3 +164,47 @@ def test_gains_of_ones_own_wait_for_the_start_gains(client: TestClient, database
     answer = client.post(f"{path}/trials", json={"gains": {"kp": 1600, "ki": 900, "kd": 200}})
     assert answer.status_code == 409
     assert "start gains" in answer.json()["detail"]
+
+
+def sagged(volts: float, *, until_s: float = 33.0) -> FlightRecord:
+    """A climb at whose end the battery has so many volts; a short one cannot be scored."""
+    record = create_record(until_s=until_s)
+    channels = {**record.trajectory.channels, "battery_v": np.linspace(11.1, volts, len(record.trajectory))}
+    return replace(record, trajectory=replace(record.trajectory, channels=channels))
+
+
+def test_a_low_battery_ends_a_campaign_whatever_its_last_flight_is_worth(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(
+        client, database, definition={"stop": {"kind": "budget", "max_flights": 9, "min_battery_v": 10.5}}
+    )
+    path = f"/api/campaigns/{campaign['id']}"
+    trial = create_trial(client, campaign["id"], gains={"kp": 300, "ki": 13, "kd": 82})
+    create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), sagged(10.8))
+    run_jobs(database)
+    before = get(client, f"{path}/proposal")["proposal"]
+    assert before["stop_verdict"]["stop"] is False
+    assert client.post(f"/api/trials/{trial['id']}/fly", json={"speed": None}).status_code == 202
+    land(database, lift_off(database), sagged(10.4, until_s=10.0))
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "invalid"
+    run_jobs(database)
+    done = get(client, path)
+    assert (done["state"], done["outcome"]) == ("finished", "budget")
+    assert done["stop_reason"].startswith("The last flight ended at 10.40 V; 10.5 V is the least.")
+    after = get(client, f"{path}/proposal")["proposal"]
+    assert (after["stale"], after["gains"]) == (False, before["gains"])
+    assert after["history_digest"] != before["history_digest"]
+
+
+def test_without_a_battery_limit_an_invalid_flight_leaves_the_proposal_as_it_is(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    path = f"/api/campaigns/{campaign['id']}/proposal"
+    before = get(client, path)["proposal"]
+    create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), sagged(10.4, until_s=10.0))
+    run_jobs(database)
+    assert get(client, path)["proposal"]["history_digest"] == before["history_digest"]

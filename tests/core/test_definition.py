@@ -1,4 +1,6 @@
-from dataclasses import replace
+import hashlib
+import json
+from dataclasses import asdict, replace
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,10 +16,18 @@ def test_the_digest_changes_with_every_field_and_only_then() -> None:
         replace(one, bounds={"kp": (1, 2)}),
         replace(one, options={"scaled": False}),
         replace(one, step_fraction=0.5),
+        replace(one, safe_gains={"kp": 283, "ki": 13, "kd": 82}),
     ]
-    assert len({one.digest(), *(other.digest() for other in others)}) == 6
+    assert len({one.digest(), *(other.digest() for other in others)}) == 7
     assert one.digest() == Definition().digest()
     assert len(one.digest()) == 64
+
+
+def test_the_digest_of_a_definition_without_safe_gains_of_its_own_is_that_of_one_that_knows_of_none() -> None:
+    fields = asdict(Definition())
+    del fields["safe_gains"]
+    canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
+    assert Definition().digest() == hashlib.sha256(canonical.encode()).hexdigest()
 
 
 @given(st.integers(0, 2**64), st.integers(1, 200))

@@ -92,16 +92,19 @@ def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "
     assert low.why.startswith("The last flight ended at 10.42 V; 10.5 V is the least.")
 
 
-def test_the_battery_is_read_at_the_end_of_the_last_flight() -> None:
+def test_the_battery_is_read_at_the_end_of_a_record() -> None:
     flight = fly(1, 30, 40)
+    assert landing_battery_v(flight.trajectory) is None
+    channels = {**flight.trajectory.channels, "battery_v": np.linspace(11.1, 10.4, len(flight.trajectory))}
+    assert landing_battery_v(replace(flight.trajectory, channels=channels)) == pytest.approx(10.4)
+
+
+def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
     proposal = Proposal(
         kind="step", gains={}, predicted=None, predicted_error=None, explanation=Explanation(summary="A step.")
     )
     definition = Definition(stop=StopRule(min_battery_v=10.5))
-    assert landing_battery_v(flight.trajectory) is None
-    assert judge(definition, [flight], proposal).reason is None
-    channels = {**flight.trajectory.channels, "battery_v": np.linspace(11.1, 10.4, len(flight.trajectory))}
-    sagging = replace(flight, trajectory=replace(flight.trajectory, channels=channels))
-    assert landing_battery_v(sagging.trajectory) == pytest.approx(10.4)
-    assert judge(definition, [sagging], proposal).reason == "battery low"
-    assert judge(definition, [], proposal).reason is None
+    for flights in ([], [fly(1, 30, 40)]):
+        assert judge(definition, flights, proposal).reason is None
+        assert judge(definition, flights, proposal, battery_v=10.6).reason is None
+        assert judge(definition, flights, proposal, battery_v=10.4).reason == "battery low"

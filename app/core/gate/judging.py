@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from app.core.calibration import known
-from app.core.checks import Check, Envelope
+from app.core.checks import Check
 from app.core.definition import Definition, Flight
+from app.core.envelope import envelope_of
 from app.core.experiments.base import Experiment
 from app.core.gate.bounds import NUMBERS, check_bounds, check_numbers, check_step, jointly_offered
 from app.core.policy import Gains, PolicySpace
@@ -47,7 +48,6 @@ def check_policy(
     *,
     start: Gains | None = None,
     spread: Spread | None = None,
-    safe_gains: Gains | None = None,
 ) -> Gate:
     """Judge a complete set of gains (every name of `space`): its numbers, the campaign's bounds, its step limit, and
     the experiment's hazards.
@@ -58,18 +58,14 @@ def check_policy(
     `space` is the experiment's, narrowed to the campaign's bounds. Before the first valid flight a gain may change by
     `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from some valid flight.
     `start`: the start gains where they are known; searching them on the model takes long. `spread`: what is known of
-    the vehicle, where `flights` come without their records. `safe_gains`: what an abort flies, by default the
-    experiment's default gains.
+    the vehicle, where `flights` come without their records.
     """
     if numbers := check_numbers(space, gains):
         return Gate(numbers)
     hazards = experiment.hazards(
         space.vector(gains),
         known(experiment, flights) if spread is None else spread,
-        Envelope(
-            ceiling_m=definition.ceiling_m,
-            safe_gains=experiment.space.mapping(experiment.space.default) if safe_gains is None else safe_gains,
-        ),
+        envelope_of(definition, experiment),
     )
     if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
         hazards = tuple(_flown_before(check) for check in hazards)

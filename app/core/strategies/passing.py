@@ -1,7 +1,7 @@
 """Whether the gate would let a step fly, asked before it is proposed."""
 
-from app.core.checks import Envelope
 from app.core.definition import Definition
+from app.core.envelope import envelope_of
 from app.core.experiments.base import Experiment
 from app.core.policy import Vector
 from app.core.spread import Spread
@@ -9,5 +9,4 @@ from app.core.spread import Spread
 
 def may_fly(definition: Definition, experiment: Experiment, gains: Vector, spread: Spread) -> bool:
     """Whether the experiment sees no hazard in gains of shape (n,) over what is known of the vehicle."""
-    envelope = Envelope(ceiling_m=definition.ceiling_m, safe_gains=experiment.space.mapping(experiment.space.default))
-    return all(check.passed for check in experiment.hazards(gains, spread, envelope))
+    return all(check.passed for check in experiment.hazards(gains, spread, envelope_of(definition, experiment)))

@@ -7,6 +7,7 @@ import pytest
 
 from app.core.checks import Check, Envelope
 from app.core.definition import Definition
+from app.core.gate import check_policy
 from app.core.policy import Vector
 from app.core.spread import Spread
 from app.core.strategies.bias import corrected_by
@@ -158,3 +159,21 @@ def test_a_step_that_the_gate_refuses_is_halved_until_it_passes(monkeypatch: pyt
     assert proposal.gains == pytest.approx({"a": 34.0, "b": 64})
     assert proposal.explanation.notes[-1] == "The gate refuses a 18, b 58."
     assert "is refused by the gate, so the next one goes less far" in proposal.explanation.summary
+
+
+@pytest.mark.parametrize(("safe_gains", "a"), [({"a": 50.0, "b": 70}, 34.0), (None, 18.0)])
+def test_the_vehicles_own_safe_gains_are_what_a_step_is_judged_with(
+    monkeypatch: pytest.MonkeyPatch, safe_gains: dict[str, float] | None, a: float
+) -> None:
+    """An abort to these safe gains (not to the experiment's, a = 90) is a hazard from below a = 30."""
+
+    def hazards(_bowl: Bowl, gains: Vector, _spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+        passed = bool(gains[0] >= 30.0 or envelope.safe_gains["a"] > 80.0)
+        return (Check("abort altitude", passed, "too high", worst=30.0, limit=30.0),)
+
+    monkeypatch.setattr(Bowl, "hazards", hazards)
+    definition = Definition(safe_gains=safe_gains)
+    proposal = propose(definition, BOWL, SPACE, [fly(1, 50.0, 70)])
+    assert proposal.gains["a"] == pytest.approx(a)
+    gate = check_policy(definition, BOWL, SPACE, proposal.gains, [fly(1, 50.0, 70)], spread=proposal.spread)
+    assert gate.passed
