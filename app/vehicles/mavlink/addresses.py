@@ -1,0 +1,133 @@
+"""Where a vehicle is reached, written as one text.
+
+udp:HOST:PORT[@LOCALPORT]  send to the vehicle there, from LOCALPORT (Paparazzi sends to a port fixed in its firmware)
+udpin:HOST:PORT            wait at our own address until a vehicle speaks
+tcp:HOST:PORT              connect to the vehicle
+serial:DEVICE:BAUD         a telemetry radio or cable
+"""
+
+import ipaddress
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from app.core.errors import InputError, Problem
+
+LARGEST_PORT: Final = 65535
+FORMS: Final = "udp:HOST:PORT[@LOCALPORT], udpin:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD"
+
+
+@dataclass(frozen=True, slots=True)
+class UdpAddress:
+    """A vehicle that listens at `host`:`port`; `local_port` is ours, None any free one."""
+
+    host: str
+    port: int
+    local_port: int | None = None
+
+    def __str__(self) -> str:
+        return f"udp:{self.host}:{self.port}" + (f"@{self.local_port}" if self.local_port is not None else "")
+
+
+@dataclass(frozen=True, slots=True)
+class UdpInAddress:
+    """Our own address, at which a vehicle will speak first; 0.0.0.0 means every interface."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"udpin:{self.host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class TcpAddress:
+    """A vehicle, or a bridge to it, that takes connections at `host`:`port`."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"tcp:{self.host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class SerialAddress:
+    """A serial device, such as /dev/ttyUSB0, and its baud rate."""
+
+    device: str
+    baud: int
+
+    def __str__(self) -> str:
+        return f"serial:{self.device}:{self.baud}"
+
+
+Address = UdpAddress | UdpInAddress | TcpAddress | SerialAddress
+
+
+def parse(text: str) -> Address:
+    """The address that `text` writes; str() of it gives the text back. Raises InputError saying what is wrong."""
+    kind, _, rest = text.strip().partition(":")
+    place, colon, number = rest.rpartition(":")
+    if kind not in _PARSERS or not colon or not place:
+        raise _error(text, f"must be {FORMS}")
+    return _PARSERS[kind](text, place, number)
+
+
+def is_loopback(address: Address) -> bool:
+    """Whether nothing beyond this computer can be reached by it: a simulation, not a vehicle."""
+    if isinstance(address, SerialAddress):
+        return False
+    return is_loopback_host(address.host)
+
+
+def is_loopback_host(host: str) -> bool:
+    """Whether `host` is this computer, judged by its text alone: no name is looked up."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _udp(text: str, host: str, ports: str) -> UdpAddress:
+    port, at, local = ports.partition("@")
+    return UdpAddress(host, _port(text, port), _port(text, local) if at else None)
+
+
+def _udp_in(text: str, host: str, port: str) -> UdpInAddress:
+    return UdpInAddress(host, _port(text, port))
+
+
+def _tcp(text: str, host: str, port: str) -> TcpAddress:
+    return TcpAddress(host, _port(text, port))
+
+
+def _serial(text: str, device: str, baud: str) -> SerialAddress:
+    return SerialAddress(device, _positive(text, baud, "the baud rate"))
+
+
+_PARSERS: Final[Mapping[str, Callable[[str, str, str], Address]]] = MappingProxyType(
+    {"udp": _udp, "udpin": _udp_in, "tcp": _tcp, "serial": _serial}
+)
+
+
+def _port(text: str, digits: str) -> int:
+    port = _positive(text, digits, "the port")
+    if port > LARGEST_PORT:
+        raise _error(text, f"the port is at most {LARGEST_PORT}, got {port}")
+    return port
+
+
+def _positive(text: str, digits: str, what: str) -> int:
+    if not (digits.isascii() and digits.isdigit() and int(digits) > 0):
+        raise _error(text, f"{what} must be a whole number above 0, got {digits!r}")
+    return int(digits)
+
+
+def _error(text: str, reason: str) -> InputError:
+    return InputError(
+        f"{text!r} is not the address of a vehicle.",
+        problems=(Problem("address", reason),),
+        hint="Examples: udp:127.0.0.1:4245@4244, udpin:0.0.0.0:14550, tcp:127.0.0.1:5760, serial:/dev/ttyUSB0:57600.",
+    )

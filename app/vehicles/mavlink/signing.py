@@ -1,0 +1,64 @@
+"""MAVLink 2 signing: frames carry a keyed hash, and whatever arrives without a good one is bad data.
+
+Both ends hold the same 32 bytes. Nothing of MAVLink 1 can be signed, so Paparazzi cannot.
+"""
+
+import datetime as dt
+import time
+from typing import Final, Protocol
+
+from app.core.errors import InputError, Problem
+
+KEY_BYTES: Final = 32
+_EPOCH_NS: Final = int(dt.datetime(2015, 1, 1, tzinfo=dt.UTC).timestamp()) * 10**9
+_TICK_NS: Final = 10_000
+
+
+class SigningState(Protocol):
+    """What the MAVLink library keeps about the signing of one link."""
+
+    secret_key: bytes | None
+    timestamp: int
+    link_id: int
+    sign_outgoing: bool
+
+
+def parse_key(text: str) -> bytes:
+    """The key that 64 hexadecimal digits write. Raises InputError, which does not repeat the text: it is a secret."""
+    try:
+        key = bytes.fromhex(text.strip())
+    except ValueError:
+        key = b""
+    check_key(key)
+    return key
+
+
+def check_key(key: bytes) -> None:
+    """Raises InputError unless `key` has the length of a signing key."""
+    if len(key) != KEY_BYTES:
+        raise InputError(
+            "This is not a signing key.",
+            problems=(
+                Problem("signing_key", f"must be {KEY_BYTES} bytes, written as {2 * KEY_BYTES} hexadecimal digits"),
+            ),
+            hint="Make one with: openssl rand -hex 32",
+        )
+
+
+def enable(state: SigningState, key: bytes, *, link_id: int = 0) -> None:
+    """Sign what is sent and accept nothing unsigned. Raises InputError for a key of a wrong length."""
+    check_key(key)
+    state.secret_key = key
+    state.link_id = link_id
+    state.sign_outgoing = True
+    refresh(state)
+
+
+def refresh(state: SigningState) -> None:
+    """Bring the time stamp of the next frame up to now, for it must neither fall behind nor repeat."""
+    state.timestamp = max(state.timestamp, timestamp_now())
+
+
+def timestamp_now() -> int:
+    """Units of 10 µs since 2015, as the signature counts them."""
+    return (time.time_ns() - _EPOCH_NS) // _TICK_NS

@@ -1,0 +1,338 @@
+"""Bytes to and from a vehicle, over UDP, TCP or a serial line; times are seconds on the wall.
+
+A connection that breaks is silence, not an error: it is opened again behind the scenes, so that a link lost in the air
+is met in one way, whatever carries it.
+"""
+
+import contextlib
+import os
+import selectors
+import socket
+import time
+from collections.abc import Callable
+from typing import Final, Protocol
+
+import serial
+
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.addresses import (
+    Address,
+    SerialAddress,
+    TcpAddress,
+    UdpAddress,
+    UdpInAddress,
+    is_loopback_host,
+)
+
+Peer = tuple[str, int]
+"""Who sent something: host and port, or device and baud rate."""
+
+BATCH: Final = 64
+"""Datagrams handed over at once; what is left comes at once with the next read, after whatever there is to send."""
+LARGEST_READ: Final = 65536
+RECEIVE_BUFFER: Final = 1 << 20
+BACKLOG: Final = 4096
+"""Bytes that may wait for a stalled stream; at 57 600 baud that is 0.7 s, beyond which commands would come late."""
+REOPEN_EVERY_S: Final = 1.0
+CONNECT_WITHIN_S: Final = 2.0
+UNACKNOWLEDGED_MS: Final = 5000
+
+
+class LinkError(VehicleError):
+    """The link to a vehicle could not be opened, or does not work any more."""
+
+
+class Transport(Protocol):
+    """Bytes to and from one peer. For one thread, save `wake`."""
+
+    @property
+    def remote(self) -> Peer | None:
+        """The peer that is written to and listened to; None while it is not known (`adopt`), and all are heard."""
+        ...
+
+    @property
+    def foreign(self) -> int:
+        """How often something came from another peer, and was dropped."""
+        ...
+
+    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        """What has come in, a datagram or a piece of a stream each; waits at most so long for the first, or `wake`."""
+        ...
+
+    def write(self, data: bytes) -> bool:
+        """Send without waiting; whether it could be: false while there is no peer or connection, or no room."""
+        ...
+
+    def adopt(self, peer: Peer) -> None:
+        """From now on hear and write to `peer` alone."""
+        ...
+
+    def wake(self) -> None:
+        """Make a `read` of another thread return at once."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def open_transport(address: Address) -> Transport:
+    """Open what `address` names. Raises LinkError when it cannot be opened."""
+    match address:
+        case UdpAddress(host, port, local_port):
+            ours = ("127.0.0.1" if is_loopback_host(host) else "0.0.0.0", local_port or 0)  # noqa: S104
+            return UdpTransport(ours, _resolved(address, host, port))
+        case UdpInAddress(host, port):
+            return UdpTransport(_resolved(address, host, port), None)
+        case TcpAddress(host, port):
+            return StreamTransport((host, port), lambda: _connected(host, port))
+        case SerialAddress(device, baud):
+            return StreamTransport((device, baud), lambda: _serial_port(device, baud))
+
+
+class UdpTransport:
+    """Datagrams between our address and one peer's."""
+
+    def __init__(self, local: Peer, remote: Peer | None) -> None:
+        """Raises LinkError when `local` is taken: two that listen at one port would steal each other's packets."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        try:
+            self._socket.bind(local)
+        except OSError as error:
+            self._socket.close()
+            raise _cannot_open(f"udp port {local[1]} of {local[0]}", error) from error
+        self._waiter = _Waiter()
+        self._waiter.watch(self._socket.fileno())
+        self._remote = remote
+        self._foreign = 0
+
+    @property
+    def local(self) -> Peer:
+        host, port = self._socket.getsockname()
+        return host, port
+
+    @property
+    def remote(self) -> Peer | None:
+        return self._remote
+
+    @property
+    def foreign(self) -> int:
+        return self._foreign
+
+    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        heard: list[tuple[bytes, Peer]] = []
+        if not self._waiter.wait(timeout_s):
+            return heard
+        with contextlib.suppress(BlockingIOError):
+            for _ in range(BATCH):
+                data, peer = self._socket.recvfrom(LARGEST_READ)
+                if self._remote is None or peer == self._remote:
+                    heard.append((data, peer))
+                else:
+                    self._foreign += 1
+        return heard
+
+    def write(self, data: bytes) -> bool:
+        if self._remote is None:
+            return False
+        try:
+            self._socket.sendto(data, self._remote)
+        except OSError:  # no room, or the network is down: it may be up again for the next one
+            return False
+        return True
+
+    def adopt(self, peer: Peer) -> None:
+        self._remote = peer
+
+    def wake(self) -> None:
+        self._waiter.wake()
+
+    def close(self) -> None:
+        self._waiter.close()
+        self._socket.close()
+
+
+class _Stream(Protocol):
+    """An open, non-blocking descriptor."""
+
+    def fileno(self) -> int: ...
+    def close(self) -> None: ...
+
+
+class StreamTransport:
+    """A stream of bytes to one peer; opened again every second once it has broken."""
+
+    def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
+        """`opened` opens the stream or raises OSError. Raises LinkError when that fails now."""
+        self._peer = peer
+        self._opened = opened
+        self._backlog = bytearray()
+        self._next_try_s = 0.0
+        try:
+            self._stream: _Stream | None = opened()
+        except OSError as error:
+            raise _cannot_open(f"{peer[0]}:{peer[1]}", error) from error
+        self._waiter = _Waiter()
+        self._waiter.watch(self._stream.fileno())
+
+    @property
+    def remote(self) -> Peer | None:
+        return self._peer
+
+    @property
+    def foreign(self) -> int:
+        return 0
+
+    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        if self._stream is None:
+            timeout_s = min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0))
+        events = self._waiter.wait(timeout_s)
+        if self._stream is None:
+            self._reopen()
+            return []
+        if events & selectors.EVENT_WRITE:
+            self._flush()
+        data = self._receive() if events & selectors.EVENT_READ else b""
+        return [(data, self._peer)] if data else []
+
+    def write(self, data: bytes) -> bool:
+        if self._stream is None or len(self._backlog) + len(data) > BACKLOG:
+            return False
+        self._backlog += data
+        self._flush()
+        return self._stream is not None
+
+    def adopt(self, peer: Peer) -> None:
+        """There is but one."""
+
+    def wake(self) -> None:
+        self._waiter.wake()
+
+    def close(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+        self._waiter.close()
+
+    def _receive(self) -> bytes:
+        """What a readable stream holds; one that holds nothing has ended."""
+        if self._stream is None:
+            return b""
+        try:
+            data = os.read(self._stream.fileno(), LARGEST_READ)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._break()
+        return data
+
+    def _flush(self) -> None:
+        """Write what the stream takes now; the rest follows when it takes more."""
+        if self._stream is None:
+            return
+        try:
+            del self._backlog[: os.write(self._stream.fileno(), self._backlog)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._break()
+            return
+        self._waiter.watch(self._stream.fileno(), writable=bool(self._backlog))
+
+    def _break(self) -> None:
+        if self._stream is not None:
+            self._waiter.forget()
+            self._stream.close()
+        self._stream = None
+        self._backlog.clear()
+        self._next_try_s = time.monotonic() + REOPEN_EVERY_S
+
+    def _reopen(self) -> None:
+        if time.monotonic() < self._next_try_s:
+            return
+        try:
+            self._stream = self._opened()
+        except OSError:
+            self._next_try_s = time.monotonic() + REOPEN_EVERY_S
+        else:
+            self._waiter.watch(self._stream.fileno())
+
+
+class _Waiter:
+    """Waits for one descriptor, or for another thread's wake."""
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._bell, self._button = socket.socketpair()
+        self._bell.setblocking(False)
+        self._button.setblocking(False)
+        self._selector.register(self._bell, selectors.EVENT_READ)
+        self._watched: int | None = None
+        self._events = 0
+
+    def watch(self, descriptor: int, *, writable: bool = False) -> None:
+        """Wait for `descriptor` to be readable, and writable if so asked."""
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writable else 0)
+        if self._watched is None:
+            self._selector.register(descriptor, events)
+        elif events != self._events:
+            self._selector.modify(descriptor, events)
+        self._watched, self._events = descriptor, events
+
+    def forget(self) -> None:
+        if self._watched is not None:
+            self._selector.unregister(self._watched)
+        self._watched = None
+
+    def wait(self, timeout_s: float) -> int:
+        """The events of the watched descriptor, 0 after the time-out or a wake."""
+        found = 0
+        for key, events in self._selector.select(max(timeout_s, 0.0)):
+            if key.fd == self._watched:
+                found = events
+            else:
+                with contextlib.suppress(BlockingIOError):
+                    self._bell.recv(LARGEST_READ)
+        return found
+
+    def wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # full of wakes: it will wake
+            self._button.send(b"!")
+
+    def close(self) -> None:
+        self._selector.close()
+        self._bell.close()
+        self._button.close()
+
+
+def _connected(host: str, port: int) -> socket.socket:
+    connection = socket.create_connection((host, port), timeout=CONNECT_WITHIN_S)
+    connection.setblocking(False)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux: a vehicle switched off does not say good-bye
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
+    return connection
+
+
+def _serial_port(device: str, baud: int) -> serial.Serial:
+    """Opened and set up by pyserial, but read and written by its descriptor: pyserial's `write` waits for room."""
+    try:
+        return serial.Serial(device, baud, timeout=0, exclusive=True)
+    except ValueError as error:  # a baud rate that the device does not know
+        raise OSError(str(error)) from error
+
+
+def _resolved(address: Address, host: str, port: int) -> Peer:
+    try:
+        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+    except OSError as error:
+        raise _cannot_open(str(address), error) from error
+    return str(found[0][4][0]), port
+
+
+def _cannot_open(what: str, error: OSError) -> LinkError:
+    return LinkError(
+        f"{what} could not be opened: {error.strerror or error}.",
+        hint="See that the address is right, the vehicle is there, and no other program uses it.",
+    )
