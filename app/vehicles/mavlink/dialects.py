@@ -60,6 +60,12 @@ def source_system(message: Message) -> int:
     return frame[3] if frame[0] == _MAVLINK_1 else frame[5]
 
 
+def source_component(message: Message) -> int:
+    """The sender's component id, read from the frame for the same reason."""
+    frame = message.get_msgbuf()
+    return frame[4] if frame[0] == _MAVLINK_1 else frame[6]
+
+
 def sequence(message: Message) -> int:
     """The sender's sequence number (0 to 255), read from the frame for the same reason."""
     frame = message.get_msgbuf()
@@ -133,11 +139,26 @@ class Codec:
 
     def parse(self, data: bytes) -> list[Message]:
         """Every message that `data` completes, noise among them as BAD_DATA; never raises for what comes in."""
-        found: list[Message] = self._mav.parse_buffer(data) or []
+        found: list[Message] = []
+        while (message := self._next(data)) is not None:
+            found.append(message)
+            data = b""
         if self._mav.buf_index > _SPENT_BYTES:  # the library frees its buffer only when that happens to run empty
             del self._mav.buf[: self._mav.buf_index]
             self._mav.buf_index = 0
         return found
+
+    def _next(self, data: bytes) -> Message | None:
+        """The next message that `data` completes.
+
+        The library believes the time stamp of a frame before it has checked the signature: one flipped bit, or one
+        forged frame, and everything after it would be refused as old. So what a bad frame said of time is forgotten.
+        """
+        times = dict(self._mav.signing.stream_timestamps)
+        message: Message | None = self._mav.parse_char(data)
+        if message is not None and message.get_type() == BAD_DATA:
+            self._mav.signing.stream_timestamps = times
+        return message
 
 
 PAPARAZZI: Final = Dialect(

@@ -1,0 +1,331 @@
+"""One conversation with one vehicle.
+
+A thread of its own does all input and output, so that a command leaves within milliseconds of `send`, whatever else
+the program is at.
+"""
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from app.vehicles.mavlink.addresses import Address
+from app.vehicles.mavlink.clock import Clock
+from app.vehicles.mavlink.dialects import (
+    BAD_DATA,
+    Codec,
+    Dialect,
+    FieldValue,
+    Message,
+    is_known,
+    number,
+    sequence,
+    source_component,
+    source_system,
+)
+from app.vehicles.mavlink.tlog import TlogWriter
+from app.vehicles.mavlink.transports import LinkError, Peer, open_transport
+
+__all__ = ["Link", "LinkError", "LinkHealth", "LossCounter", "Received"]
+
+HEARTBEAT_EVERY_S: Final = 1.0
+UNATTENDED_AFTER_S: Final = 3.0
+"""When nobody has listened for so long, the program hangs: no heartbeat then pretends otherwise, and the vehicle's own
+answer to a lost ground station is not kept from acting."""
+INBOX: Final = 20_000
+"""Messages kept for a program that does not ask for them; then the oldest are dropped, and counted."""
+OLDER: Final = 128
+"""A sequence number so far ahead is one from the past: packets may overtake each other."""
+
+MAV_TYPE_GCS: Final = 6
+MAV_AUTOPILOT_INVALID: Final = 8
+MAV_STATE_ACTIVE: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message and when it came, in seconds of the link's clock."""
+
+    message: Message
+    received_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkHealth:
+    """What has passed so far; times in seconds of the link's clock."""
+
+    received: int
+    """Messages of the vehicle that the dialect knows."""
+    lost: int
+    """Messages missing by the vehicle's sequence numbers."""
+    bad: int
+    """Stretches of noise: wrong checksums, wrong signatures."""
+    foreign: int
+    """Datagrams of other senders and messages of other systems, all dropped."""
+    overrun: int
+    """Messages dropped because nobody called `receive`."""
+    sent: int
+    unsent: int
+    """Messages that could not leave: no peer yet, no connection, no room."""
+    last_packet_s: float | None
+    last_heartbeat_s: float | None
+
+
+class LossCounter:
+    """Counts missing messages by the sequence numbers of each component."""
+
+    def __init__(self, uncounted: tuple[str, ...]) -> None:
+        """`uncounted`: beginnings of the names of messages that are numbered by another counter."""
+        self._uncounted = uncounted
+        self._latest: dict[int, int] = {}
+        self.lost = 0
+
+    def count(self, kind: str, component: int, number: int) -> None:
+        """Take note of a message with its sequence number, 0 to 255; late and repeated ones count as nothing."""
+        if kind.startswith(self._uncounted):
+            return
+        ahead = (number - self._latest.get(component, number - 1)) % 256
+        if 0 < ahead < OLDER:
+            self.lost += ahead - 1
+            self._latest[component] = number
+
+
+class Link:
+    """Sends to and hears one vehicle; safe to use from any thread.
+
+    `target_system` is the vehicle's system id; None takes the first autopilot that is heard. With `tlog`, both
+    directions are appended to that file. With `signing_key`, everything is signed.
+    """
+
+    def __init__(
+        self,
+        address: Address,
+        dialect: Dialect,
+        *,
+        clock: Clock,
+        target_system: int | None = None,
+        system: int = 255,
+        component: int = 190,
+        tlog: Path | None = None,
+        signing_key: bytes | None = None,
+    ) -> None:
+        """Raises LinkError when the address or the file cannot be opened, InputError for signing that cannot be."""
+        self._address, self._dialect, self._clock = address, dialect, clock
+        self._identity = (system, component, signing_key)
+        self._codec = self._new_codec()
+        self._transport = open_transport(address)
+        try:
+            self._tlog = TlogWriter(tlog) if tlog else None
+        except LinkError:
+            self._transport.close()
+            raise
+        self._opened_s, self._opened_unix_us = clock.now_s(), time.time_ns() // 1000
+        self._vehicle_system = target_system
+        self._losses = LossCounter(dialect.uncounted)
+        self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
+        self._last_packet_s: float | None = None
+        self._last_heartbeat_s: float | None = None
+        self._next_heartbeat_s = self._attended_s = self._opened_s
+        self._listeners = 0
+        self._outbox: deque[Message] = deque()
+        self._inbox: deque[Received] = deque()
+        self._news = threading.Condition()
+        self._is_closing = self._is_closed = False
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name=f"link {address}", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def vehicle_system(self) -> int | None:
+        """The vehicle's system id, None until it is known."""
+        return self._vehicle_system
+
+    @property
+    def log_problem(self) -> str | None:
+        """Why the telemetry log is not complete, once that is known."""
+        return self._tlog.problem if self._tlog else None
+
+    @property
+    def health(self) -> LinkHealth:
+        with self._news:
+            return LinkHealth(
+                received=self._received,
+                lost=self._losses.lost,
+                bad=self._bad,
+                foreign=self._foreign + self._transport.foreign,
+                overrun=self._overrun,
+                sent=self._sent,
+                unsent=self._unsent,
+                last_packet_s=self._last_packet_s,
+                last_heartbeat_s=self._last_heartbeat_s,
+            )
+
+    def send(self, kind: str, **fields: FieldValue) -> None:
+        """Have the message `kind` ("PARAM_SET") leave within milliseconds; returns at once.
+
+        Raises ValueError for a message or fields that the dialect does not have, LinkError when the link is closed.
+        """
+        message = self._dialect.message(kind, fields)
+        with self._news:
+            if self._is_closing or self._is_closed:
+                raise self._closed_error()
+            self._outbox.append(message)
+            self._transport.wake()
+
+    def receive(self, timeout_s: float) -> list[Received]:
+        """Everything heard since the last call, oldest first; waits at most `timeout_s` of the clock for the first.
+
+        Every message is given once, whoever asks. Raises LinkError when the link is closed and nothing is left.
+        """
+        with self._news:
+            self._listeners += 1
+            try:
+                self._news.wait_for(lambda: self._inbox or self._is_closed, self._clock.wall_s(timeout_s))
+            finally:
+                self._listeners -= 1
+                self._attended_s = self._clock.now_s()
+            if self._is_closed and not self._inbox:
+                raise self._closed_error()
+            heard = list(self._inbox)
+            self._inbox.clear()
+        return heard
+
+    def close(self) -> None:
+        """Send what is waiting, then end the conversation; returns once the log is stored. Again is harmless."""
+        with self._news:
+            self._is_closing = True
+            if not self._is_closed:
+                self._transport.wake()
+        self._thread.join()
+        if self._tlog:
+            self._tlog.close()
+
+    def _closed_error(self) -> LinkError:
+        why = f"failed: {self._failure}" if self._failure else "is closed"
+        return LinkError(f"The link {self._address} {why}.", hint="Connect to the vehicle again.")
+
+    # ---- in the link's own thread
+
+    def _run(self) -> None:
+        try:
+            while not self._is_closing:
+                self._send_what_is_due()
+                for data, peer in self._transport.read(self._patience_s()):
+                    self._take_in(data, peer)
+            self._send_what_is_due()
+        except Exception as error:
+            self._failure = error
+            raise
+        finally:
+            with self._news:
+                self._is_closed = True
+                self._news.notify_all()
+                self._transport.close()
+
+    def _patience_s(self) -> float:
+        """How long to wait for news, s on the wall."""
+        return self._clock.wall_s(max(self._next_heartbeat_s - self._clock.now_s(), 0.0))
+
+    def _send_what_is_due(self) -> None:
+        while self._outbox:
+            self._write(self._outbox.popleft())
+        now_s = self._clock.now_s()
+        if now_s < self._next_heartbeat_s:
+            return
+        self._next_heartbeat_s = now_s + HEARTBEAT_EVERY_S
+        is_attended = self._listeners > 0 or now_s - self._attended_s < UNATTENDED_AFTER_S
+        if self._dialect.heeds_heartbeats and is_attended:
+            self._write(self._dialect.message("HEARTBEAT", _GROUND_STATION))
+
+    def _write(self, message: Message) -> None:
+        frame = self._codec.pack(message)
+        if self._transport.write(frame):
+            self._sent += 1
+            self._record(frame)
+        else:
+            self._unsent += 1
+
+    def _take_in(self, data: bytes, peer: Peer) -> None:
+        if self._transport.remote is not None:
+            self._hear(self._codec.parse(data))
+            return
+        # A codec of its own: what a stranger sends must not stand in the way of the vehicle's first packet.
+        messages = self._new_codec().parse(data)
+        if any(self._is_vehicle(message) for message in messages):
+            self._transport.adopt(peer)
+            self._hear(messages)
+        else:
+            self._foreign += 1
+
+    def _is_vehicle(self, message: Message) -> bool:
+        """Whether the message shows its sender to be the vehicle that this link is for."""
+        if self._vehicle_system is None:
+            return _is_autopilots_heartbeat(message)
+        return is_known(message) and source_system(message) == self._vehicle_system
+
+    def _hear(self, messages: list[Message]) -> None:
+        now_s = self._clock.now_s()
+        fresh = [Received(message, now_s) for message in messages if self._accepts(message, now_s)]
+        if not fresh:
+            return
+        with self._news:
+            excess = max(len(self._inbox) + len(fresh) - INBOX, 0)
+            self._overrun += excess
+            self._inbox.extend(fresh)
+            for _ in range(excess):
+                self._inbox.popleft()
+            self._news.notify_all()
+
+    def _accepts(self, message: Message, now_s: float) -> bool:
+        """Count and record the message; whether it is to be handed on."""
+        if message.get_type() == BAD_DATA:
+            self._bad += 1
+            return False
+        if self._vehicle_system is None and self._is_vehicle(message):
+            self._vehicle_system = source_system(message)
+        if source_system(message) != self._vehicle_system:
+            self._foreign += 1
+            return False
+        self._losses.count(message.get_type(), source_component(message), sequence(message))
+        self._record(bytes(message.get_msgbuf()))
+        if not is_known(message):  # neither its checksum nor its signature was looked at: no sign of life
+            return False
+        self._received += 1
+        self._last_packet_s = now_s
+        if _is_autopilots_heartbeat(message):
+            self._last_heartbeat_s = now_s
+        return True
+
+    def _record(self, frame: bytes) -> None:
+        if self._tlog:
+            passed_us = round((self._clock.now_s() - self._opened_s) * 1e6)
+            self._tlog.write(self._opened_unix_us + passed_us, frame)
+
+    def _new_codec(self) -> Codec:
+        system, component, key = self._identity
+        return self._dialect.codec(system=system, component=component, signing_key=key)
+
+
+_GROUND_STATION: Final[dict[str, FieldValue]] = {
+    "type": MAV_TYPE_GCS,
+    "autopilot": MAV_AUTOPILOT_INVALID,
+    "base_mode": 0,
+    "custom_mode": 0,
+    "system_status": MAV_STATE_ACTIVE,
+}
+
+
+def _is_autopilots_heartbeat(message: Message) -> bool:
+    """Not that of a gimbal or another ground station."""
+    return message.get_type() == "HEARTBEAT" and number(message, "autopilot") != MAV_AUTOPILOT_INVALID
