@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from app.core.confirming import Confirmation, confirm, standing
+from app.core.confirming import Confirmation, confirm, contest, standing
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
 from app.core.stopping import StopVerdict
@@ -32,11 +32,13 @@ def advise(
     said: StopVerdict,
 ) -> Advice:
     """Under the rule `noise` the proposal holds the advice already; under the others it is a recommendation only, and a
-    step that flights cannot tell from noise is advised against."""
-    now = standing(definition, experiment, flights)
+    step that flights cannot tell from noise is advised against. Only gains inside the bounds are advised, except to
+    stop with what the flights found best."""
+    tells_noise = definition.stop.kind == "noise"
+    now = (standing if said.stop and not tells_noise else contest)(definition, experiment, flights)
     if said.stop:
         return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=said.why)
-    if now is None or definition.stop.kind == "noise":
+    if now is None or tells_noise:
         kind = _FLOWN_ANYWAY.get(proposal.kind, "step")
         return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)
     confirmation = confirm(definition, experiment, flights, proposal)

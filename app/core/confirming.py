@@ -2,11 +2,12 @@
 
 Two phases. *Steps* are worth flying while the proposal promises more than the flights that are left could tell from
 noise. After that the winner and the baseline (the first flight's gains) are flown again in turn, until the difference
-is decided; the confidence allows for the number of policies among which the winner was found, and for every look.
+is decided; the confidence allows for the number of policies among which the winner was found, and for every look. Gains
+outside the campaign's bounds, flown over a refusal, would be refused again and take no part.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from app.core.definition import Definition, Flight
@@ -68,16 +69,40 @@ def standing(definition: Definition, experiment: Experiment, flights: Sequence[F
     return Standing(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=comparison)
 
 
+def contest(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Standing | None:
+    """The standing among the gains that may be flown again: those inside the bounds. None while there are none."""
+    return standing(definition, experiment, _inside(definition, experiment, flights))
+
+
 def confirm(
     definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
 ) -> Confirmation:
-    """The next flight as far as noise is concerned. At least one flight must be valid.
+    """The next flight as far as noise is concerned. At least one valid flight must lie inside the bounds.
 
     A proposal of kind `manual` promises nothing and is the operator's own business until the flights run short.
     """
-    now = standing(definition, experiment, flights)
+    inside = _inside(definition, experiment, flights)
+    now = standing(definition, experiment, inside)
     assert now is not None
-    left = definition.stop.max_flights - len(flights)
+    found = _next(definition, experiment, now, definition.stop.max_flights - len(flights), proposal)
+    return replace(found, why=f"{found.why} {_left_out(flights, inside)}".strip())
+
+
+def _inside(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Sequence[Flight]:
+    space = experiment.space.narrowed(definition.bounds)
+    return [flight for flight in flights if all(gain.outside(flight.gains[gain.name]) is None for gain in space.gains)]
+
+
+def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:
+    within = {flight.number for flight in inside}
+    out = [str(flight.number) for flight in flights if flight.number not in within]
+    if not out:
+        return ""
+    do = ("Flight", "lies", "takes") if len(out) == 1 else ("Flights", "lie", "take")
+    return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} no part."
+
+
+def _next(definition: Definition, experiment: Experiment, now: Standing, left: int, proposal: Proposal) -> Confirmation:
     if now.winner is now.baseline:
         return _unbeaten(definition, experiment, now, left, proposal)
     if left <= 0:

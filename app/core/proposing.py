@@ -3,16 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.core.confirming import confirm, standing
+from app.core.calibration import known
+from app.core.confirming import confirm, contest
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
+from app.core.gate import Gate, check_policy
 from app.core.policy import PolicySpace
 from app.core.predictions import expected, expected_again, track_record
 from app.core.starting import start_gains
-from app.core.statistics import groups_of, pooled
+from app.core.statistics import Group, groups_of, pooled
 from app.core.strategies import STRATEGIES
-from app.core.strategies.base import Explanation, Proposal
+from app.core.strategies.base import Explanation, Kind, Proposal
 from app.core.strategies.bias import corrected_by, nominal
 from app.core.strategies.history import describe
 from app.core.transfer import Transfer, transfer
@@ -49,7 +51,7 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     base = next((flight for flight in flights if flight.number == number), None)
     proposal = expected(experiment, space, flights, proposal, scatter, base=base)
     if definition.stop.kind == "noise":
-        proposal = _told_from_noise(definition, experiment, flights, proposal)
+        proposal = _told_from_noise(definition, experiment, space, flights, proposal)
     return _with_notes(proposal, flights, warm)
 
 
@@ -76,22 +78,35 @@ def _start(
 
 
 def _told_from_noise(
-    definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
+    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], proposal: Proposal
 ) -> Proposal:
-    """The strategy's proposal where a step is still worth a flight, else the flight that the noise asks for."""
-    wanted, now = confirm(definition, experiment, flights, proposal), standing(definition, experiment, flights)
-    assert now is not None
-    why = replace(proposal.explanation, notes=(*proposal.explanation.notes, *filter(None, (wanted.why,))))
-    match wanted.phase:
-        case "step":
-            return replace(proposal, explanation=why)
-        case "decided":
-            return expected_again(experiment, flights, now.winner, now.scatter, "none", Explanation(summary=wanted.why))
-        case "repeat" | "baseline" as kind:
-            group = now.winner if kind == "repeat" else now.baseline
-            lesson = "Whether the winner is better than the first gains."
-            explanation = Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson)
-            return expected_again(experiment, flights, group, now.scatter, kind, explanation)
+    """The strategy's proposal where a step is still worth a flight, else the flight that the noise asks for; nothing
+    more where the gate refuses that one."""
+    now = contest(definition, experiment, flights)
+    if now is None:
+        return proposal
+    wanted = confirm(definition, experiment, flights, proposal)
+    if wanted.phase == "step":
+        notes = (*proposal.explanation.notes, *filter(None, (wanted.why,)))
+        return replace(proposal, explanation=replace(proposal.explanation, notes=notes))
+    spread = known(experiment, flights) if proposal.spread is None else proposal.spread
+
+    def again(group: Group, kind: Kind, why: Explanation) -> Proposal:
+        return replace(expected_again(experiment, flights, group, now.scatter, kind, why), spread=spread)
+
+    if wanted.phase == "decided":
+        return again(now.winner, "none", Explanation(summary=wanted.why))
+    group = now.winner if wanted.phase == "repeat" else now.baseline
+    gate = check_policy(definition, experiment, space, group.gains, flights, spread=spread)
+    if not gate.passed:
+        return again(now.winner, "none", Explanation(summary=f"{wanted.why} {_refused(group, gate)}"))
+    lesson = "Whether the winner is better than the first gains."
+    return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
+
+
+def _refused(group: Group, gate: Gate) -> str:
+    reasons = " ".join(check.sentence for check in gate.refusals)
+    return f"But {describe(group.gains)} cannot be flown again, the gate refuses them: {reasons}"
 
 
 def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:

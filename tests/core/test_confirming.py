@@ -1,10 +1,12 @@
 """Telling the winner from luck: the rule `noise`, and advice under the other rules."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.core.advice import advise
-from app.core.confirming import confirm, standing, verdict_sentence
+from app.core.confirming import confirm, contest, standing, verdict_sentence
 from app.core.definition import Definition, Flight, StopRule
 from app.core.stopping import judge
 from app.core.strategies.base import Explanation, Kind, Proposal
@@ -92,6 +94,36 @@ def test_the_operators_own_gains_are_no_promise_and_need_none() -> None:
     assert phase(flown((1, 0.5)), proposed("manual", 0.5)) == "step"
     assert phase(flown((1, 0.5), (2, 0.3)), proposed("manual", 0.3)) == "step"
     assert phase(flown((1, 0.5)), proposed("step", None)) == "decided"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "winner", "baseline", "left_out"),
+    [
+        ((0.0, 100.0), 3.0, 1.0, ""),
+        ((1.5, 100.0), 3.0, 2.0, "Flight 1 lies outside the bounds and takes no part."),
+        ((0.0, 2.5), 2.0, 1.0, "Flights 3, 4 lie outside the bounds and take no part."),
+        ((3.5, 100.0), 4.0, 4.0, "Flights 1, 2, 3 lie outside the bounds and take no part."),
+    ],
+)
+def test_only_gains_inside_the_bounds_are_confirmed(
+    bounds: tuple[float, float], winner: float, baseline: float, left_out: str
+) -> None:
+    """Those outside were flown over a refusal and would be refused again."""
+    definition = replace(NOISE, bounds={"a": bounds})
+    flights = flown((1, 0.5), (2, 0.4), (3, 0.2), (4, 0.3))
+    now = contest(definition, Bowl(), flights)
+    assert now is not None
+    assert (now.winner.gains["a"], now.baseline.gains["a"]) == (winner, baseline)
+    why = confirm(definition, Bowl(), flights, proposed("none", 0.2)).why
+    assert why.endswith(left_out)
+    assert ("outside the bounds" in why) == bool(left_out)
+
+
+def test_with_every_flight_outside_the_bounds_nothing_is_confirmed() -> None:
+    definition = replace(NOISE, bounds={"a": (50.0, 100.0)})
+    assert contest(definition, Bowl(), flown((1, 0.5), (2, 0.2))) is None
+    advice = advise(definition, Bowl(), flown((1, 0.5)), proposed(), judge(definition, flown((1, 0.5)), proposed()))
+    assert (advice.kind, advice.gains["a"]) == ("step", 99.0)
 
 
 def test_a_difference_that_nothing_would_decide_is_said_to_be_one() -> None:

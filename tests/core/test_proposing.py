@@ -12,6 +12,7 @@ from app.core.checking import problems_of
 from app.core.definition import Definition, Flight, Start, StopRule
 from app.core.gate import check_policy
 from app.core.proposing import next_proposal
+from app.core.stopping import judge
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Proposal
 from tests.core.flying import ARDRONE, TAKEOFF, TWIN, campaign, compiled_only, errors, fly
@@ -129,6 +130,40 @@ def test_under_the_rule_noise_the_winner_and_the_first_gains_are_flown_again() -
     assert proposals[-3].gains == proposals[-1].gains == min(flights, key=lambda flight: flight.error or 1.0).gains
     assert proposals[-2].gains == flights[0].gains
     assert proposals[-1].explanation.summary.startswith("Better with more than 99.9 % confidence")
+
+
+@pytest.mark.parametrize("strategy", ["gradient", "calibrated"])
+def test_under_the_rule_noise_gains_outside_the_bounds_are_not_flown_again(strategy: str) -> None:
+    """The second flight, the best until then, was flown over the gate's refusal."""
+    bounds: dict[str, tuple[float, float]] = {"kp": (0, 1000), "ki": (0, 400)}
+    definition = Definition(strategy=strategy, bounds=bounds, stop=StopRule(kind="noise", max_flights=12))
+    space = TAKEOFF.space.narrowed(bounds)
+    flights = [fly(1, {"kp": 283, "ki": 13, "kd": 82}), fly(2, {"kp": 1600, "ki": 900, "kd": 150})]
+    while (proposal := next_proposal(definition, flights)).kind != "none":
+        assert proposal.spread is not None
+        assert check_policy(definition, TAKEOFF, space, proposal.gains, flights, spread=proposal.spread).passed
+        flights.append(fly(len(flights) + 1, proposal.gains))
+    assert space.check(proposal.gains) == proposal.gains
+    assert "Flight 2 lies outside the bounds and takes no part." in proposal.explanation.summary
+    assert judge(definition, flights, proposal).reason == "told from noise"
+
+
+def test_under_the_rule_noise_after_flights_outside_the_bounds_alone_the_strategy_goes_on() -> None:
+    bounds: dict[str, tuple[float, float]] = {"kp": (0, 1000), "ki": (0, 400)}
+    definition = Definition(bounds=bounds, stop=StopRule(kind="noise", max_flights=12))
+    proposal = next_proposal(definition, [fly(1, {"kp": 1600, "ki": 900, "kd": 150})])
+    assert proposal.gains == TAKEOFF.space.narrowed(bounds).check(proposal.gains)
+
+
+def test_under_the_rule_noise_a_campaign_ends_where_the_gate_refuses_what_it_would_fly_again() -> None:
+    """The first flight hardly damped its swinging; it was flown over the gate's refusal."""
+    definition = Definition(strategy="calibrated", stop=StopRule(kind="noise", max_flights=12))
+    undamped: dict[str, float] = {"kp": 1500, "ki": 1000, "kd": 40}
+    flights = [fly(number, undamped if number == 1 else {"kp": 1600, "ki": 900, "kd": 150}) for number in (1, 2, 3)]
+    proposal = next_proposal(definition, flights)
+    assert not check_policy(definition, TAKEOFF, TAKEOFF.space, undamped, flights, spread=proposal.spread).passed
+    assert (proposal.kind, proposal.gains) == ("none", flights[1].gains)
+    assert "kp 1500, ki 1000, kd 40 cannot be flown again, the gate refuses them: " in proposal.explanation.summary
 
 
 def test_a_recorded_flight_of_the_real_autopilot_can_be_told() -> None:
