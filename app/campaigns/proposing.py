@@ -233,13 +233,17 @@ def stored_spread(session: Session, campaign: CampaignRow, experiment: Experimen
     """What was known of the vehicle when the latest proposal was computed: a fit takes too long for a transaction.
 
     One that further flights have overtaken still serves, it only knows less; one from a flight that no longer counts
-    does not, and before any there is the data sheet.
+    does not, and before any there is the data sheet. Early databases do not say which flights they are: then it is
+    computed anew, and until that is done the data sheet serves too.
     """
     latest = repository.latest_proposal(session, campaign.id)
     if latest is None or latest.spread is None:
         return before_flight(experiment)
+    if (shown_by := latest.spread.get("flights")) is None:
+        request_proposal(session, campaign)
+        return before_flight(experiment)
     valid = {row.number for row in history.trials_of(session, campaign.id) if row.state == TrialState.VALID}
-    if not valid.issuperset(latest.spread["flights"]):
+    if not valid.issuperset(shown_by):
         return before_flight(experiment)
     return Spread(
         mean=tuple(latest.spread["mean"]),

@@ -131,6 +131,27 @@ def test_own_gains_are_judged_over_what_the_flights_have_shown(client: TestClien
         assert proposing.stored_spread(session, row, experiment) == before_flight(experiment)
 
 
+def test_what_was_stored_without_the_flights_that_showed_it_is_computed_anew(
+    client: TestClient, database: Database
+) -> None:
+    """As an early database has it."""
+    campaign = create_ready_campaign(client, database, definition=OPEN)
+    create_flown_trial(client, database, campaign["id"])
+    experiment = get_experiment("takeoff")
+    with database.write() as session:
+        row = session.get_one(CampaignRow, campaign["id"])
+        spread = proposing.stored_spread(session, row, experiment)
+        for proposal in session.query(ProposalRow):
+            assert proposal.spread is not None
+            proposal.spread = {name: value for name, value in proposal.spread.items() if name != "flights"}
+        session.flush()
+        assert proposing.stored_spread(session, row, experiment) == before_flight(experiment)
+    assert run_jobs(database) == 1
+    with database.read() as session:
+        row = session.get_one(CampaignRow, campaign["id"])
+        assert proposing.stored_spread(session, row, experiment) == spread
+
+
 def test_what_a_flight_showed_that_no_longer_counts_is_not_judged_by(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=OPEN)
     flown = create_flown_trial(client, database, campaign["id"])
