@@ -8,6 +8,7 @@ import contextlib
 import os
 import selectors
 import socket
+import termios
 import time
 from collections.abc import Callable
 from typing import Final, Protocol
@@ -32,7 +33,7 @@ BATCH: Final = 64
 LARGEST_READ: Final = 65536
 RECEIVE_BUFFER: Final = 1 << 20
 BACKLOG: Final = 4096
-"""Bytes that may wait for a stalled stream; at 57 600 baud that is 0.7 s, beyond which commands would come late."""
+"""Bytes that may wait for a stalled stream: 0.7 s at 57 600 baud. Commands would only come late after more of them."""
 REOPEN_EVERY_S: Final = 1.0
 CONNECT_WITHIN_S: Final = 2.0
 UNACKNOWLEDGED_MS: Final = 5000
@@ -310,6 +311,7 @@ def _connected(host: str, port: int) -> socket.socket:
     connection = socket.create_connection((host, port), timeout=CONNECT_WITHIN_S)
     connection.setblocking(False)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
     if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux: a vehicle switched off does not say good-bye
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
     return connection
@@ -319,7 +321,7 @@ def _serial_port(device: str, baud: int) -> serial.Serial:
     """Opened and set up by pyserial, but read and written by its descriptor: pyserial's `write` waits for room."""
     try:
         return serial.Serial(device, baud, timeout=0, exclusive=True)
-    except ValueError as error:  # a baud rate that the device does not know
+    except (ValueError, OverflowError, termios.error) as error:  # such as a baud rate that no device knows
         raise OSError(str(error)) from error
 
 

@@ -1,0 +1,110 @@
+"""The other end of a link: a socket of the operating system and a vehicle's MAVLink identity."""
+
+import socket
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, Self
+
+from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
+from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message
+from app.vehicles.mavlink.link import Link, Received
+
+LOOPBACK: Final = "127.0.0.1"
+SOON_S: Final = 5.0
+"""Far longer than anything on the loopback interface takes."""
+
+
+class Speaker:
+    """A vehicle's end over UDP: says what it is told to, and keeps what it hears."""
+
+    def __init__(self, dialect: Dialect, *, system: int = 31, component: int = 1, key: bytes | None = None) -> None:
+        self.dialect = dialect
+        self.codec = dialect.codec(system=system, component=component, signing_key=key)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind((LOOPBACK, 0))
+        self.ground = (LOOPBACK, free_port())
+        self.frames: list[bytes] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.socket.close()
+
+    @property
+    def port(self) -> int:
+        port: int = self.socket.getsockname()[1]
+        return port
+
+    @property
+    def address(self) -> UdpAddress:
+        """Where a ground station reaches it, speaking from the one port that it sends to."""
+        return UdpAddress(LOOPBACK, self.port, self.ground[1])
+
+    @property
+    def ground_address(self) -> UdpInAddress:
+        """Where a ground station waits for it."""
+        return UdpInAddress(*self.ground)
+
+    def frame(self, kind: str, **fields: FieldValue) -> bytes:
+        return self.codec.pack(self.dialect.message(kind, fields))
+
+    def say(self, kind: str, **fields: FieldValue) -> None:
+        self.send(self.frame(kind, **fields))
+
+    def send(self, datagram: bytes) -> None:
+        self.socket.sendto(datagram, self.ground)
+
+    def beat(self) -> None:
+        self.send(heartbeat(self))
+
+    def hear(self, timeout_s: float = SOON_S) -> list[Message]:
+        """The messages of the next datagram, none after the time-out."""
+        self.socket.settimeout(timeout_s)
+        try:
+            frame = self.socket.recv(4096)
+        except TimeoutError:
+            return []
+        self.frames.append(frame)
+        return self.codec.parse(frame)
+
+
+def heartbeat(speaker: Speaker, *, autopilot: int = 3, kind: int = 2) -> bytes:
+    """A frame saying that this is a quadrotor flown by ArduPilot, unless told otherwise."""
+    return speaker.frame(
+        "HEARTBEAT", type=kind, autopilot=autopilot, base_mode=0, custom_mode=0, system_status=3, mavlink_version=3
+    )
+
+
+def position(time_boot_ms: int, z: float = 0.0) -> dict[str, FieldValue]:
+    """The fields of LOCAL_POSITION_NED."""
+    return {"time_boot_ms": time_boot_ms, "x": 0.0, "y": 0.0, "z": z, "vx": 0.0, "vy": 0.0, "vz": 0.0}
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def collect(link: Link, count: int) -> list[Received]:
+    """The next `count` messages of the link, or as many as come soon."""
+    found: list[Received] = []
+    until_s = time.monotonic() + SOON_S
+    while len(found) < count and time.monotonic() < until_s:
+        found += link.receive(0.1)
+    return found
+
+
+def becomes(condition: Callable[[], bool]) -> bool:
+    """Whether it comes true soon."""
+    until_s = time.monotonic() + SOON_S
+    while time.monotonic() < until_s:
+        if condition():
+            return True
+        time.sleep(0.005)
+    return False

@@ -1,0 +1,220 @@
+"""Bytes over real sockets and a real terminal line."""
+
+import os
+import pty
+import socket
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress, UdpAddress, UdpInAddress
+from app.vehicles.mavlink.transports import BACKLOG, LinkError, Transport, open_transport
+from tests.vehicles.mavlink.speaking import LOOPBACK, SOON_S, becomes, free_port
+
+
+def hear(transport: Transport, size: int) -> bytes:
+    """The next `size` bytes or more, or what comes soon."""
+    data = b""
+    until_s = time.monotonic() + SOON_S
+    while len(data) < size and time.monotonic() < until_s:
+        data += b"".join(piece for piece, _ in transport.read(0.1))
+    return data
+
+
+@pytest.fixture
+def vehicle() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind((LOOPBACK, 0))
+        vehicle.settimeout(SOON_S)
+        yield vehicle
+
+
+# ---- UDP
+
+
+def test_only_the_vehicles_own_address_is_heard_and_others_are_counted(vehicle: socket.socket) -> None:
+    local = free_port()
+    with (
+        closing(open_transport(UdpAddress(LOOPBACK, vehicle.getsockname()[1], local))) as transport,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        stranger.sendto(b"stranger", (LOOPBACK, local))
+        vehicle.sendto(b"vehicle", (LOOPBACK, local))
+        assert hear(transport, 7) == b"vehicle"
+        assert transport.foreign == 1
+        assert transport.write(b"command")
+        assert vehicle.recvfrom(100) == (b"command", (LOOPBACK, local))
+
+
+def test_a_vehicle_that_is_not_there_yet_is_no_error(vehicle: socket.socket) -> None:
+    """The operating system reports "port unreachable"; a drone that boots later must be heard all the same."""
+    port, local = free_port(), free_port()
+    with closing(open_transport(UdpAddress(LOOPBACK, port, local))) as transport:
+        for _ in range(3):
+            transport.write(b"anybody?")
+            assert transport.read(0.01) == []
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
+            late.bind((LOOPBACK, port))
+            late.sendto(b"here", (LOOPBACK, local))
+            assert hear(transport, 4) == b"here"
+
+
+def test_at_our_own_address_everybody_is_heard_until_one_is_adopted(vehicle: socket.socket) -> None:
+    local = free_port()
+    with (
+        closing(open_transport(UdpInAddress(LOOPBACK, local))) as transport,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        assert transport.remote is None
+        assert not transport.write(b"to whom?")
+        stranger.sendto(b"one", (LOOPBACK, local))
+        vehicle.sendto(b"two", (LOOPBACK, local))
+        assert hear(transport, 6) == b"onetwo"
+        transport.adopt(vehicle.getsockname())
+        stranger.sendto(b"three", (LOOPBACK, local))
+        vehicle.sendto(b"four", (LOOPBACK, local))
+        assert hear(transport, 4) == b"four"
+        assert transport.foreign == 1
+        assert transport.write(b"command")
+        assert vehicle.recv(100) == b"command"
+
+
+def test_a_port_that_another_program_listens_at_is_refused(vehicle: socket.socket) -> None:
+    with pytest.raises(LinkError, match="Address already in use") as refusal:
+        open_transport(UdpInAddress(*vehicle.getsockname()))
+    assert "no other program" in refusal.value.hint
+
+
+def test_a_host_without_an_address_is_refused() -> None:
+    with pytest.raises(LinkError, match=r"udp:drone\.invalid:4245 could not be opened"):
+        open_transport(UdpAddress("drone.invalid", 4245))
+
+
+def test_a_burst_is_read_to_its_last_datagram(vehicle: socket.socket) -> None:
+    local = free_port()
+    with closing(open_transport(UdpAddress(LOOPBACK, vehicle.getsockname()[1], local))) as transport:
+        for number in range(1000):
+            vehicle.sendto(b"%04d" % number, (LOOPBACK, local))
+        assert hear(transport, 4000) == b"".join(b"%04d" % number for number in range(1000))
+
+
+def test_a_reader_that_waits_is_woken_by_another_thread() -> None:
+    with closing(open_transport(UdpInAddress(LOOPBACK, free_port()))) as transport:
+        start_s = time.monotonic()
+        waker = threading.Timer(0.05, transport.wake)
+        waker.start()
+        assert transport.read(60.0) == []
+        assert time.monotonic() - start_s < SOON_S
+        waker.join()
+
+
+# ---- TCP
+
+
+def test_a_broken_connection_is_silence_until_it_is_open_again() -> None:
+    with socket.create_server((LOOPBACK, 0)) as server:
+        address = TcpAddress(LOOPBACK, server.getsockname()[1])
+        with closing(open_transport(address)) as transport:
+            first, _ = server.accept()
+            first.sendall(b"first")
+            assert hear(transport, 5) == b"first"
+            first.close()
+            assert becomes(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
+            server.settimeout(SOON_S)
+            reader = threading.Thread(target=lambda: setattr(reader, "heard", hear(transport, 6)))
+            reader.start()
+            second, _ = server.accept()
+            with second:
+                second.sendall(b"second")
+                reader.join()
+                assert vars(reader)["heard"] == b"second"
+                assert transport.write(b"command")
+                second.settimeout(SOON_S)
+                assert second.recv(100) == b"command"
+
+
+def test_a_vehicle_that_takes_no_connections_is_refused() -> None:
+    with pytest.raises(LinkError, match="Connection refused"):
+        open_transport(TcpAddress(LOOPBACK, free_port()))
+
+
+def test_writing_never_waits_for_a_peer_that_does_not_read() -> None:
+    """What was taken arrives whole and in order; the rest is refused rather than sent much later."""
+    with (
+        socket.create_server((LOOPBACK, 0)) as server,
+        closing(open_transport(TcpAddress(LOOPBACK, server.getsockname()[1]))) as transport,
+    ):
+        peer, _ = server.accept()
+        taken = bytearray()
+        with peer:
+            start_s = time.monotonic()
+            while transport.write(block := b"%08d" % len(taken) * 64):
+                taken += block
+            assert time.monotonic() - start_s < SOON_S
+            assert len(taken) > BACKLOG
+            arrived = bytearray()
+            peer.settimeout(SOON_S)
+            while len(arrived) < len(taken):
+                transport.read(0.0)
+                arrived += peer.recv(1 << 20)
+            assert arrived == taken
+
+
+# ---- a serial line
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> Iterator[tuple[int, Path]]:
+    """The vehicle's end of a line, and the name of the device that is ours."""
+    vehicle, device = plugged(tmp_path / "ttyRadio")
+    yield vehicle, device
+    os.close(vehicle)
+
+
+def plugged(name: Path) -> tuple[int, Path]:
+    vehicle, ours = pty.openpty()
+    tty.setraw(ours)
+    name.unlink(missing_ok=True)
+    name.symlink_to(os.ttyname(ours))
+    os.close(ours)
+    return vehicle, name
+
+
+def test_a_serial_line_carries_every_byte_both_ways(line: tuple[int, Path]) -> None:
+    vehicle, device = line
+    everything = bytes(range(256))
+    with closing(open_transport(SerialAddress(str(device), 57600))) as transport:
+        os.write(vehicle, everything)
+        assert hear(transport, 256) == everything
+        assert transport.remote == (str(device), 57600)
+        assert transport.write(everything)
+        assert os.read(vehicle, 1000) == everything
+        assert transport.read(0.01) == []
+
+
+def test_a_radio_that_is_pulled_out_and_put_back_is_heard_again(tmp_path: Path) -> None:
+    vehicle, device = plugged(tmp_path / "ttyRadio")
+    with closing(open_transport(SerialAddress(str(device), 57600))) as transport:
+        os.write(vehicle, b"before")
+        assert hear(transport, 6) == b"before"
+        os.close(vehicle)
+        assert becomes(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
+        vehicle, _ = plugged(device)
+        assert becomes(lambda: transport.read(0.05) == [] and transport.write(b"after"))
+        assert os.read(vehicle, 100) == b"after"
+    os.close(vehicle)
+
+
+def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="No such file"):
+        open_transport(SerialAddress(str(tmp_path / "ttyUSB0"), 57600))
+
+
+def test_a_baud_rate_of_no_device_is_refused(line: tuple[int, Path]) -> None:
+    with pytest.raises(LinkError, match="could not be opened"):
+        open_transport(SerialAddress(str(line[1]), 10**12))
