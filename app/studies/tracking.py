@@ -21,6 +21,7 @@ from app.studies.f16 import (
     MethodResult,
     Showcase,
     showcase,
+    start,
     study,
     truth,
 )
@@ -147,8 +148,7 @@ def _starts(on_progress: Progress) -> Iterator[Row]:
     for perturbation, expected in EXPECTED_START.items():
         errors = []
         for seed in range(SEEDS):
-            inaccurate = PitchTracking({"perturbation": perturbation, "model_seed": seed})
-            errors.append(_true_error(model_optimum(inaccurate, inaccurate.space, inaccurate.space.default).gains))
+            errors.append(_true_error(start(perturbation, seed).gains))
             done += 1
             on_progress(_FROM_SHOWCASE + share * done, f"models' optima at {_percent(perturbation)}, seed {seed}")
         yield Row(

@@ -6,7 +6,7 @@ single one can be told from the scatter as such: Ïƒ is pooled over the groups, â
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -19,9 +19,7 @@ from app.core.statistics import Group, pooled, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
 from app.studies.gate import overruled_for
 from app.studies.results import OVERRULE, Progress, Result, Row, marks, ratio
-from app.vehicles.base import FlightOrder
-from app.vehicles.open import open_vehicle
-from app.vehicles.twin import TWIN
+from app.studies.vehicles import fly, population
 
 GROUPS: Final = 200
 REPEATS: Final = 10
@@ -44,7 +42,7 @@ class RepeatedPolicy:
 
     @property
     def named_gains(self) -> dict[str, float]:
-        return dict(zip(get_experiment("takeoff").space.names, map(float, self.gains), strict=True))
+        return _named(self.gains)
 
 
 POLICIES: Final = (
@@ -99,18 +97,19 @@ def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_group
 def repeated_errors(gains: tuple[int, int, int], *, seed: int, group: int, fade: float = 0.0) -> Vector:
     """Errors of ten flights of one policy on one battery of the twin, shape (10,): what differs is the twin's scatter
     and, with `fade`, the thrust, which falls from flight to flight by that share in all."""
-    experiment = get_experiment("takeoff")
-    hover = next(float(option.default) for option in TWIN.options if option.name == "hover_throttle")
+    (twin,) = population("twin", 1, seed)
+    hover = float(twin.options["hover_throttle"])
     errors = np.empty(REPEATS)
     for flight in range(REPEATS):
         weaker = 1.0 - fade * flight / (REPEATS - 1)
-        safe_gains = experiment.space.mapping(experiment.space.default)
-        with open_vehicle("twin", {"hover_throttle": hover / weaker}, safe_gains=safe_gains) as vehicle:
-            vehicle.stage(dict(zip(experiment.space.names, gains, strict=True)))
-            order = FlightOrder(seed=flight_seed(seed, group * REPEATS + flight + 1))
-            record = vehicle.fly(order, on_sample=lambda _: None, should_abort=lambda: None)
-        errors[flight] = experiment.error(record.trajectory)
+        flown = replace(twin, options={**twin.options, "hover_throttle": hover / weaker})
+        record = fly(flown, _named(gains), flight_seed(seed, group * REPEATS + flight + 1))
+        errors[flight] = get_experiment("takeoff").error(record)
     return errors
+
+
+def _named(gains: tuple[int, int, int]) -> dict[str, float]:
+    return dict(zip(get_experiment("takeoff").space.names, map(float, gains), strict=True))
 
 
 def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable[[int], None]) -> Repeats:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.vehicles.lti import LOG_NOISE
+from app.vehicles.lti import LOG_NOISE, whole_flight
 from app.vehicles.open import open_vehicle
 from tests.vehicles.flying import HAND, TRACKING, Watcher, flown, fly
 
@@ -18,6 +18,18 @@ def test_the_aircraft_flies_as_the_experiments_truth() -> None:
     assert set(flight.channels) == set(model.channels)
     for name, values in flight.channels.items():
         assert values == pytest.approx(model[name], abs=1e-9)
+
+
+@pytest.mark.parametrize(("gains", "log_noise"), [(TRACKING, 0.0), (HAND, 1.5), (RUNAWAY, 1.0)])
+def test_a_flight_in_one_call_is_the_flight_of_the_vehicle_seam(gains: dict[str, float], log_noise: float) -> None:
+    quick, seam = (
+        whole_flight(gains, log_noise=log_noise, seed=5),
+        flown("lti", {"log_noise": log_noise}, gains, seed=5),
+    )
+    np.testing.assert_array_equal(quick.time_s, seam.time_s)
+    assert list(quick.channels) == list(seam.channels)
+    for name, values in seam.channels.items():
+        np.testing.assert_array_equal(quick[name], values, err_msg=name)
 
 
 def test_the_records_noise_is_as_large_as_it_says_and_leaves_the_flight_alone() -> None:

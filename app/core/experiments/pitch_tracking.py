@@ -122,6 +122,7 @@ class PitchTracking:
         perturbation = float(self._options["perturbation"])
         self._system: Final = perturbed(perturbation, int(self._options["model_seed"]))
         self.model_parameters: Final = _parameters(perturbation) if parameters is None else parameters
+        self._kept: tuple[bytes, Matrix] | None = None
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The experiment with another inaccurate model; what is not among `options` has its default."""
@@ -152,6 +153,16 @@ class PitchTracking:
         multipliers[..., rows, columns] = model
         return np.asarray(self._system * np.exp(multipliers))
 
+    def _moves(self, model: Matrix | Vector) -> Matrix:
+        """Motion over one step, shape (k, 5, 7). A search asks for the same model hundreds of times: the last one that
+        came alone is kept."""
+        if model.ndim > 1:
+            return transitions(self.systems(model))
+        key, kept = model.tobytes(), self._kept
+        if kept is None or kept[0] != key:
+            kept = self._kept = key, transitions(self.systems(model[np.newaxis]))
+        return kept[1]
+
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the model with every channel."""
         errors, detail = track(gains, transitions(self.systems(model)), _SAMPLES)
@@ -159,7 +170,7 @@ class PitchTracking:
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         """Pitch error of many policies, each on its own model or all on one: gains (k, 6) → (k, 3001)."""
-        return track_batch(gains, transitions(self.systems(np.atleast_2d(model))), _SAMPLES)
+        return track_batch(gains, self._moves(model), _SAMPLES)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
         """What every recorded step did beyond the model's, shape (3000, 5) in the source's units; zero once the run
@@ -174,7 +185,7 @@ class PitchTracking:
 
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
         """`outputs` with `disturbances` added to the states after each step."""
-        return track_batch(gains, transitions(self.systems(np.atleast_2d(model))), _SAMPLES, disturbances)
+        return track_batch(gains, self._moves(model), _SAMPLES, disturbances)
 
     def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:  # noqa: ARG002
         """None that is known beside its bounds: it is flown in simulation only."""
@@ -208,4 +219,7 @@ def states_and_commands(trajectory: Trajectory, grid_s: Samples) -> Matrix | Non
 def _counted(errors: Matrix) -> Matrix:
     """Absolute errors; one that has reached the largest counts as that from there on."""
     size = np.abs(errors)
-    return np.where(np.maximum.accumulate(size >= LARGEST_ERROR_RAD, axis=-1), LARGEST_ERROR_RAD, size)
+    is_largest = size >= LARGEST_ERROR_RAD
+    if not is_largest.any():
+        return np.asarray(size)
+    return np.where(np.maximum.accumulate(is_largest, axis=-1), LARGEST_ERROR_RAD, size)
