@@ -195,14 +195,27 @@ def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
     assert again.json()["definition"]["start"] == start
 
 
-def test_the_second_proposal_of_a_warm_start_says_what_was_taken_over(
-    client: TestClient, database: Database, donor: int
+@pytest.mark.parametrize(
+    ("settling_s", "decided", "agreement"),
+    [
+        (1.0, "The model fitted to the other vehicle's flight takes the data sheet's place: ", "agreement 100%"),
+        (6.0, "Nothing is taken over from the other vehicle: ", "less than 50%"),
+    ],
+)
+def test_the_proposals_after_a_warm_starts_first_flight_say_what_was_taken_over(
+    client: TestClient, database: Database, donor: int, settling_s: float, decided: str, agreement: str
 ) -> None:
+    """The donor's best flight settled within 1 s; what this vehicle's first one shows decides for all that follow."""
     definition = {**LONG, "strategy": "gradient", "start": {"kind": "campaign", "donor": {"campaign_id": donor}}}
     campaign = create_ready_campaign(client, database, definition=definition)
-    create_flown_trial(client, database, campaign["id"], 1.0)
-    notes = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["explanation"]["notes"]
-    assert any("agreement 100%" in note for note in notes)
+    path = f"/api/campaigns/{campaign['id']}/proposal"
+    assert not any("other vehicle" in note for note in get(client, path)["proposal"]["explanation"]["notes"])
+    for flown_s in (settling_s, 0.8 * settling_s):
+        create_flown_trial(client, database, campaign["id"], flown_s)
+        proposal = get(client, path)["proposal"]
+        (note,) = [note for note in proposal["explanation"]["notes"] if "other vehicle" in note]
+        assert note.startswith(decided)
+        assert agreement in note
 
 
 def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, database: Database, donor: int) -> None:
