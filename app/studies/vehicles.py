@@ -1,10 +1,7 @@
 """Random vehicles to try a tuning method on: how they fly, what is unsafe, and how well each could fly at best."""
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -166,31 +163,13 @@ class Optimum:
     error: float
 
 
-def own_optimum(vehicle: SampledVehicle, *, cache: Path | None = None) -> Optimum:
+def own_optimum(vehicle: SampledVehicle) -> Optimum:
     """The gains in the default bounds with the lowest noise-free error.
 
     The optimum of the takeoff model most like the vehicle, searched from many starts, then refined on the vehicle
     itself: over whole counts for twins; for JSBSim, which flies a hundred times slower, by Nelder–Mead and coarser
-    steps. The valley is flat: what is left is below 0.4 % of the error for twins. `cache`: a folder in which results
-    are kept.
+    steps. The valley is flat: what is left is below 0.4 % of the error for twins.
     """
-    file = cache / f"{_digest(vehicle)}.json" if cache else None
-    if file and file.is_file():
-        kept = json.loads(file.read_text(encoding="utf-8"))
-        return Optimum(kept["gains"], kept["error"])
-    found = _search(vehicle)
-    if file:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps({"gains": dict(found.gains), "error": found.error}), encoding="utf-8")
-    return found
-
-
-def _digest(vehicle: SampledVehicle) -> str:
-    described = json.dumps([vehicle.kind, dict(vehicle.quiet.options)], sort_keys=True)
-    return hashlib.sha256(described.encode() + Path(__file__).read_bytes()).hexdigest()[:24]
-
-
-def _search(vehicle: SampledVehicle) -> Optimum:
     space, (start, evaluations, coarsest, finest) = _TAKEOFF.space, _REFINEMENT[vehicle.kind]
 
     def error(gains: Vector) -> float:
