@@ -56,7 +56,8 @@ _PLACES: Final = {
 class TwinFlight:
     """A simulation by the protocol of `app.vehicles.simulated`.
 
-    `options` are those of the kind, complete. What differs between flights depends on `seed` alone.
+    `options` are those of the kind, complete. What differs between flights depends on `seed` alone; after `MOST_STEPS`
+    its gusts come again. `autopilot` is the loop's memory, the state of app.core.control.vertical_loop first.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:
@@ -71,7 +72,7 @@ class TwinFlight:
         self._datum_m = float(_DATUM_SD_M * datum)
         self._gusts = gusts(gust, MOST_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=_GUST_CORRELATION_S)
         self._resting = round(max(options["start_latency_s"] + _START_SD_S * start, 0.0) * RATE_HZ)
-        self._autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
+        self.autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
         self._plant = np.zeros(3)
         self._past = np.zeros((2, PAST))
         self._done = 0
@@ -81,15 +82,15 @@ class TwinFlight:
         square."""
         rows = np.empty((steps, len(CHANNELS)))
         time_s = (self._done + np.arange(steps)) * STEP_S
-        rows[:, BATTERY] = _BATTERY_V * np.sqrt(1.0 - self._sag_1_s * time_s)
+        rows[:, BATTERY] = _BATTERY_V * np.sqrt(np.maximum(1.0 - self._sag_1_s * time_s, 0.0))
         fly_simple_model(
-            self._autopilot,
+            self.autopilot,
             command,
             self._plant,
             self._past,
             self._model,
             self._datum_m,
-            self._gusts[self._done : self._done + steps],
+            np.take(self._gusts, np.arange(self._done, self._done + steps), mode="wrap"),
             self._resting,
             self._done,
             rows,

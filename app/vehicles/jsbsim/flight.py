@@ -60,7 +60,8 @@ def new_aircraft() -> jsbsim.FGFDMExec:
 class JsbsimFlight:
     """A simulation by the protocol of `app.vehicles.simulated`.
 
-    `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone.
+    `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone; after `MOST_STEPS` they
+    come again. `autopilot` is the loop's memory, the state of app.core.control.vertical_loop first.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:
@@ -80,7 +81,7 @@ class JsbsimFlight:
         self._configure(options)
         self._resting_steps = round(options["start_latency_s"] * RATE_HZ)
         self._sags = options["battery_sag"] > 0.0
-        self._autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
+        self.autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
         self._done = 0
         self._ground_m = self._settle()
 
@@ -92,14 +93,15 @@ class JsbsimFlight:
         sink_ft_s = self._property("velocities/v-down-fps").get_double_value
         cosine_of_tilt = self._property("attitude/cosine-of-tilt").get_double_value
         set_thrust = self._property("motors/thrust-norm").set_double_value
-        run, autopilot, done, resting = self._fdm.run, self._autopilot, self._done, self._resting_steps
-        for i, (row, noise_m) in enumerate(zip(rows, self._noise_m[done : done + steps].tolist(), strict=True)):
+        run, autopilot, done, resting = self._fdm.run, self.autopilot, self._done, self._resting_steps
+        noise_m = np.take(self._noise_m, np.arange(done, done + steps), mode="wrap").tolist()
+        for i, (row, error_m) in enumerate(zip(rows, noise_m, strict=True)):
             altitude_m = altitude_ft() * _FOOT_M - self._ground_m
             set_thrust(
                 control(
                     autopilot,
                     command,
-                    altitude_m + noise_m,
+                    altitude_m + error_m,
                     sink_ft_s() * -_FOOT_M,
                     cosine_of_tilt(),
                     done + i >= resting,
@@ -154,5 +156,5 @@ class JsbsimFlight:
         """What only some flights have: gusts in, battery voltage out."""
         if self._gusts_ft_s:
             for axis, series in zip(("north", "east", "down"), self._gusts_ft_s, strict=True):
-                self._fdm[f"atmosphere/gust-{axis}-fps"] = series[step]
+                self._fdm[f"atmosphere/gust-{axis}-fps"] = series[step % MOST_STEPS]
         row[BATTERY] = _FULL_BATTERY_V * self._fdm["battery/voltage-norm"]
