@@ -160,6 +160,57 @@ def reproduce(
     run(what.value, full=full, trace=trace, json_out=json_out)
 
 
+@app.command("sim-drone")
+@plainly
+def sim_drone(
+    autopilot: Annotated[str, typer.Option(help="Whose manners it has: paparazzi, ardupilot or px4.")] = "paparazzi",
+    link: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            show_default=False,
+            help="Where the ground station listens and, after @, where the drone does: udp:HOST:PORT[@LOCALPORT]. "
+            "[default: udp:127.0.0.1:4244@4245 for Paparazzi, else udp:127.0.0.1:14550]",
+        ),
+    ] = None,
+    vehicle: Annotated[str, typer.Option(help="Its body: jsbsim or twin.")] = "jsbsim",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=NUMBER", show_default=False, help="A setting of the body. Repeatable."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of its first flight; each later one has the next.")] = 1,
+    speed: Annotated[float, typer.Option(help="Its time over the clock's.")] = 1.0,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[:DURATION]@T",
+            show_default=False,
+            help="What goes wrong, T s after the takeoff command or @connect; docs/sim-drone.md lists it. Repeatable.",
+        ),
+    ] = None,
+    system: Annotated[
+        int | None, typer.Option(min=1, max=255, show_default=False, help="Its MAVLink system id.")
+    ] = None,
+    any_network: Annotated[
+        bool, typer.Option("--any-network", help="Allow links that lead beyond this computer.")
+    ] = False,
+) -> None:
+    """Serve a simulated drone that speaks MAVLink, until it is stopped."""
+    from app.commands.sim_drone import run_sim_drone
+
+    run_sim_drone(
+        autopilot,
+        link=link,
+        vehicle=vehicle,
+        settings=settings or [],
+        seed=seed,
+        speed=speed,
+        faults=fault or [],
+        system=system,
+        any_network=any_network,
+    )
+
+
 @controller.command()
 @plainly
 def replay(

@@ -1,0 +1,87 @@
+"""`gainline sim-drone`: a drone of the program's own simulation that speaks MAVLink like a real autopilot."""
+
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+from app.commands.console import console
+from app.errors import InputError, Problem
+from app.vehicles.mavlink.addresses import is_loopback, parse
+from app.vehicles.mavlink.clock import ScaledClock
+from app.vehicles.mavlink.transports import open_transport
+from app.vehicles.simdrone.autopilots.registry import get_autopilot
+from app.vehicles.simdrone.body import new_body
+from app.vehicles.simdrone.drone import Drone
+from app.vehicles.simdrone.faults import parse_fault
+from app.vehicles.simdrone.server import Server
+
+
+def run_sim_drone(
+    autopilot: str,
+    *,
+    link: str | None,
+    vehicle: str,
+    settings: Sequence[str],
+    seed: int,
+    speed: float,
+    faults: Sequence[str],
+    system: int | None,
+    any_network: bool,
+) -> None:
+    """Serve the drone until SIGINT or SIGTERM; the main thread only. Raises InputError for what cannot be had, and
+    LinkError when the link cannot be opened."""
+    kind = get_autopilot(autopilot)
+    address = parse(link or kind.link)
+    if not any_network and not is_loopback(address):
+        raise InputError(
+            "A simulated drone keeps to this computer.",
+            problems=(Problem("--link", f"{address} leads elsewhere"),),
+            hint="Anybody who reaches it can fly it; if that is meant, add --any-network.",
+        )
+    planned = [parse_fault(text) for text in faults]
+    clock = ScaledClock(speed)
+    number = kind.system if system is None else system
+    body = new_body(vehicle, _options(settings), seed=seed)
+    drone = Drone(body, lambda fresh: kind.make(fresh, number), planned)
+    transport = open_transport(address)
+    try:
+        server = Server(drone, transport, clock)
+        out = console()
+        out.print(f"{kind.title}, system {number}, in the body of {vehicle}, on {address}.")
+        out.print(f"Its time runs {speed:g} times as fast as the clock's. Ctrl-C switches it off.")
+        with _stopped_by_signals(server):
+            server.run()
+        if server.lost_s > 0.0:
+            out.print(f"This computer was too slow: the drone's clock is {server.lost_s:.1f} s late.")
+    finally:
+        transport.close()
+
+
+def _options(settings: Sequence[str]) -> dict[str, float]:
+    """`NAME=NUMBER`, each an option of the body's vehicle kind."""
+    options: dict[str, float] = {}
+    for setting in settings:
+        name, _, number = setting.partition("=")
+        try:
+            options[name] = float(number)
+        except ValueError as error:
+            raise InputError(
+                "This setting cannot be used.",
+                problems=(Problem(f"--set {name}", f"must be NAME=NUMBER, got {setting!r}"),),
+                hint="For example --set wind_m_s=3; docs/vehicles.md lists the settings of jsbsim and twin.",
+            ) from error
+    return options
+
+
+@contextmanager
+def _stopped_by_signals(server: Server) -> Iterator[None]:
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        server.stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

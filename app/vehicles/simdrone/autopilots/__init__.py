@@ -1,0 +1,1 @@
+"""The autopilots a simulated drone can have."""

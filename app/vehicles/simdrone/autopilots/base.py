@@ -1,0 +1,82 @@
+"""What every autopilot of a simulated drone is to the drone around it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final, Protocol
+
+from app.vehicles.mavlink.dialects import Dialect, FieldValue
+from app.vehicles.simdrone.body import TICK_S
+
+Fields = Mapping[str, FieldValue]
+
+ARMED: Final = 128
+"""The bit of HEARTBEAT.base_mode."""
+
+# MAV_RESULT
+ACCEPTED: Final = 0
+TEMPORARILY_REJECTED: Final = 1
+DENIED: Final = 2
+UNSUPPORTED: Final = 3
+FAILED: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """A message on its way out, not yet packed. `counter` names the sequence counter that numbers it: Paparazzi has
+    one for each of its source files. `system` is the sender's id where it is not the vehicle's own."""
+
+    kind: str
+    fields: Fields
+    counter: str = ""
+    system: int | None = None
+
+
+class Autopilot(Protocol):
+    """Flies its body, hears bytes and has letters to send; its time is counted in ticks since it was switched on."""
+
+    dialect: Dialect
+    system: int
+    component: int
+    refuses_arming: bool
+    """A fault: arming is refused in this autopilot's own manner."""
+    ignores_parameters: bool
+    """A fault: PARAM_SET changes nothing and is not answered."""
+    took_off: bool
+    """Whether a takeoff was ever commanded."""
+
+    def receive(self, data: bytes) -> None:
+        """Take in what the radio received."""
+        ...
+
+    def tick(self) -> list[Letter]:
+        """Let one tick of TICK_S pass: answer what was heard, fly the body on, and return what is to be sent."""
+        ...
+
+
+@dataclass(slots=True)
+class Timetable:
+    """Telemetry at fixed periods, rounded down to whole ticks."""
+
+    ticks: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, periods_s: Mapping[str, float]) -> "Timetable":
+        table = cls()
+        for kind, period_s in periods_s.items():
+            table.set(kind, period_s)
+        return table
+
+    def set(self, kind: str, period_s: float) -> None:
+        """From now on send `kind` every `period_s` seconds; 0 or less: never."""
+        if period_s > 0.0:
+            self.ticks[kind] = whole_ticks(period_s)
+        else:
+            self.ticks.pop(kind, None)
+
+    def due(self, tick: int) -> list[str]:
+        return [kind for kind, period in self.ticks.items() if tick % period == 0]
+
+
+def whole_ticks(seconds: float) -> int:
+    """At least one."""
+    return max(int(seconds / TICK_S), 1)

@@ -1,0 +1,135 @@
+"""The settings of the AR.Drone 2 airframe: names as MAVLink shows them, in order, with their values after the start.
+
+A name is what 16 characters hold of the C variable's; longer ones end alike, and none of 16 characters is ever found.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from app.core.control.fixed_point import INT32_MAX, INT32_MIN
+
+NAME_LIMIT: Final = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One setting; a whole default stands for an integer in the autopilot, into which every value is cut."""
+
+    name: str
+    default: int | float
+
+    def held(self, value: float) -> float:
+        """What is left of `value` in the autopilot's variable."""
+        if isinstance(self.default, float):
+            return value
+        return float(min(max(math.trunc(value), INT32_MIN), INT32_MAX)) if math.isfinite(value) else float(INT32_MIN)
+
+
+class Settings:
+    """The values held, from the defaults on."""
+
+    def __init__(self) -> None:
+        self._values: list[float] = [float(setting.default) for setting in SETTINGS]
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[_PLACES[name]]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        place = _PLACES[name]
+        self._values[place] = SETTINGS[place].held(value)
+
+    def count(self, name: str) -> int:
+        """A setting that is an integer in the autopilot."""
+        return int(self[name])
+
+    def at(self, index: int) -> tuple[str, float]:
+        return SETTINGS[index].name, self._values[index]
+
+
+def find(name: str) -> int | None:
+    """The place of the setting that this name finds, if any; case matters."""
+    return _PLACES.get(name) if len(name) < NAME_LIMIT else None
+
+
+SETTINGS: Final = (
+    Setting("tel_mod_Mav", 0),
+    Setting("tel_mod_Mai", 0),
+    Setting("aut_mod_aut", 13),
+    Setting("kil_thr", 1),
+    Setting("aut_pow_swi", 0),
+    Setting("aut_mod", 13),
+    Setting("gui_v_kp", 283),
+    Setting("gui_v_kd", 82),
+    Setting("gui_v_ki", 13),
+    Setting("gui_v_nom_thr", 0.655),
+    Setting("gui_v_ada_thr_en", 0),
+    Setting("gui_v_z_sp", -23),
+    Setting("gui_h_use_ref", 1),
+    Setting("gh_ref_max_spe", 5.0),
+    Setting("gui_h_app_for_by", 0.0),
+    Setting("gh_ref_tau", 0.5),
+    Setting("gh_ref_ome", 1.169371),
+    Setting("gh_ref_zet", 0.85),
+    Setting("gui_h_gai_p", 79),
+    Setting("gui_h_gai_d", 100),
+    Setting("gui_h_gai_i", 30),
+    Setting("gui_h_gai_v", 0),
+    Setting("gui_h_gai_a", 0),
+    Setting("gui_h_sp_pos_x", 0),
+    Setting("gui_h_sp_pos_y", 0),
+    Setting("fli_alt", 149.0),
+    Setting("nav_hea", 31),
+    Setting("nav_rad", 5.0),
+    Setting("nav_cli_vsp", 0.5),
+    Setting("nav_des_vsp", -0.8),
+    Setting("sta_gai_p_x", 850),
+    Setting("sta_gai_d_x", 425),
+    Setting("sta_gai_i_x", 0),
+    Setting("sta_gai_dd_x", 0),
+    Setting("sta_gai_p_y", 850),
+    Setting("sta_gai_d_y", 425),
+    Setting("sta_gai_i_y", 0),
+    Setting("sta_gai_dd_y", 0),
+    Setting("sta_gai_p_z", 1000),
+    Setting("sta_gai_d_z", 700),
+    Setting("sta_gai_i_z", 0),
+    Setting("sta_gai_dd_z", 100),
+    Setting("att_ref_qua_i_mo", 7.853981),
+    Setting("att_ref_qua_i_mo", 0.9),
+    Setting("att_ref_qua_i_mo", 7.853981),
+    Setting("att_ref_qua_i_mo", 0.9),
+    Setting("att_ref_qua_i_mo", 3.490659),
+    Setting("att_ref_qua_i_mo", 0.9),
+    Setting("nps_byp_ahr", 0),
+    Setting("nps_byp_ins", 0),
+    Setting("gps_has_fix", 1),
+    Setting("dat_ena", 1),
+    Setting("nps_ele_sup_vol", 12.4),
+    Setting("nps_atm_win_spe", 0.0),
+    Setting("nps_atm_win_dir", 0.0),
+    Setting("nps_atm_tur_sev", 0.0),
+    Setting("imu_bod_to_imu_e", 0.0),
+    Setting("imu_bod_to_imu_e", 0.0),
+    Setting("imu_bod_to_imu_e", 0.0),
+    Setting("imu_b2i_set_cur", 0),
+    Setting("mul_gps_mod", 0),
+    Setting("ahr_icq_gra_heu_", 30),
+    Setting("ahr_icq_acc_ome", 0.063),
+    Setting("ahr_icq_acc_zet", 0.9),
+    Setting("ahr_icq_mag_ome", 0.04),
+    Setting("ahr_icq_mag_zet", 0.9),
+    Setting("air_dat_qnh", 1013.315),
+    Setting("air_dat_tas_fac", 1.0),
+    Setting("air_dat_cal_qnh_", 0),
+    Setting("air_dat_cal_air", 1),
+    Setting("air_dat_cal_tas_", 1),
+    Setting("air_dat_cal_ams_", 0),
+    Setting("geo_mag_cal_onc", 0),
+    Setting("gps_nps_gps_nps_", 1),
+    Setting("dat_mav_per_sta", 1),
+    Setting("dat_mav_per_tel_", 1),
+)
+
+_PLACES: Final = {setting.name: place for place, setting in reversed(list(enumerate(SETTINGS)))}
+"""Where each name is first found."""
