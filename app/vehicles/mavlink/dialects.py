@@ -100,7 +100,7 @@ class Dialect:
         try:
             message: _Packable = known(**{name: _wire(known, name, value) for name, value in fields.items()})
             message.pack(_load(self.module).MAVLink(None))
-        except (TypeError, ValueError, IndexError, OverflowError, struct.error) as error:
+        except (AttributeError, IndexError, OverflowError, TypeError, ValueError, struct.error) as error:
             raise ValueError(f"{kind} cannot carry these fields: {error}") from error
         return message
 

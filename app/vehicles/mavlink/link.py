@@ -116,6 +116,7 @@ class Link:
         self._address, self._dialect, self._clock = address, dialect, clock
         self._identity = (system, component, signing_key)
         self._codec = self._new_codec()
+        self._heartbeat = dialect.message("HEARTBEAT", _GROUND_STATION)
         self._transport = open_transport(address)
         try:
             self._tlog = TlogWriter(tlog) if tlog else None
@@ -153,7 +154,7 @@ class Link:
 
     @property
     def log_problem(self) -> str | None:
-        """Why the telemetry log is not complete, once that is known."""
+        """Why the telemetry log is not complete, None while it is."""
         return self._tlog.problem if self._tlog else None
 
     @property
@@ -246,7 +247,7 @@ class Link:
         self._next_heartbeat_s = now_s + HEARTBEAT_EVERY_S
         is_attended = self._listeners > 0 or now_s - self._attended_s < UNATTENDED_AFTER_S
         if self._dialect.heeds_heartbeats and is_attended:
-            self._write(self._dialect.message("HEARTBEAT", _GROUND_STATION))
+            self._write(self._heartbeat)
 
     def _write(self, message: Message) -> None:
         frame = self._codec.pack(message)
@@ -323,6 +324,7 @@ _GROUND_STATION: Final[dict[str, FieldValue]] = {
     "base_mode": 0,
     "custom_mode": 0,
     "system_status": MAV_STATE_ACTIVE,
+    "mavlink_version": 3,
 }
 
 

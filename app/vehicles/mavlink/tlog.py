@@ -36,7 +36,7 @@ class TlogWriter:
 
     @property
     def problem(self) -> str | None:
-        """Why the file is not complete, once that is known."""
+        """Why the file is not complete, None while it is."""
         return self._problem
 
     def write(self, time_us: int, frame: bytes) -> None:
@@ -52,23 +52,26 @@ class TlogWriter:
             self._problem = f"{self._path} was not stored within {STORED_WITHIN_S:g} s"
 
     def _run(self) -> None:
+        more, unstored = True, b""
         with self._file:
-            more = True
             while more:
                 waiting = [self._frames.get()]
                 self._closing.wait(FLUSH_EVERY_S)
                 while not self._frames.empty():
                     waiting.append(self._frames.get())
                 more = waiting[-1] is not None
-                self._store(b"".join(record(*each) for each in waiting if each is not None))
+                unstored = self._store(unstored + b"".join(record(*each) for each in waiting if each is not None))
 
-    def _store(self, data: bytes) -> None:
-        rest = memoryview(data)
+    def _store(self, data: bytes) -> bytes:
+        """Write `data`; what the disk did not take, to be tried again before all that follows."""
         try:
-            while rest:
-                rest = rest[self._file.write(rest) :]
+            while data:
+                data = data[self._file.write(data) :]
         except OSError as error:
             self._problem = f"{self._path} is not complete: {error.strerror or error}"
+        else:
+            self._problem = None
+        return data
 
 
 def record(time_us: int, frame: bytes) -> bytes:

@@ -1,0 +1,453 @@
+"""A link and a vehicle that talk over the loopback interface."""
+
+import os
+import pty
+import socket
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
+from app.vehicles.mavlink.clock import ScaledClock
+from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, DIALECTS, PAPARAZZI, Dialect, FieldValue, number, text
+from app.vehicles.mavlink.link import INBOX, UNATTENDED_AFTER_S, Link, LinkError, LossCounter
+from tests.vehicles.mavlink.speaking import (
+    LOOPBACK,
+    SOON_S,
+    Speaker,
+    becomes,
+    collect,
+    heartbeat,
+    position,
+)
+
+GAIN: dict[str, FieldValue] = {
+    "target_system": 31,
+    "target_component": 0,
+    "param_id": "gui_v_kp",
+    "param_value": 283.0,
+    "param_type": 9,
+}
+CLOCK = ScaledClock()
+
+
+@pytest.fixture
+def paparazzi() -> Iterator[Speaker]:
+    with Speaker(PAPARAZZI, component=190) as speaker:
+        yield speaker
+
+
+@pytest.fixture
+def link(paparazzi: Speaker) -> Iterator[Link]:
+    with Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31) as link:
+        yield link
+
+
+# ---- hearing
+
+
+def test_messages_are_handed_over_in_order_with_the_time_of_their_receipt(paparazzi: Speaker, link: Link) -> None:
+    before_s = CLOCK.now_s()
+    for step in range(300):
+        paparazzi.say("LOCAL_POSITION_NED", **position(20 * step, z=-0.01 * step))
+    heard = collect(link, 300)
+    assert [number(each.message, "time_boot_ms") for each in heard] == [20 * step for step in range(300)]
+    assert number(heard[-1].message, "z") == pytest.approx(-2.99)
+    times = [each.received_s for each in heard]
+    assert before_s <= times[0]
+    assert times == sorted(times)
+    assert link.health.received == 300
+    assert (link.health.lost, link.health.bad, link.health.foreign) == (0, 0, 0)
+    assert link.health.last_packet_s == times[-1]
+
+
+def test_a_call_waits_no_longer_than_asked_in_vehicle_seconds(paparazzi: Speaker) -> None:
+    with Link(paparazzi.address, PAPARAZZI, clock=ScaledClock(100.0), target_system=31) as link:
+        start_s = time.monotonic()
+        assert link.receive(10.0) == []
+        assert 0.1 <= time.monotonic() - start_s < 2.0
+
+
+def test_another_system_at_the_vehicles_address_is_dropped_and_counted(paparazzi: Speaker, link: Link) -> None:
+    other = PAPARAZZI.codec(system=7, component=1)
+    paparazzi.send(other.pack(PAPARAZZI.message("LOCAL_POSITION_NED", position(20))))
+    paparazzi.say("LOCAL_POSITION_NED", **position(40))
+    assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [40]
+    assert link.health.foreign == 1
+    assert link.health.received == 1
+
+
+def test_another_sender_with_the_vehicles_system_id_is_dropped_and_counted(paparazzi: Speaker, link: Link) -> None:
+    with Speaker(PAPARAZZI, component=190) as impostor:
+        impostor.ground = paparazzi.ground
+        impostor.say("LOCAL_POSITION_NED", **position(20))
+        paparazzi.say("LOCAL_POSITION_NED", **position(40))
+        assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [40]
+    assert link.health.foreign == 1
+
+
+def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(paparazzi: Speaker) -> None:
+    with Link(paparazzi.address, PAPARAZZI, clock=CLOCK) as link:
+        station = Speaker(PAPARAZZI, system=255)
+        with station:
+            paparazzi.send(heartbeat(station, autopilot=8, kind=6))
+        paparazzi.say("LOCAL_POSITION_NED", **position(20))
+        assert link.receive(0.0) == []
+        paparazzi.send(heartbeat(paparazzi, autopilot=9))
+        paparazzi.say("LOCAL_POSITION_NED", **position(40))
+        beat, sample = collect(link, 2)
+        assert (beat.message.get_type(), sample.message.get_type()) == ("HEARTBEAT", "LOCAL_POSITION_NED")
+        assert link.vehicle_system == 31
+        assert link.health.foreign == 2
+        assert link.health.last_heartbeat_s == beat.received_s
+        assert link.health.last_packet_s == sample.received_s
+
+
+def test_strangers_at_our_own_address_do_not_keep_the_vehicle_out() -> None:
+    with (
+        Speaker(ARDUPILOTMEGA, system=1) as vehicle,
+        Speaker(ARDUPILOTMEGA, system=9) as stranger,
+        Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1) as link,
+    ):
+        stranger.ground = vehicle.ground
+        stranger.beat()
+        stranger.send(b"\xfd\xff")  # the beginning of a frame that would swallow what follows
+        link.send("COMMAND_LONG", **command(400))  # to nobody yet
+        assert becomes(lambda: link.health.foreign == 2)
+        vehicle.beat()
+        assert [each.message.get_srcSystem() for each in collect(link, 1)] == [1]
+        link.send("COMMAND_LONG", **command(21))
+        commands = [message for message in vehicle.hear() + vehicle.hear() if message.get_type() == "COMMAND_LONG"]
+        assert [number(message, "command") for message in commands] == [21]
+        stranger.beat()
+        assert becomes(lambda: link.health.foreign == 3)
+        assert link.health.unsent >= 1
+
+
+def command(number: int) -> dict[str, FieldValue]:
+    parameters: dict[str, FieldValue] = {f"param{index}": 0.0 for index in range(1, 8)}
+    return {"target_system": 1, "target_component": 1, "command": number, "confirmation": 0, **parameters}
+
+
+def test_noise_is_counted_and_what_follows_is_heard(paparazzi: Speaker, link: Link) -> None:
+    damaged = bytearray(paparazzi.frame("LOCAL_POSITION_NED", **position(20)))
+    damaged[10] ^= 0x10
+    paparazzi.send(bytes(damaged))
+    paparazzi.send(b"modem: OK\r\n")
+    paparazzi.say("LOCAL_POSITION_NED", **position(40))
+    assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [40]
+    assert link.health.bad == 2
+    assert link.health.lost == 0
+
+
+def test_what_is_missing_in_the_sequence_is_counted_as_lost(paparazzi: Speaker, link: Link) -> None:
+    frames = [paparazzi.frame("LOCAL_POSITION_NED", **position(20 * step)) for step in range(600)]
+    for step, frame in enumerate(frames):
+        if step % 100 != 50:
+            paparazzi.send(frame)
+    assert len(collect(link, 594)) == 594
+    assert link.health.lost == 6
+
+
+def test_a_newer_message_is_not_handed_over_yet_counts_in_the_sequence() -> None:
+    """PX4 sends ids that the dialect does not know; their checksums cannot be judged, so they are no sign of life."""
+    with (
+        Speaker(COMMON, system=1) as vehicle,
+        Link(vehicle.address, COMMON, clock=CLOCK, target_system=1) as link,
+    ):
+        vehicle.beat()
+        assert len(collect(link, 1)) == 1
+        unknown = bytearray(vehicle.frame("LOCAL_POSITION_NED", **position(20)))
+        unknown[7:10] = (60_000).to_bytes(3, "little")
+        vehicle.send(bytes(unknown))
+        vehicle.say("LOCAL_POSITION_NED", **position(40))
+        assert [each.message.get_type() for each in collect(link, 1)] == ["LOCAL_POSITION_NED"]
+        assert (link.health.lost, link.health.received) == (0, 2)
+
+
+def test_paparazzis_other_counters_are_left_out_of_the_losses() -> None:
+    losses = LossCounter(PAPARAZZI.uncounted)
+    for number_ in (10, 11, 12):
+        losses.count("LOCAL_POSITION_NED", 190, number_)
+        losses.count("SCRIPT_CURRENT", 190, 200)
+        losses.count("MISSION_ACK", 190, 77)
+    assert losses.lost == 0
+
+
+def test_overtaken_and_repeated_packets_are_not_losses() -> None:
+    losses = LossCounter(())
+    for number_ in (254, 0, 255, 0, 1, 1, 2):
+        losses.count("HEARTBEAT", 1, number_)
+    assert losses.lost == 1
+    losses.count("HEARTBEAT", 2, 100)
+    assert losses.lost == 1
+
+
+def test_a_program_that_does_not_listen_loses_the_oldest_and_is_told(
+    paparazzi: Speaker, link: Link, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert INBOX >= 50 * 60  # a minute of telemetry at least
+    monkeypatch.setattr("app.vehicles.mavlink.link.INBOX", 5)
+    for step in range(8):
+        paparazzi.say("LOCAL_POSITION_NED", **position(step))
+    assert becomes(lambda: link.health.received == 8)
+    assert [number(each.message, "time_boot_ms") for each in link.receive(1.0)] == [3, 4, 5, 6, 7]
+    assert link.health.overrun == 3
+
+
+# ---- sending
+
+
+def test_a_frame_of_mavlink_2_is_never_sent_to_paparazzi(paparazzi: Speaker, link: Link) -> None:
+    """Not even after one was received, which is what switches other programs over."""
+    newer = COMMON.codec(system=31, component=190)
+    paparazzi.send(newer.pack(COMMON.message("LOCAL_POSITION_NED", position(20))))
+    assert len(collect(link, 1)) == 1
+    for _ in range(3):
+        link.send("PARAM_SET", **GAIN)
+        (heard,) = paparazzi.hear()
+        assert (text(heard, "param_id"), number(heard, "param_value")) == ("gui_v_kp", 283.0)
+    assert [frame[0] for frame in paparazzi.frames] == [0xFE] * 3
+    assert "MAVLINK20" not in os.environ
+
+
+@pytest.mark.parametrize("dialect", [ARDUPILOTMEGA, COMMON], ids=lambda dialect: dialect.name)
+def test_others_are_sent_mavlink_2(dialect: Dialect) -> None:
+    with (
+        Speaker(dialect, system=1) as vehicle,
+        Link(vehicle.address, dialect, clock=CLOCK, target_system=1) as link,
+    ):
+        link.send("PARAM_SET", **GAIN)
+        assert vehicle.hear()
+        assert vehicle.frames[0][0] == 0xFD
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields", "reason"),
+    [
+        ("PARAM_SETT", GAIN, "no message PARAM_SETT"),
+        ("PARAM_SET", GAIN | {"gain": 1.0}, "unexpected keyword argument 'gain'"),
+        ("PARAM_SET", {"param_id": "gui_v_kp"}, "missing 4 required"),
+        ("PARAM_SET", GAIN | {"target_system": 256}, "0 <= number <= 255"),
+        ("PARAM_SET", GAIN | {"target_system": 1.5}, "required argument is not an integer"),
+        ("PARAM_SET", GAIN | {"param_value": "283"}, "not a float"),
+        ("PARAM_SET", GAIN | {"param_value": 1e300}, "float too large"),
+        ("PARAM_SET", GAIN | {"param_id": "gui_v_ada_thr_enabled"}, "param_id holds 16 characters"),
+        ("PARAM_SET", GAIN | {"param_id": "größe"}, "'ascii' codec can't encode"),
+        ("PARAM_SET", GAIN | {"param_id": 1.0}, "no attribute .split."),
+    ],
+)
+def test_what_cannot_be_sent_is_refused_to_the_caller_at_once(
+    link: Link, kind: str, fields: dict[str, FieldValue], reason: str
+) -> None:
+    with pytest.raises(ValueError, match=reason):
+        link.send(kind, **fields)
+
+
+def test_many_threads_send_and_every_message_leaves_once(paparazzi: Speaker, link: Link) -> None:
+    paparazzi.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+
+    def send(first: int) -> None:
+        for value in range(first, first + 20):
+            link.send("PARAM_SET", **GAIN | {"param_value": float(value)})
+
+    with ThreadPoolExecutor(10) as threads:
+        list(threads.map(send, range(0, 200, 20)))
+    heard = [paparazzi.hear()[0] for _ in range(200)]
+    assert sorted(number(message, "param_value") for message in heard) == [float(value) for value in range(200)]
+    assert [frame[2] for frame in paparazzi.frames] == list(range(200))  # the sequence numbers
+    assert link.health.sent == 200
+
+
+def test_a_command_is_on_the_wire_at_once_while_telemetry_streams(paparazzi: Speaker, link: Link) -> None:
+    done = threading.Event()
+
+    def stream() -> None:
+        while not done.wait(0.002):
+            paparazzi.say("LOCAL_POSITION_NED", **position(0))
+
+    telemetry = threading.Thread(target=stream)
+    telemetry.start()
+    delays_s = []
+    for _ in range(50):
+        start_s = time.monotonic()
+        link.send("PARAM_SET", **GAIN)
+        assert paparazzi.hear()
+        delays_s.append(time.monotonic() - start_s)
+    done.set()
+    telemetry.join()
+    assert sorted(delays_s)[45] < 0.05  # bench/link.py measures it
+
+
+# ---- heartbeats
+
+
+def heartbeats(vehicle: Speaker, wall_s: float) -> int:
+    until_s = time.monotonic() + wall_s
+    heard = 0
+    while (left_s := until_s - time.monotonic()) > 0.0:
+        heard += sum(message.get_type() == "HEARTBEAT" for message in vehicle.hear(left_s))
+    return heard
+
+
+def pump(link: Link, done: threading.Event) -> None:
+    while not done.is_set():
+        link.receive(0.2)
+
+
+def test_a_ground_stations_heartbeat_goes_out_every_second_of_vehicle_time() -> None:
+    with (
+        Speaker(ARDUPILOTMEGA, system=1) as vehicle,
+        Link(vehicle.address, ARDUPILOTMEGA, clock=ScaledClock(20.0), target_system=1) as link,
+    ):
+        done = threading.Event()
+        listener = threading.Thread(target=pump, args=(link, done))
+        listener.start()
+        (first,) = vehicle.hear()
+        counted = heartbeats(vehicle, 1.0)
+        done.set()
+        listener.join()
+    assert (first.get_srcSystem(), first.get_srcComponent()) == (255, 190)
+    assert (number(first, "type"), number(first, "autopilot")) == (6, 8)
+    assert 12 <= counted <= 21
+
+
+def test_no_heartbeat_pretends_that_a_hung_program_is_there() -> None:
+    """The vehicle's own answer to a lost ground station must be able to act."""
+    with (
+        Speaker(ARDUPILOTMEGA, system=1) as vehicle,
+        Link(vehicle.address, ARDUPILOTMEGA, clock=ScaledClock(20.0), target_system=1) as link,
+    ):
+        assert heartbeats(vehicle, 0.5) <= UNATTENDED_AFTER_S
+        assert heartbeats(vehicle, 0.2) == 0
+        link.receive(0.0)
+        assert heartbeats(vehicle, 0.2) > 0
+
+
+def test_paparazzi_is_not_bothered_with_heartbeats(paparazzi: Speaker) -> None:
+    with Link(paparazzi.address, PAPARAZZI, clock=ScaledClock(20.0), target_system=31) as link:
+        assert heartbeats(paparazzi, 0.3) == 0
+        assert link.health.sent == 0
+
+
+# ---- the end
+
+
+def test_what_was_sent_before_closing_still_leaves(paparazzi: Speaker) -> None:
+    link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
+    for value in range(5):
+        link.send("PARAM_SET", **GAIN | {"param_value": float(value)})
+    link.close()
+    assert [number(paparazzi.hear()[0], "param_value") for _ in range(5)] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    link.close()  # again is harmless
+
+
+def test_a_closed_link_hands_over_what_it_heard_and_then_says_that_it_is_closed(paparazzi: Speaker) -> None:
+    link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
+    paparazzi.say("LOCAL_POSITION_NED", **position(20))
+    assert becomes(lambda: link.health.received == 1)
+    link.close()
+    assert len(link.receive(1.0)) == 1
+    for call in (lambda: link.receive(1.0), lambda: link.send("PARAM_SET", **GAIN)):
+        with pytest.raises(LinkError, match=r"is closed\. Connect to the vehicle again"):
+            call()
+
+
+def test_closing_ends_the_wait_of_another_thread(paparazzi: Speaker) -> None:
+    link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
+    closer = threading.Timer(0.05, link.close)
+    closer.start()
+    with pytest.raises(LinkError):
+        link.receive(60.0)
+    closer.join()
+
+
+class BrokenClock(ScaledClock):
+    """Fails once it is asked to."""
+
+    is_broken = False
+
+    def now_s(self) -> float:
+        if self.is_broken and threading.current_thread().name.startswith("link"):
+            raise OverflowError("the clock is broken")
+        return super().now_s()
+
+
+def test_a_link_whose_thread_fails_says_so_to_everybody(paparazzi: Speaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    reported: list[str] = []
+    monkeypatch.setattr(threading, "excepthook", lambda failure: reported.append(str(failure.exc_value)))
+    clock = BrokenClock()
+    with Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link:
+        clock.is_broken = True
+        paparazzi.say("LOCAL_POSITION_NED", **position(20))
+        with pytest.raises(LinkError, match=r"failed: the clock is broken\."):
+            link.receive(SOON_S)
+        with pytest.raises(LinkError, match="failed: the clock is broken"):
+            link.send("PARAM_SET", **GAIN)
+    assert reported == ["the clock is broken"]
+
+
+# ---- other carriers
+
+
+def test_a_link_over_tcp_outlives_the_connection() -> None:
+    with (
+        socket.create_server((LOOPBACK, 0)) as server,
+        Speaker(COMMON, system=1) as vehicle,
+        Link(TcpAddress(LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK) as link,
+    ):
+        server.settimeout(SOON_S)
+        for _ in range(2):
+            connection, _ = server.accept()
+            with connection:
+                connection.setblocking(True)
+                frame = heartbeat(vehicle, autopilot=12)
+                connection.sendall(frame[:5])  # a stream is cut anywhere
+                connection.sendall(frame[5:])
+                assert [each.message.get_type() for each in collect(link, 1)] == ["HEARTBEAT"]
+                link.send("COMMAND_LONG", **command(21))
+                assert "COMMAND_LONG" in kinds_heard(vehicle, connection.fileno())
+        assert link.health.bad == 0
+
+
+def test_a_link_over_a_serial_line() -> None:
+    vehicle_end, our_end = pty.openpty()
+    tty.setraw(our_end)
+    with (
+        Speaker(ARDUPILOTMEGA, system=1) as vehicle,
+        Link(SerialAddress(os.ttyname(our_end), 57600), ARDUPILOTMEGA, clock=CLOCK) as link,
+    ):
+        os.write(vehicle_end, b"\x00\x55" + heartbeat(vehicle))
+        assert [each.message.get_srcSystem() for each in collect(link, 1)] == [1]
+        link.send("COMMAND_LONG", **command(21))
+        assert "COMMAND_LONG" in kinds_heard(vehicle, vehicle_end)
+    os.close(vehicle_end)
+    os.close(our_end)
+
+
+def kinds_heard(vehicle: Speaker, descriptor: int) -> list[str]:
+    """What arrives up to the first message that is no heartbeat."""
+    kinds: list[str] = []
+    while not kinds or kinds[-1] == "HEARTBEAT":
+        kinds += [message.get_type() for message in vehicle.codec.parse(os.read(descriptor, 4096))]
+    return kinds
+
+
+def test_a_folder_that_is_not_there_leaves_nothing_open(paparazzi: Speaker, tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="telemetry log"):
+        Link(paparazzi.address, PAPARAZZI, clock=CLOCK, tlog=tmp_path / "none" / "flight.tlog")
+    with Link(paparazzi.address, PAPARAZZI, clock=CLOCK):
+        pass  # the port is free again
+
+
+def test_the_dialects_are_found_by_name() -> None:
+    assert {name: dialect.mavlink for name, dialect in DIALECTS.items()} == {
+        "paparazzi": 1,
+        "ardupilotmega": 2,
+        "common": 2,
+    }
