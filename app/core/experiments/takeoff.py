@@ -16,9 +16,10 @@ from app.core.hazards.flights import MODELS, check_flights
 from app.core.hazards.wrapping import check_wrapping
 from app.core.metrics import mean_absolute_error, require_scorable
 from app.core.options import Option
-from app.core.plants.vertical import CHANNELS, Counts, fly, fly_batch
+from app.core.plants.vertical import CHANNELS, Counts, fly
 from app.core.plants.vertical_disturbed import fly_batch as fly_disturbed
 from app.core.plants.vertical_disturbed import observe
+from app.core.plants.vertical_lanes import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.spread import Spread
 from app.core.trajectory import Samples, Trajectory
