@@ -16,7 +16,8 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a data table; `digits` after the point, None for text."""
+    """One column of a data table; `digits` after the point, None for text and for numbers of any size, which are read
+    to four significant digits."""
 
     name: str
     title: str

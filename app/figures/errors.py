@@ -107,7 +107,7 @@ class ErrorsFigure:
     @property
     def _scatter(self) -> str:
         noise = self.history.noise
-        return "" if noise is None else f" ± {noise.sd:.4f}"
+        return "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
 
     def _error_bars(self, palette: Palette) -> dict[str, object]:
         """One standard error of a single flight, up and down."""
@@ -154,7 +154,7 @@ class ErrorsFigure:
                 "y": [round(group.mean, 6) for group in repeats],
                 "text": [
                     f"Flights {', '.join(map(str, group.numbers))}<br>"
-                    f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit}"
+                    f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit} (standard error)"
                     for group in repeats
                 ],
                 "error_y": {
@@ -327,7 +327,7 @@ class ErrorsFigure:
                 Column("flight", "Flight", digits=0),
                 Column("outcome", "Outcome"),
                 Column("error", "Error", unit, 4),
-                Column("standard_error", "±", unit, 4),
+                Column("standard_error", "± scatter of one flight", unit, 4),
                 Column("predicted_error", "Predicted", unit, 4),
                 Column("predicted_low", "At least, 90 %", unit, 4),
                 Column("predicted_high", "At most, 90 %", unit, 4),

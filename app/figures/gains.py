@@ -10,6 +10,7 @@ from app.figures.history import History, last_number
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09
+"""Height between two panels as a share of all: room for the name of the lower one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,14 @@ class GainsFigure:
         axes: dict[str, object] = {}
         for index, gain in panels:
             axes |= self._axes(palette, index, gain, last)
-        layout = theme.layout(palette, showlegend=False, uirevision="gains", **axes)
+        layout = theme.layout(
+            palette,
+            showlegend=False,
+            uirevision="gains",
+            margin={"l": 8, "r": 14, "t": 24, "b": 8},
+            annotations=self._names(palette),
+            **axes,
+        )
         return Card(
             name=self.name,
             title=self.title,
@@ -82,32 +90,48 @@ class GainsFigure:
 
     def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
         count = len(self.history.gains)
-        height = (1 - GAP * (count - 1)) / count
-        top = 1 - (index - 1) * (height + GAP)
+        bottom, height = _place(index, count)
         values = [flight.gains[gain.name] for flight in self.history.flights]
         if self.history.proposal is not None:
             values.append(self.history.proposal.gains[gain.name])
         low, high = padded(min(values), max(values), gain)
-        bottom = index == count
+        lowest = index == count
         x = {
             "range": [0.5, last + 0.6],
             "dtick": max(1, -(-last // 12)),
             "showgrid": False,
-            "showticklabels": bottom,
+            "showticklabels": lowest,
             "anchor": _axis("y", index),
             "matches": None if index == 1 else "x",
         }
         return {
-            "xaxis" + _suffix(index): theme.titled(palette, "Flight", **x) if bottom else theme.axis(palette, **x),
-            "yaxis" + _suffix(index): theme.titled(
+            "xaxis" + _suffix(index): theme.titled(palette, "Flight", **x) if lowest else theme.axis(palette, **x),
+            "yaxis" + _suffix(index): theme.axis(
                 palette,
-                gain.name,
-                domain=[max(0.0, top - height), top],
+                domain=[bottom, bottom + height],
                 anchor=_axis("x", index),
                 range=[low, high],
                 nticks=4 if count <= 3 else 3,
             ),
         }
+
+    def _names(self, palette: Palette) -> list[dict[str, object]]:
+        """What each gain is, and its unit, above its panel."""
+        count = len(self.history.gains)
+        return [
+            {
+                "text": f"<b>{gain.name}</b> {gain.title}" + (f" ({gain.unit})" if gain.unit else ""),
+                "x": 0,
+                "y": sum(_place(index, count)),
+                "xref": "paper",
+                "yref": "paper",
+                "xanchor": "left",
+                "yanchor": "bottom",
+                "showarrow": False,
+                "font": {"size": 12, "color": palette.dim},
+            }
+            for index, gain in enumerate(self.history.gains, start=1)
+        ]
 
     def _summary(self) -> str:
         best = self.history.best
@@ -115,7 +139,7 @@ class GainsFigure:
             return "No valid flight yet."
         return (
             f"Best gains, flight {best.number}: "
-            + ", ".join(f"{gain.name} {best.gains[gain.name]:g}" for gain in self.history.gains)
+            + ", ".join(f"{gain.name} {_read(best.gains[gain.name])}" for gain in self.history.gains)
             + "."
         )
 
@@ -128,7 +152,7 @@ class GainsFigure:
             rows.append(("next", *(self.history.proposal.gains[gain.name] for gain in self.history.gains)))
         columns = (
             Column("flight", "Flight"),
-            *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else 4) for gain in self.history.gains),
+            *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in self.history.gains),
         )
         return Table(columns, tuple(rows))
 
@@ -138,6 +162,17 @@ def padded(low: float, high: float, gain: Gain) -> tuple[float, float]:
     width = max(high - low, 0.5 * gain.scale)
     middle = (low + high) / 2
     return max(gain.lower - 0.05 * width, middle - 0.65 * width), middle + 0.65 * width
+
+
+def _place(index: int, count: int) -> tuple[float, float]:
+    """Foot and height of a panel, the first one on top, as shares of the whole."""
+    height = (1 - GAP * (count - 1)) / count
+    return max(0.0, 1 - index * height - (index - 1) * GAP), height
+
+
+def _read(value: float) -> str:
+    """A gain to four significant digits; a whole one in full."""
+    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
 
 
 def _suffix(index: int) -> str:

@@ -91,7 +91,6 @@ def test_a_flight_of_ones_own_gains_goes_through_the_same_checks(dashboard: Dash
     kp.fill("-5")
     dashboard.button("Fly these gains").click()
     expect(kp).to_have_attribute("aria-invalid", "true")
-    dashboard.page.get_by_text(re.compile("^All checks")).first.click()
     expect(dashboard.page.get_by_text(re.compile("must lie in 0 … 4000"))).to_be_visible()
     assert dashboard.trials(campaign_id) == []
     kp.fill("400")

@@ -10,7 +10,13 @@ def test_every_gain_has_its_own_panel_with_the_values_flown() -> None:
     assert trace(card, "flown", gain="ki")["y"] == [10, 20]
     domains = [layout(card)[axis]["domain"] for axis in ("yaxis", "yaxis2", "yaxis3")]
     assert domains[0][0] > domains[1][1] > domains[1][0] > domains[2][1]
-    assert [layout(card)[axis]["title"]["text"] for axis in ("yaxis", "yaxis2", "yaxis3")] == ["kp", "ki", "kd"]
+
+
+def test_every_panel_says_above_it_what_its_gain_is() -> None:
+    named = layout(GainsFigure(history(flight(1, 0.3))).compute())["annotations"]
+    assert [one["text"].split(" ")[0] for one in named] == ["<b>kp</b>", "<b>ki</b>", "<b>kd</b>"]
+    assert all(gain.title in one["text"] and gain.unit in one["text"] for gain, one in zip(GAINS, named, strict=True))
+    assert named[0]["y"] > named[1]["y"] > named[2]["y"]
 
 
 def test_the_proposed_gains_are_open_diamonds_at_the_next_flight() -> None:

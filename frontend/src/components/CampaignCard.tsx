@@ -27,7 +27,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
       <Sparkline curves={spark} />
       <dl className={`${classes["figures"]} numbers`}>
         <div>
-          <dt>Best error</dt>
+          <dt>{best === null ? "Best error" : "Best error ± standard error"}</dt>
           <dd>{plusMinus(best?.mean, best?.standard_error, unit)}</dd>
         </div>
         <div>

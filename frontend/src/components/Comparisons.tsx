@@ -21,7 +21,7 @@ export function Comparisons({ trial, unit }: { trial: Trial; unit: string }) {
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>},{" "}
               {confidenceText(confidence)} confidence, against {against === "first" ? "the first" : "the best before"},
               flight {trial_number}: {plusMinus(Math.abs(difference), standard_error, unit)}{" "}
-              {difference < 0 ? "lower" : "higher"}
+              {difference < 0 ? "lower" : "higher"} <small>(± standard error)</small>
             </span>
           </li>
         );

@@ -1,11 +1,11 @@
 import type { FigureTable } from "../api/types";
-import { NOTHING } from "../lib/format";
+import { gainText, NOTHING } from "../lib/format";
 import classes from "./DataTable.module.css";
 
 function cell(value: string | number | null, digits: number | null): string {
   if (value === null) return NOTHING;
-  if (typeof value === "string" || digits === null) return String(value);
-  return value.toFixed(digits);
+  if (typeof value === "string") return value;
+  return digits === null ? gainText(value) : value.toFixed(digits);
 }
 
 /** A figure's data in numbers. */
@@ -28,7 +28,9 @@ export function DataTable({ table, label, height }: { table: FigureTable; label:
           {table.rows.map((row) => (
             <tr key={String(row[0])}>
               {table.columns.map((column, index) => (
-                <td key={column.name}>{cell(row[index] ?? null, column.digits)}</td>
+                <td key={column.name} title={String(row[index] ?? "")}>
+                  {cell(row[index] ?? null, column.digits)}
+                </td>
               ))}
             </tr>
           ))}

@@ -3,9 +3,9 @@ import { useDebouncedValue } from "@mantine/hooks";
 import { useState } from "react";
 import { useCampaigns } from "../api/queries";
 import type { CampaignSummary } from "../api/types";
-import { gainText } from "../lib/format";
 import { plusMinus } from "../lib/uncertainty";
 import classes from "./AdvancedFields.module.css";
+import { GainList } from "./GainList";
 import { useUnits } from "./useUnits";
 
 interface Props {
@@ -46,12 +46,10 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
         <p className={`${classes["taken"]} numbers`}>
           Its best, flight {donor.best.trial_number} on {donor.vehicle.title}:{" "}
           <strong>
-            {Object.entries(donor.best.gains)
-              .map(([name, value]) => `${name} ${gainText(value)}`)
-              .join(" · ")}
+            <GainList gains={donor.best.gains} experiment={experiment} />
           </strong>
-          , error {plusMinus(donor.best.mean, donor.best.standard_error, unit)}. They are flown first; then it shows
-          whether the vehicles are alike enough to build on what was learned there.
+          , error {plusMinus(donor.best.mean, donor.best.standard_error, unit)} (± standard error). They are flown
+          first; then it shows whether the vehicles are alike enough to build on what was learned there.
         </p>
       )}
     </div>

@@ -2,12 +2,13 @@ import { Button } from "@mantine/core";
 import { IconArchive } from "@tabler/icons-react";
 import { useArchive } from "../api/mutations";
 import type { Campaign, Trial } from "../api/types";
-import { against, gainText, percentChange, withUnit } from "../lib/format";
+import { against, percentChange, withUnit } from "../lib/format";
 import { bestOf } from "../lib/nextStep";
 import { campaignWords } from "../lib/states";
 import { plusMinus } from "../lib/uncertainty";
 import { VERDICTS } from "../lib/verdict";
 import { CloneForm } from "./CloneForm";
+import { GainList } from "./GainList";
 import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
 import { Trouble } from "./Trouble";
@@ -22,7 +23,8 @@ interface Props {
 /** The campaign's result, and what to do with it. */
 export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const archive = useArchive(campaign.id);
-  const unit = useUnits(campaign.definition.experiment ?? "").error;
+  const experiment = campaign.definition.experiment ?? "";
+  const unit = useUnits(experiment).error;
   const best = bestOf(campaign, trials);
   const first = trials.find((trial) => trial.state === "valid");
   const title = campaignWords("finished", campaign.outcome).word;
@@ -40,9 +42,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             <p>± standard error</p>
             {campaign.best.flights > 1 && <p>mean of {campaign.best.flights} flights</p>}
             <p>
-              {Object.entries(best.gains)
-                .map(([name, value]) => `${name} ${gainText(value)}`)
-                .join("  ·  ")}
+              <GainList gains={best.gains} experiment={experiment} />
             </p>
             {first && change !== null && best.id !== first.id && (
               <p>

@@ -29,8 +29,12 @@ export function GainTable({ changes, unit, titles = {} }: Props) {
             <th scope="row">
               {name} {titles[name] && <small>{titles[name]}</small>}
             </th>
-            <td className={classes["now"]}>{gainText(now)}</td>
-            <td className={classes["next"]}>{gainText(next)}</td>
+            <td className={classes["now"]} title={String(now)}>
+              {gainText(now)}
+            </td>
+            <td className={classes["next"]} title={String(next)}>
+              {gainText(next)}
+            </td>
             <td className={classes["delta"]} data-same={delta === 0 || undefined}>
               {delta === 0 ? "same" : `${delta > 0 ? "+" : "−"}${gainText(Math.abs(delta))}`}
             </td>

@@ -7,8 +7,9 @@ import type { Campaign } from "../api/types";
 import { gainText } from "../lib/format";
 import type { Speed } from "../lib/nextStep";
 import { readNumber, typed, typedGain } from "../lib/numbers";
-import { isGateRefusal, offersOf, type Problem, problemOf, reasonsByField, reasonsByWeight } from "../lib/problems";
+import { isGateRefusal, offersOf, problemOf, reasonsByField } from "../lib/problems";
 import classes from "./NextFlight.module.css";
+import { Refusal } from "./Refusal";
 import { Trouble } from "./Trouble";
 
 interface Props {
@@ -77,8 +78,11 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
       {refused && problem !== null && (
         <Refusal
           problem={problem}
-          offers={offersOf(problem).filter(([name]) => names.includes(name))}
-          onUse={(name, value) => change(name, typed(value))}
+          offers={names.flatMap((name) => offersOf(problem).filter(([gain]) => gain === name))}
+          onUse={(offers) => {
+            setTexts({ ...texts, ...Object.fromEntries(offers.map(([name, value]) => [name, typed(value)])) });
+            create.reset();
+          }}
         />
       )}
       {refused && !campaign.vehicle.is_real && <Overrule pending={create.isPending} onFly={submit} />}
@@ -97,40 +101,6 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
       </Button>
       {!refused && <Trouble error={create.error} shown={names} />}
     </form>
-  );
-}
-
-interface RefusalProps {
-  problem: Problem;
-  offers: [gain: string, value: number][];
-  onUse: (gain: string, value: number) => void;
-}
-
-/** What would happen, in a sentence, and what would pass; the other checks folded. */
-function Refusal({ problem, offers, onUse }: RefusalProps) {
-  const [first, ...others] = reasonsByWeight(problem);
-  return (
-    <div className={`${classes["failed"]} ${classes["stack"]}`} role="alert">
-      <div>
-        <strong>{problem.title}</strong>
-        <p>{first}</p>
-      </div>
-      {offers.map(([name, value]) => (
-        <Button key={name} variant="light" onClick={() => onUse(name, value)}>
-          Use {name} {gainText(value)}
-        </Button>
-      ))}
-      {others.length > 0 && (
-        <details className={classes["more"]}>
-          <summary>All checks: {others.length} more refused</summary>
-          <ul className={classes["gate"]}>
-            {others.map((reason) => (
-              <li key={reason}>{reason}</li>
-            ))}
-          </ul>
-        </details>
-      )}
-    </div>
   );
 }
 

@@ -11,7 +11,7 @@ import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { Trouble } from "./Trouble";
-import { useUnits } from "./useUnits";
+import { useGainTitles, useUnits } from "./useUnits";
 
 interface Props {
   campaign: Campaign;
@@ -22,7 +22,9 @@ interface Props {
 /** A trial that is planned and has not flown: fly it, hand in its record, or give it up. */
 export function PlannedCard({ campaign, trial, upload }: Props) {
   const [speed, setSpeed] = useSpeed();
-  const unit = useUnits(campaign.definition.experiment ?? "").error;
+  const experiment = campaign.definition.experiment ?? "";
+  const unit = useUnits(experiment).error;
+  const titles = useGainTitles(experiment);
   const fly = useFlyTrial(campaign.id);
   const cancel = useCancelTrial();
   return (
@@ -31,8 +33,10 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
         <dl className={`${classes["big"]} numbers`}>
           {Object.entries(trial.gains).map(([name, value]) => (
             <div key={name} className={classes["reading"]}>
-              <dt>{name}</dt>
-              <dd>{gainText(value)}</dd>
+              <dt>
+                {name} {titles[name] && <small>{titles[name]}</small>}
+              </dt>
+              <dd title={String(value)}>{gainText(value)}</dd>
             </div>
           ))}
           <div className={classes["reading"]} data-row>

@@ -1,11 +1,11 @@
 import { Button } from "@mantine/core";
-import { IconPencil, IconPlaneDeparture } from "@tabler/icons-react";
+import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useState } from "react";
 import { type RecordUpload, useCreateTrial } from "../api/mutations";
-import { useCatalogue } from "../api/queries";
 import type { Campaign, Proposal, Trial } from "../api/types";
 import { speedOf } from "../lib/nextStep";
 import { advised, choicesFor, KINDS, type Variant } from "../lib/proposal";
+import { Choices, Expectation } from "./Choices";
 import { GainTable } from "./GainTable";
 import { GateChecks } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
@@ -17,7 +17,7 @@ import { Recommendation } from "./Recommendation";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { StopCampaign } from "./StopCampaign";
 import { Trouble } from "./Trouble";
-import { useUnits } from "./useUnits";
+import { useGainTitles, useUnits } from "./useUnits";
 import { Why } from "./Why";
 
 interface Props {
@@ -32,9 +32,9 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const [editing, setEditing] = useState(false);
   const [speed, setSpeed] = useSpeed();
   const create = useCreateTrial(campaign.id);
-  const units = useUnits(campaign.definition.experiment ?? "");
-  const experiment = useCatalogue().data?.experiments.find(({ name }) => name === campaign.definition.experiment);
-  const titles = Object.fromEntries((experiment?.gains ?? []).map(({ name, title }) => [name, title]));
+  const experiment = campaign.definition.experiment ?? "";
+  const units = useUnits(experiment);
+  const titles = useGainTitles(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
   const order = campaign.vehicle.can_fly ? { fly: { speed: speedOf(speed) } } : {};
   const advice = advised(proposal);
@@ -56,11 +56,14 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
       <div className={classes["stack"]}>
         {trials.length > 0 && <Recommendation advice={advice} />}
         {advice.variant !== null && (
-          <FlyButton
-            label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
-            loading={create.isPending}
-            onClick={() => advice.variant !== null && flyVariant(advice.variant)}
-          />
+          <div>
+            <FlyButton
+              label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
+              loading={create.isPending}
+              onClick={() => advice.variant !== null && flyVariant(advice.variant)}
+            />
+            <Expectation campaignId={campaign.id} variant={advice.variant} />
+          </div>
         )}
         <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
         <Predicted proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />
@@ -78,24 +81,13 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
         ) : (
           <ImportRecord upload={upload} proposalId={proposal.id} />
         )}
-        <div className={classes["row"]}>
-          {choicesFor(campaign, proposal, trials)
-            .filter(({ variant }) => variant !== advice.variant)
-            .map(({ variant, label, hint }) => (
-              <Button
-                key={variant}
-                variant="default"
-                title={hint}
-                disabled={create.isPending}
-                onClick={() => flyVariant(variant)}
-              >
-                {label}
-              </Button>
-            ))}
-          <Button variant="default" leftSection={<IconPencil size={18} aria-hidden />} onClick={() => setEditing(true)}>
-            Edit gains
-          </Button>
-        </div>
+        <Choices
+          campaignId={campaign.id}
+          choices={choicesFor(campaign, proposal, trials).filter(({ variant }) => variant !== advice.variant)}
+          disabled={create.isPending}
+          onFly={flyVariant}
+          onEdit={() => setEditing(true)}
+        />
         <Trouble error={create.error} />
         <div>
           <Why explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />

@@ -1,9 +1,12 @@
 import type { ReproductionRow } from "../api/work";
-import { grouped, measure } from "../lib/work";
+import { type ComparedColumn, comparedColumns, grouped, measure } from "../lib/work";
 import classes from "./ReproductionRows.module.css";
+
+const RATIO_DIGITS = 3;
 
 /** Our numbers beside the published ones, under the headings of their groups. */
 export function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; title: string }) {
+  const columns = comparedColumns(rows);
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
     <section className={`${classes["scroll"]} sideways`} aria-label={`${title}: numbers`} tabIndex={0}>
@@ -12,20 +15,22 @@ export function ReproductionRows({ rows, title }: { rows: readonly ReproductionR
           <tr>
             <td />
             <th scope="col">Ours</th>
-            <th scope="col">Paper</th>
-            <th scope="col">Ratio</th>
-            <th scope="col">Expected</th>
+            {columns.map(([key, heading]) => (
+              <th key={key} scope="col">
+                {heading}
+              </th>
+            ))}
           </tr>
         </thead>
         {grouped(rows).map((group) => (
           <tbody key={group.title}>
             <tr className={classes["group"]}>
-              <th scope="rowgroup" colSpan={5}>
+              <th scope="rowgroup" colSpan={2 + columns.length}>
                 {group.title}
               </th>
             </tr>
             {group.rows.map((row) => (
-              <Row key={row.label} row={row} />
+              <Row key={row.label} row={row} columns={columns} />
             ))}
           </tbody>
         ))}
@@ -34,7 +39,7 @@ export function ReproductionRows({ rows, title }: { rows: readonly ReproductionR
   );
 }
 
-function Row({ row }: { row: ReproductionRow }) {
+function Row({ row, columns }: { row: ReproductionRow; columns: readonly ComparedColumn[] }) {
   return (
     <tr>
       <th scope="row">
@@ -48,9 +53,9 @@ function Row({ row }: { row: ReproductionRow }) {
       <td className={classes["ours"]}>
         {measure(row.measured, row.digits)} <span className={classes["unit"]}>{row.unit}</span>
       </td>
-      <td>{measure(row.paper, row.digits)}</td>
-      <td>{measure(row.ratio, 3)}</td>
-      <td>{measure(row.reference, row.digits)}</td>
+      {columns.map(([key]) => (
+        <td key={key}>{measure(row[key], key === "ratio" ? RATIO_DIGITS : row.digits)}</td>
+      ))}
     </tr>
   );
 }

@@ -82,7 +82,8 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
         <small>{confidenceText(confidence)} confidence</small>
       </p>
       <p className="numbers">
-        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
+        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
+        <small className={classes["meaning"]}>(± standard error of the difference)</small>
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>
             {count(more, "more flight")} would decide: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the
@@ -114,7 +115,10 @@ function Scatter({
           </p>
         </Help>
       </h3>
-      <p className={`${classes["big"]} numbers`}>{plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}</p>
+      <p className={`${classes["big"]} numbers`}>
+        {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
+        <small>± its own standard error</small>
+      </p>
       <p>
         {repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`},{" "}
         worth {Number(freedom.toFixed(1))} repeats in all.
@@ -166,7 +170,7 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
           <tr>
             <th scope="col">[{names.join(" ")}]</th>
             <th scope="col">Flights</th>
-            <th scope="col">Mean error</th>
+            <th scope="col">Mean error ± standard error</th>
             <th scope="col">Standing</th>
           </tr>
         </thead>

@@ -7,6 +7,7 @@ import { sentenceOf } from "../lib/verdict";
 import { Kept, Marks } from "./Marks";
 import { StateBadge } from "./StateBadge";
 import classes from "./TrialsTable.module.css";
+import { useGainTitles } from "./useUnits";
 
 interface Props {
   campaign: Campaign;
@@ -19,6 +20,7 @@ interface Props {
 /** The campaign's flights like the paper's Table 1: gains, error, prediction, and what came of each. */
 export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) {
   const names = Object.keys(trials[0]?.gains ?? {});
+  const titles = useGainTitles(campaign.definition.experiment ?? "");
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
     <section className={`${classes["scroll"]} sideways`} aria-label="All flights" tabIndex={0}>
@@ -28,7 +30,7 @@ export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) 
             <th scope="col">Flight</th>
             {names.map((name) => (
               <th key={name} scope="col">
-                {name}
+                {name} {titles[name] && <small>{titles[name]}</small>}
               </th>
             ))}
             <th scope="col">Error</th>
@@ -62,15 +64,19 @@ export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) 
                   )}
                 </th>
                 {names.map((name) => (
-                  <td key={name}>{gainText(trial.gains[name] ?? Number.NaN)}</td>
+                  <td key={name} title={String(trial.gains[name] ?? "")}>
+                    {gainText(trial.gains[name] ?? Number.NaN)}
+                  </td>
                 ))}
                 <td className={classes["error"]}>{withUnit(trial.error, unit)}</td>
                 <td>
                   <span className={classes["predicted"]}>
                     {withUnit(trial.predicted_error, unit)}
-                    {trial.predicted_interval && <small>({rangeText(trial.predicted_interval, unit)})</small>}
                     <Kept trial={trial} brief />
                   </span>
+                  {trial.predicted_interval && (
+                    <small className={classes["range"]}>{rangeText(trial.predicted_interval, unit)}</small>
+                  )}
                 </td>
                 <td className={classes["text"]}>
                   <span className={classes["state"]}>

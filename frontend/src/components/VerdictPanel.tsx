@@ -4,12 +4,13 @@ import type { ReactNode } from "react";
 import { Link } from "react-router";
 import { recordCsv, useStatistics } from "../api/queries";
 import type { Trial } from "../api/types";
-import { gainText, percentChange, withUnit } from "../lib/format";
+import { percentChange, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { intervalText, plusMinus } from "../lib/uncertainty";
 import { askedFor, bestBeforeOf, sentenceOf } from "../lib/verdict";
 import { Classify } from "./Classify";
 import { Comparisons } from "./Comparisons";
+import { GainList } from "./GainList";
 import { Glitches } from "./Glitches";
 import { Kept, Marks } from "./Marks";
 import { Panel } from "./Panel";
@@ -22,6 +23,7 @@ interface Props {
   trials: readonly Trial[];
   isBest: boolean;
   unit: string;
+  experiment: string;
   /** On the flight's own page there is no link to that page. */
   own?: boolean;
 }
@@ -50,7 +52,7 @@ function Fact({ title, wide = false, children }: { title: string; wide?: boolean
 }
 
 /** What happened in a flight: against the best before it, against its prediction, and what it counts for. */
-export function VerdictPanel({ trial, trials, isBest, unit, own = false }: Props) {
+export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false }: Props) {
   const bestBefore = bestBeforeOf(trial, trials);
   const statistics = useStatistics(trial.campaign_id).data;
   const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
@@ -80,7 +82,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, own = false }: Props
       )}
       <dl className={`${classes["figures"]} numbers`}>
         <Fact title="Error">
-          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(scatter of one flight)</small> : null}
+          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± scatter of one flight)</small> : null}
         </Fact>
         <Fact title="Predicted">
           {withUnit(trial.predicted_error, unit)}{" "}
@@ -93,15 +95,13 @@ export function VerdictPanel({ trial, trials, isBest, unit, own = false }: Props
         </Fact>
         {group !== undefined && group.errors.length > 1 && (
           <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`}>
-            {plusMinus(group.mean, group.standard_error, unit)} <small>(standard error)</small>
+            {plusMinus(group.mean, group.standard_error, unit)} <small>(± standard error)</small>
           </Fact>
         )}
         {trial.overshoot_m !== null && <Fact title="Overshoot">{withUnit(trial.overshoot_m, "m", 2)}</Fact>}
         <Fact title="Gains" wide>
           <span className={classes["gains"]}>
-            {Object.entries(trial.gains)
-              .map(([name, value]) => `${name} ${gainText(value)}`)
-              .join(" · ")}
+            <GainList gains={trial.gains} experiment={experiment} />
           </span>
         </Fact>
       </dl>

@@ -16,6 +16,12 @@ test("what flies comes before everything else", () => {
   expect(nextStep(flying, ready, [trial(8, "flying")])).toEqual({ kind: "flying", trialId: 8, trialNumber: 2 });
 });
 
+test("a flight that has landed is not flying any more, even if the campaign is not up to date yet", () => {
+  const flying = { ...campaign, flying: { trial_id: 8, trial_number: 2 } };
+  expect(nextStep(flying, ready, [trial(8, "valid")])).toEqual({ kind: "computing" });
+  expect(nextStep(flying, ready, [trial(8, "captured")])).toEqual({ kind: "judge", trial: trial(8, "captured") });
+});
+
 test("a stale proposal is never offered", () => {
   const stale: NextFlight = { ...ready, state: "ready", proposal: { ...proposal, stale: true } };
   expect(nextStep(campaign, stale, [])).toEqual({ kind: "computing" });

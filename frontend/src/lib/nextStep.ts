@@ -1,6 +1,7 @@
 /** The one thing to do next in a campaign: what the right-hand card of its page shows. */
 
 import type { Campaign, NextFlight, Proposal, Trial, Trouble } from "../api/types";
+import { wasFlown } from "./states";
 
 export type NextStep =
   | { kind: "flying"; trialId: number; trialNumber: number }
@@ -13,11 +14,15 @@ export type NextStep =
   | { kind: "finished" };
 
 export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly Trial[]): NextStep {
-  if (campaign.flying !== null) {
-    return { kind: "flying", trialId: campaign.flying.trial_id, trialNumber: campaign.flying.trial_number };
+  const { flying } = campaign;
+  const landed = flying !== null && trials.some(({ id, state }) => id === flying.trial_id && wasFlown(state));
+  if (flying !== null && !landed) {
+    return { kind: "flying", trialId: flying.trial_id, trialNumber: flying.trial_number };
   }
   const unjudged = trials.find((trial) => trial.state === "captured" || trial.state === "lost");
   if (unjudged !== undefined) return { kind: "judge", trial: unjudged };
+  // The list of flights has come before the campaign that it belongs to: neither it nor its proposal is up to date.
+  if (landed) return { kind: "computing" };
   if (campaign.state === "finished" || campaign.state === "archived") return { kind: "finished" };
   const planned = trials.find((trial) => trial.state === "planned" || trial.state === "staged");
   if (planned !== undefined) return { kind: "planned", trial: planned };

@@ -2,6 +2,7 @@ import { expect, test } from "vitest";
 import {
   ApiError,
   isGateRefusal,
+  limitsOf,
   offersOf,
   otherProblems,
   problemFrom,
@@ -70,6 +71,7 @@ test("values that would pass are read from the refusals that have any", () => {
     ["kd", 409],
   ]);
   expect(offersOf(null)).toEqual([]);
+  expect(limitsOf(problem)).toEqual(["can wrap"]);
 });
 
 test("only refused gains can be overruled, no other mistake", () => {

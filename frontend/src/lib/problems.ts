@@ -65,6 +65,11 @@ export function offersOf(problem: Problem | null): [gain: string, value: number]
   return Object.entries(all);
 }
 
+/** What the limits say that offer other values; every offer lies within all of them. */
+export function limitsOf(problem: Problem | null): string[] {
+  return [...new Set((problem?.problems ?? []).filter(({ offer }) => offer !== undefined).map(({ reason }) => reason))];
+}
+
 /** Whatever a failed request brought, as a problem that can be shown. */
 export function problemFrom(status: number | undefined, body: unknown): Problem {
   if (status === undefined) return UNREACHABLE;

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
-import type { Campaign, Proposal, Trial } from "../api/types";
-import { advised, choicesFor, sameGains } from "./proposal";
+import type { Campaign, CampaignStatistics, Proposal, Trial } from "../api/types";
+import { advised, choicesFor, expectationOf, sameGains } from "./proposal";
 
 const first = { kp: 283, ki: 13, kd: 82 };
 const better = { kp: 900, ki: 200, kd: 200 };
@@ -41,6 +41,34 @@ describe("what can be flown instead", () => {
     expect(
       choicesFor(campaign(2), proposal({ kind: "repeat", gains: better }), two).map(({ variant }) => variant),
     ).toEqual(["baseline"]);
+  });
+});
+
+describe("what a choice should score", () => {
+  const statistics = {
+    sigma: 0.0117,
+    error_unit: "m",
+    groups: [
+      { trial_numbers: [1], mean: 0.5283, is_best: false, is_baseline: true },
+      { trial_numbers: [2, 3], mean: 0.12845, is_best: true, is_baseline: false },
+    ],
+  } as unknown as CampaignStatistics;
+
+  test("is what the flights of the same gains scored, with the scatter of one flight", () => {
+    expect(expectationOf("repeat", statistics)).toBe(
+      "Expected: 0.128 ± 0.012 m, as flights 2, 3 (± scatter of one flight).",
+    );
+    expect(expectationOf("baseline", statistics)).toBe(
+      "Expected: 0.528 ± 0.012 m, as flight 1 (± scatter of one flight).",
+    );
+  });
+
+  test("is not known for half a step, and that is said", () => {
+    expect(expectationOf("smaller step", statistics)).toContain("No prediction");
+  });
+
+  test("is not said before the statistics are there", () => {
+    expect(expectationOf("repeat", undefined)).toBe("");
   });
 });
 

@@ -1,7 +1,8 @@
 /** What can be flown next instead of, or beside, what is proposed. */
 
-import type { Campaign, Proposal, Trial } from "../api/types";
+import type { Campaign, CampaignStatistics, Proposal, Trial } from "../api/types";
 import { bestOf } from "./nextStep";
+import { plusMinus } from "./uncertainty";
 
 export type Recommended = Proposal["recommended"];
 export type Variant = "smaller step" | "repeat" | "baseline";
@@ -67,7 +68,7 @@ export function choicesFor(campaign: Campaign, proposal: Proposal, trials: reado
     choices.push({
       variant: "repeat",
       label: "Repeat instead",
-      hint: `The gains of flight ${best.number}, the best, once more: was it luck?`,
+      hint: "The best gains once more: was it luck?",
     });
   }
   if (!sameGains(first.gains, proposal.gains) && !sameGains(first.gains, best.gains)) {
@@ -78,4 +79,14 @@ export function choicesFor(campaign: Campaign, proposal: Proposal, trials: reado
     });
   }
   return choices;
+}
+
+/** What a variant should score: flights of gains that were flown before say it themselves, half a step nobody does. */
+export function expectationOf(variant: Variant, statistics: CampaignStatistics | undefined): string {
+  if (variant === "smaller step") return "Half way from the best gains to these. No prediction is made for it.";
+  const group = statistics?.groups.find((one) => (variant === "repeat" ? one.is_best : one.is_baseline));
+  if (statistics === undefined || group === undefined) return "";
+  const flights = `flight${group.trial_numbers.length === 1 ? "" : "s"} ${group.trial_numbers.join(", ")}`;
+  const error = plusMinus(group.mean, statistics.sigma, statistics.error_unit);
+  return `Expected: ${error}, as ${flights} (± scatter of one flight).`;
 }

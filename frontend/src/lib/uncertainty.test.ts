@@ -28,7 +28,7 @@ describe("a number with its uncertainty", () => {
 });
 
 test("an interval shows both ends, in the digits of an error, and its confidence", () => {
-  expect(intervalText({ lower: 0.093, upper: 0.1174, confidence: 0.9 }, "m")).toBe("0.093 … 0.117 m (90 %)");
+  expect(intervalText({ lower: 0.093, upper: 0.1174, confidence: 0.9 }, "m")).toBe("0.093 … 0.117 m (90\u00a0%)");
   expect(rangeText({ lower: 0, upper: 2.2, confidence: 0.9 }, "m")).toBe("0.000 … 2.200 m");
 });
 

@@ -40,7 +40,7 @@ export function rangeText({ lower, upper }: Interval, unit: string): string {
 
 /** `0.093 … 0.118 m (90 %)`: ± is left to standard errors, an interval always shows both ends and its confidence. */
 export function intervalText(interval: Interval, unit: string): string {
-  return `${rangeText(interval, unit)} (${percent(interval.confidence)})`;
+  return `${rangeText(interval, unit)} (${percent(interval.confidence).replace(" ", "\u00a0")})`;
 }
 
 /** A prediction in a line: the number, then its interval. */

@@ -1,17 +1,30 @@
 import { expect, test } from "vitest";
 import type { Catalogue } from "../api/types";
-import { unitsOf } from "./units";
+import { gainTitles, unitsOf } from "./units";
 
 const catalogue = {
   experiments: [
     { name: "takeoff", error_unit: "m", output_unit: "m", gains: [{ unit: "counts" }, { unit: "counts" }] },
-    { name: "pitch-tracking", error_unit: "rad·s", output_unit: "rad", gains: [{ unit: "lb s/ft" }, { unit: "deg" }] },
+    {
+      name: "pitch-tracking",
+      error_unit: "rad·s",
+      output_unit: "rad",
+      gains: [
+        { name: "theta_1", title: "Thrust per speed", unit: "lb s/ft" },
+        { name: "theta_2", title: "Thrust offset", unit: "deg" },
+      ],
+    },
   ],
 } as unknown as Catalogue;
 
 test("units are those of the campaign's experiment", () => {
   expect(unitsOf(catalogue, "takeoff")).toEqual({ error: "m", output: "m", gains: "counts" });
   expect(unitsOf(catalogue, "pitch-tracking")).toEqual({ error: "rad·s", output: "rad", gains: "" });
+});
+
+test("a gain has a name that says what it is, once the catalogue is there", () => {
+  expect(gainTitles(catalogue, "pitch-tracking")).toEqual({ theta_1: "Thrust per speed", theta_2: "Thrust offset" });
+  expect(gainTitles(undefined, "pitch-tracking")).toEqual({});
 });
 
 test("until the catalogue is there a takeoff is likeliest", () => {

@@ -1,4 +1,4 @@
-/** In which units a campaign's numbers stand, from its experiment. */
+/** In which units a campaign's numbers stand and what its gains are called, from its experiment. */
 
 import type { Catalogue } from "../api/types";
 
@@ -21,4 +21,10 @@ export function unitsOf(catalogue: Catalogue | undefined, experiment: string): U
     output: found.output_unit,
     gains: units.size === 1 ? ([...units][0] ?? "") : "",
   };
+}
+
+/** What a gain is, by its name: `theta_1` is "Thrust per speed". Empty until the catalogue is there. */
+export function gainTitles(catalogue: Catalogue | undefined, experiment: string): Readonly<Record<string, string>> {
+  const found = catalogue?.experiments.find(({ name }) => name === experiment);
+  return Object.fromEntries((found?.gains ?? []).map(({ name, title }) => [name, title]));
 }

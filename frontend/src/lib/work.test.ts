@@ -1,6 +1,16 @@
 import { expect, test } from "vitest";
 import type { Job, ReproductionRow } from "../api/work";
-import { between, duration, grouped, jobLink, jobTitle, measure, progressText, ratioSpan } from "./work";
+import {
+  between,
+  comparedColumns,
+  duration,
+  grouped,
+  jobLink,
+  jobTitle,
+  measure,
+  progressText,
+  ratioSpan,
+} from "./work";
 
 const JOB: Job = {
   id: 3,
@@ -59,6 +69,13 @@ test("rows stand under their headings, and the nearness to the paper is that of 
   ]);
   expect(ratioSpan(rows)).toBe("0.86 to 1.02 of the published numbers");
   expect(ratioSpan([row("none", null)])).toBeNull();
+});
+
+test("a column that would be empty in every row is left out", () => {
+  const recorded = { ...row("steps", null), paper: null, reference: 0 };
+  expect(comparedColumns([recorded]).map(([, heading]) => heading)).toEqual(["Expected"]);
+  const published = { ...row("jsbsim", 0.9), paper: 0.1, reference: null };
+  expect(comparedColumns([recorded, published]).map(([key]) => key)).toEqual(["paper", "ratio", "reference"]);
 });
 
 test("numbers have their own digits and a proper minus", () => {

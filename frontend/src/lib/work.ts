@@ -73,6 +73,19 @@ export function grouped(rows: readonly ReproductionRow[]): RowGroup[] {
   return groups;
 }
 
+const COMPARED = [
+  ["paper", "Paper"],
+  ["ratio", "Ratio"],
+  ["reference", "Expected"],
+] as const;
+
+export type ComparedColumn = (typeof COMPARED)[number];
+
+/** What stands beside our numbers; a column without a number in any row is left out. */
+export function comparedColumns(rows: readonly ReproductionRow[]): ComparedColumn[] {
+  return COMPARED.filter(([key]) => rows.some((row) => row[key] !== null));
+}
+
 /** The span of measured over published in the first group that has any: "0.86 … 1.02 of the published numbers". */
 export function ratioSpan(rows: readonly ReproductionRow[]): string | null {
   for (const group of grouped(rows)) {

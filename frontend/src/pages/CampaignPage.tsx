@@ -62,7 +62,8 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
   const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme);
   const errors = useCampaignFigure(campaign.id, "errors", theme);
   const gains = useCampaignFigure(campaign.id, "gains", theme);
-  const unit = useUnits(campaign.definition.experiment ?? "takeoff").error;
+  const experiment = campaign.definition.experiment ?? "takeoff";
+  const unit = useUnits(experiment).error;
   const lower = Math.max(LOWER_PX, PANEL_PX * Object.keys(trials[0]?.gains ?? {}).length);
   const shown = shownTrial(trials, chosen);
   const choose = useCallback((number: number) => setChosen((before) => (before === number ? null : number)), []);
@@ -96,7 +97,13 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
             }
           />
           {shown !== null && (
-            <VerdictPanel trial={shown} trials={trials} isBest={shown.id === campaign.best?.trial_id} unit={unit} />
+            <VerdictPanel
+              trial={shown}
+              trials={trials}
+              isBest={shown.id === campaign.best?.trial_id}
+              unit={unit}
+              experiment={experiment}
+            />
           )}
         </div>
         <div className={classes["next"]}>

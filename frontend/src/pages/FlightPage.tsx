@@ -24,7 +24,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const trial = useTrial(trialId);
   const trials = useTrials(campaignId).data ?? [];
   const figure = useFlightFigure(trialId, theme);
-  const unit = useUnits(campaign?.definition.experiment ?? "takeoff").error;
+  const experiment = campaign?.definition.experiment ?? "takeoff";
+  const unit = useUnits(experiment).error;
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <Missing error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
@@ -42,6 +43,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
           trials={trials}
           isBest={trialId === campaign?.best?.trial_id}
           unit={unit}
+          experiment={experiment}
           own
         />
       </div>

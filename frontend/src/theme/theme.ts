@@ -63,5 +63,8 @@ export const theme = createTheme({
     Select: tall,
     Textarea: { defaultProps: { size: "md" } },
     FileInput: tall,
+    // Words that fade in or unfold cannot be read meanwhile; and nothing here gains by it.
+    Popover: { defaultProps: { transitionProps: { duration: 0 } } },
+    Accordion: { defaultProps: { transitionDuration: 0 } },
   },
 });
