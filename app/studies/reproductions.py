@@ -90,7 +90,8 @@ _ALL: Final = (
     Reproduction(
         name="variability",
         title="Fig. 12: takeoffs repeated over a battery",
-        line="Two gain sets flown ten times on each of 200 batteries of the twin: scatter, and trend over the battery.",
+        line="Two gain sets flown ten times on each of 240 batteries of the twin, 200 steady and 40 fading: scatter, "
+        "and trend over the battery.",
         paper="The error scatters by 0.0141 m at the default gains and by 0.0066 m at the tuned ones; the battery does "
         "not show.",
         figures={"figure12": "Fig. 12"},

@@ -77,7 +77,7 @@ def _view(
         group=_group(row, now),
         comparisons=comparisons(row, scored, now),
         overshoot_m=row.overshoot_m,
-        verdict=verdict(row, scored, get_experiment(campaign.experiment).error_unit),
+        verdict=verdict(row, scored, get_experiment(campaign.experiment).error_unit, _flown_before(row, now)),
         reason=row.reason,
         note=row.note,
         gate=Gate.model_validate(row.gate),
@@ -110,12 +110,23 @@ def _group(row: TrialRow, now: Standing | None) -> GroupBrief | None:
     return GroupBrief(mean=same.mean, standard_error=same.standard_error(now.scatter), n=same.size)
 
 
-def verdict(row: TrialRow, scored: Sequence[Scored], unit: str) -> str:
-    """The flight against the best before it and against its prediction, in a sentence."""
+def _flown_before(row: TrialRow, now: Standing | None) -> list[int]:
+    """The earlier flights of a trial that repeats their gains on purpose; none for any other trial."""
+    if now is None or row.kind not in {"baseline", "repeat"}:
+        return []
+    return [
+        number for group in now.groups if group.gains == row.gains for number in group.numbers if number < row.number
+    ]
+
+
+def verdict(row: TrialRow, scored: Sequence[Scored], unit: str, again: Sequence[int] = ()) -> str:
+    """The flight against the best before it and against its prediction, in a sentence. One that repeats the gains of
+    the flights `again` was not to be better than any, so it is not held against the best."""
     match row.state:
         case TrialState.VALID if row.error is not None:
             before = min(((error, number) for number, error in scored if number < row.number), default=None)
-            return f"{row.error:.3f} {unit}: {_compared(row.error, before, unit)}{_against_prediction(row, unit)}."
+            said = f" {_once_more(again)}" if again else f": {_compared(row.error, before, unit)}"
+            return f"{row.error:.3f} {unit}{said}{_against_prediction(row, unit)}."
         case TrialState.ABORTED:
             return f"Aborted: {row.reason}"
         case TrialState.INVALID:
@@ -126,6 +137,10 @@ def verdict(row: TrialRow, scored: Sequence[Scored], unit: str) -> str:
             return f"Landed and recorded{_glitches(row)}; somebody has to say whether it counts."
         case _:
             return ""
+
+
+def _once_more(again: Sequence[int]) -> str:
+    return f"with the gains of flight{'s' if len(again) > 1 else ''} {', '.join(map(str, again))} once more"
 
 
 def _glitches(row: TrialRow) -> str:

@@ -7,16 +7,17 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
-from tests.builders import create_csv, create_imported_trial, create_ready_campaign, get, run_jobs
+from tests.builders import create_csv, create_imported_trial, create_ready_campaign, create_trial, get, run_jobs, upload
 
 PATIENT = {"stop": {"kind": "budget", "max_flights": 9}}
 
 
 def test_a_difference_is_told_only_where_the_printed_errors_differ(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import", definition=PATIENT)
-    for settling_s in (1.0, 1.0001, 2.0):
+    for kp, settling_s in ((300, 1.0), (301, 1.0001), (302, 2.0)):
         run_jobs(database)
-        create_imported_trial(client, campaign["id"], create_csv(settling_s))
+        trial = create_trial(client, campaign["id"], gains={"kp": kp, "ki": 13, "kd": 82})
+        upload(client, trial["id"], create_csv(settling_s))
     trials = [get(client, f"/api/trials/{number}") for number in (1, 2, 3)]
     first, alike, slower = (trial["error"] for trial in trials)
     assert 0.0 < alike - first < 0.0005
@@ -24,6 +25,18 @@ def test_a_difference_is_told_only_where_the_printed_errors_differ(client: TestC
     share = 100 * (slower - first) / first
     told = re.escape(f"{slower - first:.3f} m ({share:.0f} %) higher than the best before it (flight 1, {first:.3f} m)")
     assert re.search(told, trials[2]["verdict"])
+
+
+def test_gains_flown_again_on_purpose_are_not_held_against_the_best(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=PATIENT)
+    first = create_imported_trial(client, campaign["id"], create_csv(2.0))
+    for settling_s in (2.1, 1.9):
+        run_jobs(database)
+        again = create_trial(client, campaign["id"], gains=first["gains"])
+        upload(client, again["id"], create_csv(settling_s))
+    second, third = (get(client, f"/api/trials/{number}") for number in (2, 3))
+    assert second["verdict"] == f"{second['error']:.3f} m with the gains of flight 1 once more."
+    assert third["verdict"] == f"{third['error']:.3f} m with the gains of flights 1, 2 once more."
 
 
 def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_the_scatter_allows(

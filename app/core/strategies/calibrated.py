@@ -140,8 +140,10 @@ def _summary(experiment: Experiment, base: Flight, choice: _Choice, foretold: Fo
     if choice.kind == "none":
         return f"{told} finds nothing that is better than {best} by {WORTH:.1%} and may be flown."
     low, high = foretold.interval.lower, foretold.interval.upper
+    assert base.error is not None
+    share = 1.0 - foretold.error / base.error
     return (
-        f"{told} promises {1.0 - choice.then / choice.now:.0%} less error than with {best}: "
+        f"{told} promises {abs(share):.0%} {'less' if share >= 0.0 else 'more'} error than with {best}: "
         f"{foretold.error:.4f} {unit}, with {foretold.interval.confidence:.0%} confidence within "
         f"{low:.4f} … {high:.4f} {unit}."
     )
