@@ -67,10 +67,14 @@ def test_the_second_flight_is_within_5_percent_of_the_optimum(truth: tuple[float
 
 @compiled_only
 def test_a_proposal_explains_itself() -> None:
-    proposal = next_proposal(CALM, [fly(1, DEFAULT)])
+    first = fly(1, DEFAULT)
+    proposal = next_proposal(CALM, [first])
     why = proposal.explanation
     assert why.base_flight == 1
     assert "calibrated on 1 flight" in why.summary
+    assert first.error is not None
+    assert proposal.predicted_error is not None
+    assert f"promises {1.0 - proposal.predicted_error / first.error:.0%} less error" in why.summary
     assert [one.name for one in why.fitted] == [parameter.name for parameter in TAKEOFF.model_parameters]
     assert why.fitted[0].value == pytest.approx(0.61, abs=0.01)
     assert why.gradient["ki"] < 0.0
