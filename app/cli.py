@@ -27,6 +27,34 @@ app.add_typer(controller, name="controller")
 
 JsonOut = Annotated[Path | None, typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.")]
 DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [default: GAINLINE_DATA_DIR]")]
+CampaignSource = Annotated[
+    str,
+    typer.Argument(
+        metavar="PRESET|FILE.yaml", show_default=False, help="A preset, as ardrone-takeoff, or a campaign file."
+    ),
+]
+StartGains = Annotated[
+    str | None,
+    typer.Option(
+        metavar="default|simplex|KP,KI,KD", show_default=False, help="Where the first flight's gains come from."
+    ),
+]
+GivenSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        show_default=False,
+        help=(
+            "A setting of the vehicle (scatter=0, wind_m_s=3), the strategy (scaled=false) or the stop rule "
+            "(improvement=0.02). Repeatable."
+        ),
+    ),
+]
+Overrule = Annotated[
+    str,
+    typer.Option(metavar="REASON", show_default=False, help="Fly gains that the gate refuses all the same; say why."),
+]
 
 
 class Reproducible(StrEnum):
@@ -87,42 +115,16 @@ def worker(data_dir: DataDir = None) -> None:
 @app.command()
 @plainly
 def run(
-    campaign: Annotated[
-        str,
-        typer.Argument(
-            metavar="PRESET|FILE.yaml", show_default=False, help="A preset, as ardrone-takeoff, or a campaign file."
-        ),
-    ],
+    campaign: CampaignSource,
     vehicle: Annotated[str | None, typer.Option(help="jsbsim or twin.", show_default=False)] = None,
     strategy: Annotated[str | None, typer.Option(help="How the next gains are found.", show_default=False)] = None,
-    start: Annotated[
-        str | None,
-        typer.Option(
-            metavar="default|simplex|KP,KI,KD", show_default=False, help="Where the first flight's gains come from."
-        ),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            show_default=False,
-            help=(
-                "A setting of the vehicle (scatter=0, wind_m_s=3), the strategy (scaled=false) or the stop rule "
-                "(improvement=0.02). Repeatable."
-            ),
-        ),
-    ] = None,
+    start: StartGains = None,
+    settings: GivenSettings = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random.", show_default=False)] = None,
     max_flights: Annotated[
         int | None, typer.Option(min=1, max=200, help="Flights at most.", show_default=False)
     ] = None,
-    overrule: Annotated[
-        str,
-        typer.Option(
-            metavar="REASON", show_default=False, help="Fly gains that the gate refuses all the same; say why."
-        ),
-    ] = "",
+    overrule: Overrule = "",
     json_out: JsonOut = None,
 ) -> None:
     """Fly a whole campaign on a simulation, without the dashboard, and print its table."""

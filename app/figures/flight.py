@@ -52,56 +52,47 @@ class FlightFigure:
         return None
 
     def compute(self) -> Card:
-        palette, record = PALETTES[self.theme], self.record
-        assert record.curve is not None
-        lines = [
-            *band_traces(palette, record.band, POINTS),
-            *self._context(palette),
-            _line(
-                f"Flight {record.number}",
-                record.curve,
-                palette.ink,
-                2.5,
-                "flight",
-                f"%{{x:.2f}} s · %{{y:.3f}} {record.output_unit}",
-            ),
-            *glitch_traces(palette, record.number, record.curve, record.glitches, record.output_unit),
-        ]
-        inputs = [self._input(palette, index, title) for index, title in enumerate(record.inputs)]
-        goal = record.set_point.values
-        low, high, _ = robust_span(
-            [record.curve.values], low=min(0.0, float(goal.min())), high=max(0.0, float(goal.max()))
-        )
-        top = [0.36, 1.0] if inputs else [0.0, 1.0]
-        axes: dict[str, object] = {
-            "yaxis": theme.titled(
-                palette, f"{record.output_title} ({record.output_unit})", domain=top, range=[low, high]
-            )
-        }
-        if inputs:
-            axes["yaxis2"] = theme.titled(palette, record.inputs_title, domain=[0.0, 0.28], nticks=4)
-        layout = theme.layout(
-            palette,
-            uirevision="flight",
-            **axes,
-            xaxis=theme.titled(
-                palette,
-                "Time since the command (s)",
-                anchor="y2" if inputs else "y",
-                range=[
-                    float(record.curve.time_s[0]) - 0.01 * float(record.set_point.time_s[-1]),
-                    float(record.curve.time_s[-1]),
-                ],
-            ),
-        )
+        palette, curve = PALETTES[self.theme], self.record.curve
+        assert curve is not None
+        inputs = [self._input(palette, index, title) for index, title in enumerate(self.record.inputs)]
         return Card(
             name=self.name,
             title=self.title,
             state="ready",
             summary=self._summary(),
-            figure=plotly_json([*lines, *inputs], layout),
-            table=self._table(record.curve),
+            figure=plotly_json([*self._outputs(palette, curve), *inputs], self._layout(palette, curve)),
+            table=self._table(curve),
         )
+
+    def _outputs(self, palette: Palette, curve: Curve) -> list[dict[str, object]]:
+        """The flight among what it is seen with, its glitches above all."""
+        record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
+        return [
+            *band_traces(palette, record.band, POINTS),
+            *self._context(palette),
+            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", reading),
+            *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
+        ]
+
+    def _layout(self, palette: Palette, curve: Curve) -> dict[str, object]:
+        """The output above, the inputs below it where there are any."""
+        record, goal = self.record, self.record.set_point
+        low, high, _ = robust_span(
+            [curve.values], low=min(0.0, float(goal.values.min())), high=max(0.0, float(goal.values.max()))
+        )
+        output = f"{record.output_title} ({record.output_unit})"
+        place = [0.36, 1.0] if record.inputs else [0.0, 1.0]
+        axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=place, range=[low, high])}
+        if record.inputs:
+            axes["yaxis2"] = theme.titled(palette, record.inputs_title, domain=[0.0, 0.28], nticks=4)
+        begin = float(curve.time_s[0]) - 0.01 * float(goal.time_s[-1])
+        axes["xaxis"] = theme.titled(
+            palette,
+            "Time since the command (s)",
+            anchor="y2" if record.inputs else "y",
+            range=[begin, float(curve.time_s[-1])],
+        )
+        return theme.layout(palette, uirevision="flight", **axes)
 
     def _context(self, palette: Palette) -> list[dict[str, object]]:
         record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
