@@ -4,6 +4,7 @@ GainlineError                 (app.core.errors)
 ├── InputError                something that came in is not usable
 │   ├── GainsError            a gain vector that may not be flown
 │   ├── TrajectoryError       a recorded flight that cannot be scored
+│   ├── UnconfirmedError      what is asked needs a person's word first
 │   ├── KeyReusedError        an idempotency key that already stands for another request
 │   ├── TooLargeError         more bytes than the program takes
 │   └── MediaTypeError        a kind of content that is not read here
@@ -34,7 +35,12 @@ __all__ = [
     "StorageError",
     "TooLargeError",
     "TrajectoryError",
+    "UnconfirmedError",
 ]
+
+
+class UnconfirmedError(InputError):
+    """What came in differs from what was planned, and nobody has said that it shall be taken all the same."""
 
 
 class KeyReusedError(InputError):

@@ -24,6 +24,7 @@ from app.errors import (
     StorageError,
     TooLargeError,
     TrajectoryError,
+    UnconfirmedError,
 )
 from app.live.client import LinkDownError
 from app.schemas import Problem, ProblemField
@@ -39,6 +40,7 @@ _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
     KeyReusedError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Key reused"),
     GainsError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Gains refused"),
     TrajectoryError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable record"),
+    UnconfirmedError: (HTTPStatus.CONFLICT, "Confirmation needed"),
     InputError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable input"),
     StorageError: (HTTPStatus.SERVICE_UNAVAILABLE, "Storage trouble"),
     LinkDownError: (HTTPStatus.SERVICE_UNAVAILABLE, "Worker out of reach"),

@@ -48,6 +48,7 @@ def _too_large(field: str, limit_bytes: int) -> TooLargeError:
     size = f"{limit_bytes / 2**20:g} MiB"
     return TooLargeError(
         "The request is too large; nothing was stored.",
-        hint=f"Send at most {size}; a flight record has at most 200 000 rows, so thin a longer one or cut it.",
+        hint=f"Send at most {size}; a flight record has at most 200 000 rows, so thin a longer one or cut it. "
+        "`gainline import` reads larger logs.",
         problems=(Problem(field, f"is larger than {size}"),),
     )

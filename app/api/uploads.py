@@ -3,30 +3,41 @@
 import hashlib
 import tempfile
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Annotated, BinaryIO, Final
 
 from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import UploadFile
+from starlette.datastructures import FormData, UploadFile
 
 from app.api.deps import CurrentDatabase, IdempotencyKey, Once, fingerprint
 from app.errors import InputError, MediaTypeError, Problem
 
 _IN_MEMORY_BYTES: Final = 2**20
 _CHUNK_BYTES: Final = 2**18
-_RAW: Final = frozenset({"text/csv", "application/csv", "application/octet-stream"})
+_CSV: Final = "text/csv"
+_ANY: Final = "application/octet-stream"
 
+_BINARY: Final = {"schema": {"type": "string", "format": "binary"}}
 REQUEST_BODY: Final = {
     "requestBody": {
         "required": True,
         "content": {
-            "text/csv": {"schema": {"type": "string", "format": "binary"}},
+            _CSV: _BINARY,
+            _ANY: _BINARY,
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
                     "required": ["file"],
-                    "properties": {"file": {"type": "string", "format": "binary"}},
+                    "properties": {
+                        "file": {"type": "string", "format": "binary"},
+                        "companion": {
+                            "type": "string",
+                            "format": "binary",
+                            "description": "the .log file that Paparazzi writes beside a .data file",
+                        },
+                    },
                 }
             },
         },
@@ -37,43 +48,68 @@ REQUEST_BODY: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """A record that has arrived completely, and the transaction that may store it."""
+    """A record that has arrived completely, and the transaction that may store it; `name` is its file's, if told."""
 
     file: BinaryIO
+    name: str
+    companion: BinaryIO | None
     once: Once
+
+
+@dataclass(frozen=True, slots=True)
+class _Arrived:
+    file: BinaryIO
+    name: str
+    companion: BinaryIO | None
+    digest: str
 
 
 async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> AsyncIterator[Upload]:
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as spool:
-        digest = hashlib.sha256()
-        async for chunk in _chunks(request, kind):
-            digest.update(chunk)
-            await run_in_threadpool(spool.write, chunk)
-        spool.seek(0)
-        yield Upload(spool, Once(database, key, fingerprint(request, digest.hexdigest())))  # type: ignore[arg-type]
-
-
-async def _chunks(request: Request, kind: str) -> AsyncIterator[bytes]:
-    if kind in _RAW:
-        async for chunk in request.stream():
-            yield chunk
-        return
-    if kind != "multipart/form-data":
+    arriving = _ARRIVING.get(kind)
+    if arriving is None:
         raise MediaTypeError(
             f"A record of type {kind or 'that is not stated'} is not read here.",
-            hint="Send the file as `Content-Type: text/csv`, or as the form field `file`.",
+            hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
         )
-    async with request.form(max_files=1, max_fields=4) as form:
-        part = form.get("file")
-        if not isinstance(part, UploadFile):
+    async with arriving(request) as arrived:
+        once = Once(database, key, fingerprint(request, f"{request.url.query} {arrived.digest}"))
+        yield Upload(arrived.file, arrived.name, arrived.companion, once)
+
+
+@asynccontextmanager
+async def _raw(request: Request) -> AsyncIterator[_Arrived]:
+    digest = hashlib.sha256()
+    with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as spool:
+        async for chunk in request.stream():
+            digest.update(chunk)
+            await run_in_threadpool(spool.write, chunk)
+        yield _Arrived(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]
+
+
+@asynccontextmanager
+async def _form(request: Request) -> AsyncIterator[_Arrived]:
+    digest = hashlib.sha256()
+    async with request.form(max_files=2, max_fields=4) as form:
+        part, companion = _part(form, "file"), _part(form, "companion")
+        if part is None:
             raise InputError(
                 "The form holds no file.",
                 hint="Send the record in the form field `file`.",
                 problems=(Problem("file", "is missing"),),
             )
-        while chunk := await part.read(_CHUNK_BYTES):
-            yield chunk
+        for each in (part, companion):
+            while each is not None and (chunk := await each.read(_CHUNK_BYTES)):
+                digest.update(chunk)
+        beside = None if companion is None else companion.file
+        yield _Arrived(part.file, part.filename or "", beside, digest.hexdigest())
 
+
+def _part(form: FormData, name: str) -> UploadFile | None:
+    part = form.get(name)
+    return part if isinstance(part, UploadFile) else None
+
+
+_ARRIVING: Final = {_CSV: _raw, "application/csv": _raw, _ANY: _raw, "multipart/form-data": _form}
 
 Record = Annotated[Upload, Depends(_upload)]

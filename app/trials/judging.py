@@ -28,6 +28,21 @@ def judge_gains(session: Session, campaign: CampaignRow, asked: Gains, *, overru
 
     Takes a tenth of a second. Raises GainsError naming what is refused, with what would pass.
     """
+    gains, gate = _asked(session, campaign, asked)
+    return _judged(campaign, gains, gate, overrule)
+
+
+def judge_flown(session: Session, campaign: CampaignRow, flown: Gains) -> Judged:
+    """Gains that have flown elsewhere: what the gate says of them, whether or not it would have let them fly.
+
+    Raises GainsError when they are none of the campaign's.
+    """
+    gains, gate = _asked(session, campaign, flown)
+    return Judged(gains, proposing.gate_json(gate), "")
+
+
+def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], Gate]:
+    """The gains, complete and in order, and the gate's answer."""
     definition = definition_of(campaign)
     experiment, space = experiment_of(definition), proposing.space_of(definition)
     gains = space.complete(asked)
@@ -42,7 +57,7 @@ def judge_gains(session: Session, campaign: CampaignRow, asked: Gains, *, overru
         start=proposing.stored_start(session, campaign) if searched else None,
         spread=proposing.stored_spread(session, campaign, experiment),
     )
-    return _judged(campaign, gains, gate, overrule)
+    return gains, gate
 
 
 def judge_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> Judged:

@@ -115,11 +115,19 @@ records = APIRouter(prefix="/api", tags=["trials"])
 
 
 @records.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
-def upload_trajectory(record: Record, trial_id: Id) -> Trial:
+def upload_trajectory(
+    record: Record,
+    trial_id: Id,
+    takeoff: Annotated[int | None, Query(ge=1, le=10_000, description="which one of a log with several")] = None,
+    confirm: Annotated[
+        bool, Query(description="take a log that was flown with other gains; the trial then has those")
+    ] = False,
+) -> Trial:
     """Hand in the record of a flight made elsewhere, or the recovered one of a lost flight.
 
-    CSV with the columns time_s (seconds since the command) and altitude_m (up), and optionally the other channels; at
-    most 200 000 rows. It is scored and classed at once.
+    A log (MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data, with its .log as the form field `companion`), in
+    which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
+    and optionally the other channels, at most 200 000 rows. It is scored and classed at once.
     """
-    trajectory = service.read_record(record.file)
-    return record.once(Trial, lambda session: service.import_trajectory(session, trial_id, trajectory))
+    flown = service.read_record(record.file, name=record.name, takeoff=takeoff, companion=record.companion)
+    return record.once(Trial, lambda session: service.import_record(session, trial_id, flown, confirmed=confirm))

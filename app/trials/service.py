@@ -16,19 +16,20 @@ from app.core.definition import flight_seed
 from app.core.errors import GainlineError, InputError, Problem
 from app.core.experiments import get_experiment
 from app.core.policy import Gains
-from app.core.trajectory import Trajectory
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import BusyError, ConflictError
 from app.fleet import service as fleet
-from app.logs.takeoff_csv import read_takeoff_csv
+from app.logs.readers import read_takeoff
+from app.logs.takeoffs import Takeoff
 from app.moves import check_action, check_move, check_version
 from app.schemas import Page
 from app.trials import history, repository
 from app.trials.capture import capture
 from app.trials.judging import Judged, judge_gains, judge_proposal
 from app.trials.lifecycle import move_flight, move_trial
+from app.trials.records import settle_gains
 from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
@@ -176,22 +177,27 @@ def classify_trial(session: Session, trial_id: int, said: Classification) -> Tri
     return trial_view(session, campaign, row)
 
 
-def read_record(stream: BinaryIO) -> Trajectory:
-    """A flight's record from CSV. Raises TrajectoryError naming the line and the column."""
-    return read_takeoff_csv(stream)
+def read_record(
+    stream: BinaryIO, *, name: str = "", takeoff: int | None = None, companion: BinaryIO | None = None
+) -> Takeoff:
+    """A takeoff from a log of any kind. Raises TrajectoryError in words, naming the takeoffs to choose from where there
+    are several."""
+    return read_takeoff(stream, name=name, number=takeoff, companion=companion)
 
 
-def import_trajectory(session: Session, trial_id: int, trajectory: Trajectory) -> Trial:
+def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed: bool = False) -> Trial:
     """The record of a flight made elsewhere, or the recovered one of a lost flight; scored and classed at once.
 
-    Raises ConflictError when the trial takes no record, TrajectoryError when the record cannot be stored.
+    Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
+    nobody has `confirmed` that, TrajectoryError when the record cannot be stored.
     """
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "upload", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
-        capture(session, campaign, row, trajectory)
+        settle_gains(session, campaign, row, flown, confirmed=confirmed)
+        capture(session, campaign, row, flown.trajectory)
         campaigns.history_changed(session, campaign)
         return trial_view(session, campaign, row)
     if fleet.can_fly(campaign.vehicle):
@@ -200,9 +206,10 @@ def import_trajectory(session: Session, trial_id: int, trajectory: Trajectory) -
             hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
         )
     _require_open(session, campaign, HISTORY)
+    settle_gains(session, campaign, row, flown, confirmed=confirmed)
     campaigns.begin_flying(campaign)
     row.flown_at = utc_now()
-    capture(session, campaign, row, trajectory)
+    capture(session, campaign, row, flown.trajectory)
     campaigns.end_flying(session, campaign)
     return trial_view(session, campaign, row)
 

@@ -117,6 +117,13 @@ def _advance_reference(state: State, mode: int, target: int, z: int) -> None:
 
 
 @kernel
+def feed_forward(zdd_ref: int, r33: int) -> int:
+    """The thrust that the reference acceleration takes at this tilt, 0 … 8640."""
+    force = divide(wrap32(_WEIGHT - wrap32(zdd_ref << 8)), _INVERSE_MASS)
+    return limit(divide(wrap32(force << R33_BITS), max(r33, _R33_MIN)), 0, _FEED_FORWARD_MAX)
+
+
+@kernel
 def _feedback(state: State, kp: int, ki: int, kd: int, ez: int, ev: int) -> int:
     """PID on limited errors; each product wraps at 32 bits, and the largest one before wrapping is remembered."""
     proportional = -kp * ez
@@ -139,8 +146,7 @@ def step(
     ez = limit(wrap32(state[Z_REF] - z), -POSITION_ERROR_MAX, POSITION_ERROR_MAX)
     ev = limit(wrap32(state[ZD_REF] - zd), -SPEED_ERROR_MAX, SPEED_ERROR_MAX)
     state[Z_SUM_ERR] = limit(state[Z_SUM_ERR] + ez, -ERROR_SUM_MAX, ERROR_SUM_MAX) if in_flight else 0
-    force = divide(wrap32(_WEIGHT - wrap32(state[ZDD_REF] << 8)), _INVERSE_MASS)
-    state[FF_CMD] = limit(divide(wrap32(force << R33_BITS), max(r33, _R33_MIN)), 0, _FEED_FORWARD_MAX)
+    state[FF_CMD] = feed_forward(state[ZDD_REF], r33)
     state[FB_CMD] = _feedback(state, kp, ki, kd, ez, ev)
     return limit(wrap32(state[FF_CMD] + state[FB_CMD]), 0, FULL_THRUST)
 

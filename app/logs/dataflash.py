@@ -1,0 +1,217 @@
+"""Reader of ArduPilot's on-board logs (.bin, "DataFlash"): self-describing binary messages.
+
+Every message begins with A3 95 and its type; messages of type 128 (FMT) give each type's length, name, format and
+columns. Only the few that tell of a takeoff are decoded, so that a log of hours takes seconds.
+"""
+
+import re
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from types import MappingProxyType
+from typing import BinaryIO, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.trajectory import Samples
+from app.logs.contents import Contents, contents, refused
+from app.logs.gains import ARDUPILOT_SETS, names_in
+from app.logs.takeoffs import FlightLog, Moment, Setting
+
+_SYNC: Final = b"\xa3\x95"
+_FMT: Final = 128
+_FMT_BYTES: Final = 89
+_MAX_OF_A_TYPE: Final = 5_000_000
+
+_FORMATS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "b": "i1", "B": "u1", "M": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8", "Q": "<u8",
+        "f": "<f4", "d": "<f8", "c": "<i2", "C": "<u2", "e": "<i4", "E": "<u4", "L": "<i4",
+        "n": "S4", "N": "S16", "Z": "S64", "a": "(32,)<i2",
+    }
+)  # fmt: skip
+_HUNDREDTHS: Final = frozenset("cCeE")
+
+_TAKEOFF, _LAND = 22, 21
+_ACCEPTED: Final = (0, 5)
+_LANDINGS: Final[Mapping[float, str]] = MappingProxyType({11: "motors off", 18: "the landing"})
+_MODES: Final[Mapping[float, str]] = MappingProxyType(
+    {0: "STABILIZE", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 9: "LAND", 16: "POSHOLD"}
+)
+
+_WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"})
+_HINT: Final = "Give ArduPilot's .bin log of the flight, with LOG_BITMASK including the control tuning (PSCD, CTUN)."
+
+Table = Mapping[str, NDArray[np.generic]]
+"""The columns of one kind of message, each of shape (n,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """A type of message as its FMT describes it; `length` includes the three bytes before the columns."""
+
+    name: str
+    length: int
+    dtype: np.dtype[np.void]
+    hundredths: frozenset[str]
+
+
+def is_dataflash(head: bytes) -> bool:
+    """Whether a file that begins so is one: its first message describes itself."""
+    return head.startswith(_SYNC + bytes([_FMT]))
+
+
+def read_dataflash(stream: BinaryIO) -> FlightLog:
+    """Read a whole log. Raises TrajectoryError when there is no altitude in it."""
+    tables = read_tables(contents(stream), _WANTED)
+    time_s, channels, title = _altitude(tables)
+    if "BAT" in tables and {"TimeUS", "Volt"} <= tables["BAT"].keys():
+        battery = _first_instance(tables["BAT"])
+        if len(battery["TimeUS"]):
+            channels["battery_v"] = np.interp(time_s, _seconds(battery), _numbers(battery["Volt"]))
+    starts, ends, landings = _moments(tables)
+    return FlightLog(
+        title=f"ArduPilot's on-board log, {title}",
+        clock="vehicle",
+        time_s=time_s,
+        channels=channels,
+        from_ground=True,
+        gain_sets=ARDUPILOT_SETS,
+        settings=tuple(_settings(tables)),
+        starts=starts,
+        ends=[*ends, *landings],
+        landings=landings,
+    )
+
+
+def read_tables(data: Contents, wanted: frozenset[str]) -> dict[str, Table]:
+    """The messages of these names, by name and column; damaged stretches are passed over.
+
+    Integers that stand for hundredths are divided; texts are bytes without the NULs at their end.
+    """
+    kinds: dict[int, _Kind] = {}
+    places: dict[int, array[int]] = {}
+    lengths = [0] * 256
+    lengths[_FMT] = _FMT_BYTES
+    position, size = 0, len(data)
+    while position + 3 <= size:
+        head = data[position : position + 3]
+        length = lengths[head[2]] if head.startswith(_SYNC) else 0
+        if not length:
+            position = data.find(_SYNC, position + 1)
+            if position < 0:
+                break
+            continue
+        if position + length > size:
+            break
+        if head[2] == _FMT:
+            _define(data[position + 3 : position + length], lengths, kinds, wanted)
+        elif head[2] in kinds:
+            found = places.setdefault(head[2], array("Q"))
+            if len(found) < _MAX_OF_A_TYPE:
+                found.append(position)
+        position += length
+    return {kinds[number].name: _table(data, kinds[number], found) for number, found in places.items()}
+
+
+def _define(body: bytes, lengths: list[int], kinds: dict[int, _Kind], wanted: frozenset[str]) -> None:
+    """Take in one FMT message: type, length, name[4], format[16], columns[64]. What makes no sense is left out."""
+    number, length = body[0], body[1]
+    if number == _FMT or length < 3 or lengths[number]:
+        return
+    lengths[number] = length
+    name, letters, columns = (_text(part) for part in (body[2:6], body[6:22], body[22:86]))
+    names = columns.split(",")
+    if name not in wanted or len(names) != len(letters) or len(set(names)) != len(names):
+        return
+    if not all(letter in _FORMATS for letter in letters) or not all(re.fullmatch(r"\w+", each) for each in names):
+        return
+    dtype = np.dtype([(each, _FORMATS[letter]) for each, letter in zip(names, letters, strict=True)])
+    if dtype.itemsize == length - 3:
+        hundredths = frozenset(each for each, letter in zip(names, letters, strict=True) if letter in _HUNDREDTHS)
+        kinds[number] = _Kind(name, length, dtype, hundredths)
+
+
+def _table(data: Contents, kind: _Kind, places: "array[int]") -> Table:
+    packed = b"".join(data[place + 3 : place + kind.length] for place in places)
+    rows = np.frombuffer(packed, kind.dtype)
+    return {name: rows[name] / 100.0 if name in kind.hundredths else rows[name] for name in kind.dtype.names or ()}
+
+
+def _text(raw: bytes) -> str:
+    return raw.partition(b"\0")[0].decode("ascii", "replace")
+
+
+def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples], str]:
+    """Time, channels, and where they are from: the vertical controller's own message where it is logged."""
+    loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
+    if {"TimeUS", "PD"} <= loop.keys():
+        time_s = _seconds(loop)
+        down = {"altitude_m": "PD", "reference_m": "TPD", "climb_rate_m_s": "VD"}
+        channels = {channel: -_numbers(loop[name]) for channel, name in down.items() if name in loop}
+        title = "altitude from PSCD.PD"
+    elif {"TimeUS", "Alt"} <= tuning.keys():
+        time_s = _seconds(tuning)
+        up = {"altitude_m": "Alt", "reference_m": "DAlt"}
+        channels = {channel: _numbers(tuning[name]) for channel, name in up.items() if name in tuning}
+        title = "altitude from CTUN.Alt"
+    else:
+        raise refused("holds neither PSCD.PD nor CTUN.Alt, the altitude", _HINT)
+    if {"TimeUS", "ThO"} <= tuning.keys() and len(tuning["TimeUS"]):
+        channels["thrust"] = np.interp(time_s, _seconds(tuning), _numbers(tuning["ThO"]))
+    return time_s, channels, title
+
+
+def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
+    """The gains, when they were logged at the log's start and whenever they were changed."""
+    table = tables.get("PARM", {})
+    names = names_in(ARDUPILOT_SETS)
+    if not {"TimeUS", "Name", "Value"} <= table.keys():
+        return
+    for time_s, raw, value in zip(_seconds(table), table["Name"], _numbers(table["Value"]), strict=True):
+        name = _text(bytes(raw))
+        if name in names and np.isfinite(value):
+            yield Setting(float(time_s), name, float(value))
+
+
+def _moments(tables: Mapping[str, Table]) -> tuple[list[Moment], list[Moment], list[Moment]]:
+    """Commands to take off, what ends the flight under them, and landings."""
+    accepted = [
+        (time_s, command) for time_s, command, result in _rows(tables, "MAVC", "Cmd", "Res") if result in _ACCEPTED
+    ]
+    starts = [Moment(time_s, "the command NAV_TAKEOFF") for time_s, command in accepted if command == _TAKEOFF]
+    ends = [Moment(time_s, "the command NAV_LAND") for time_s, command in accepted if command == _LAND]
+    modes = list(_rows(tables, "MODE", "ModeNum"))
+    ends += [
+        Moment(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
+        for (_, before), (time_s, mode) in pairwise(modes)
+        if mode != before
+    ]
+    landings = [Moment(time_s, _LANDINGS[event]) for time_s, event in _rows(tables, "EV", "Id") if event in _LANDINGS]
+    return starts, ends, landings
+
+
+def _rows(tables: Mapping[str, Table], kind: str, *names: str) -> Iterator[tuple[float, ...]]:
+    """Time and columns of one kind of message, row by row; none where a column is missing."""
+    table = tables.get(kind, {})
+    if {"TimeUS", *names} <= table.keys():
+        yield from zip(_seconds(table).tolist(), *(_numbers(table[name]).tolist() for name in names), strict=True)
+
+
+def _first_instance(table: Table) -> Table:
+    """Of several batteries the first."""
+    instance = next((table[name] for name in ("Inst", "Instance") if name in table), None)
+    return table if instance is None else {name: values[_numbers(instance) == 0] for name, values in table.items()}
+
+
+def _numbers(column: NDArray[np.generic]) -> Samples:
+    """As floats; NaN where a damaged description made texts of them."""
+    if column.ndim != 1 or column.dtype.kind not in "iuf":
+        return np.full(len(column), np.nan)
+    return column.astype(np.float64)
+
+
+def _seconds(table: Table) -> Samples:
+    return _numbers(table["TimeUS"]) / 1e6

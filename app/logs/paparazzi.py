@@ -1,0 +1,258 @@
+"""Reader of Paparazzi's ground logs: a .data file with one message a line, and its .log companion, XML, with the
+airframe and the settings.
+
+A line is the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks. VERT_LOOP
+tells everything about the vertical loop, in its own integers; without it the altitude is ROTORCRAFT_FP's.
+"""
+
+import re
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import BinaryIO, Final
+from xml.parsers import expat
+
+import numpy as np
+
+from app.core.control.fixed_point import INT32_MAX, INT32_MIN
+from app.core.control.loop_log import FIELDS, LoopLog, infer_gains
+from app.core.control.vertical_loop import FULL_THRUST
+from app.core.trajectory import Samples
+from app.logs.contents import refused
+from app.logs.gains import PAPARAZZI_SETS
+from app.logs.takeoffs import FlightLog, Moment, Setting
+
+MAX_COMPANION_BYTES: Final = 16 * 2**20
+_MAX_SAMPLES: Final = 2_000_000
+_MAX_LINE_BYTES: Final = 4096
+_LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
+_NUMBER: Final = re.compile(rb"[+-]?\d{1,10}")
+_GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
+_AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
+_PLATEAU_S: Final = 2.0
+
+_HINT: Final = "Give the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
+
+
+def is_paparazzi(head: bytes) -> bool:
+    """Whether a file that begins so is a .data file."""
+    return bool(_LINE.match(head))
+
+
+def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> FlightLog:
+    """Read a .data file, and the gains from its companion's airframe and settings where that is at hand.
+
+    Without, the gains are those that the loop's own commands follow from. Raises TrajectoryError when there is no
+    altitude, or the companion cannot be read.
+    """
+    lines = _read(stream)
+    configuration = _Configuration()
+    if companion is not None:
+        configuration.read(companion)
+    settings = configuration.settings(lines.values)
+    notes = []
+    starts: list[Moment] = []
+    ends: list[Moment] = []
+    if len(lines.loop_time_s):
+        log = lines.loop_log()
+        starts, ends = _starts(log), _ends(log)
+        if not {"kp", "ki", "kd"} <= {setting.name for setting in settings} and (inferred := infer_gains(log)):
+            settings = [Setting(-np.inf, name, value) for name, value in inferred.items()]
+            notes.append("gains worked out from the loop's commands, which follow from them")
+    time_s, channels = _altitude(lines)
+    if lines.others:
+        notes.append(f"other aircraft in the log left out: {', '.join(sorted(lines.others)[:5])}")
+    return FlightLog(
+        title=f"Paparazzi's ground log of aircraft {lines.aircraft}",
+        clock="ground",
+        time_s=time_s,
+        channels=channels,
+        from_ground=False,
+        gain_sets=PAPARAZZI_SETS,
+        settings=settings,
+        starts=starts,
+        ends=ends,
+        notes=tuple(notes),
+    )
+
+
+def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[LoopLog, dict[str, float] | None]:
+    """The samples of the vertical loop and the gains at their end, from companion and messages; None without any.
+
+    Raises TrajectoryError when there is no VERT_LOOP.
+    """
+    lines = _read(stream)
+    if not len(lines.loop_time_s):
+        raise refused("holds no VERT_LOOP, what the loop was given and commanded", _HINT)
+    configuration = _Configuration()
+    if companion is not None:
+        configuration.read(companion)
+    gains = {setting.name: setting.value for setting in configuration.settings(lines.values)}
+    return lines.loop_log(), gains if {"kp", "ki", "kd"} <= gains.keys() else None
+
+
+@dataclass(slots=True)
+class _Lines:
+    """What the lines of one aircraft say, the first one that tells of its height."""
+
+    aircraft: str = ""
+    others: set[str] = field(default_factory=set)
+    loop_time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    loop: "array[int]" = field(default_factory=lambda: array("q"))
+    time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    up: "array[int]" = field(default_factory=lambda: array("q"))
+    up_speed: "array[int]" = field(default_factory=lambda: array("q"))
+    values: list[tuple[float, int, float]] = field(default_factory=list)
+
+    def loop_log(self) -> LoopLog:
+        """The samples whose time rises."""
+        time_s, values = np.array(self.loop_time_s), np.array(self.loop, dtype=np.int64).reshape(-1, len(FIELDS))
+        rising = np.ones(len(time_s), dtype=np.bool_)
+        rising[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
+        return LoopLog(time_s[rising], values[rising])
+
+
+def _read(stream: BinaryIO) -> _Lines:
+    """Whatever is not a line of these messages is passed over."""
+    lines = _Lines()
+    stream.seek(0)
+    if not is_paparazzi(stream.read(_MAX_LINE_BYTES)):
+        raise refused("does not begin with a line of time, aircraft and message", _HINT)
+    stream.seek(0)
+    while line := stream.readline(_MAX_LINE_BYTES):
+        words = line.split(maxsplit=3)
+        if len(words) == 4 and words[2] in _WANTED:
+            _take(lines, words[0], words[1].decode("ascii", "replace")[:32], words[2], words[3].split())
+    return lines
+
+
+_WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
+
+
+def _take(lines: _Lines, time: bytes, aircraft: str, message: bytes, fields: Sequence[bytes]) -> None:
+    time_s = _float(time)
+    if not np.isfinite(time_s) or (lines.aircraft and aircraft != lines.aircraft):
+        lines.others.update([aircraft] if len(lines.others) < 5 and aircraft != lines.aircraft else [])
+        return
+    if message == b"VERT_LOOP" and len(lines.loop_time_s) < _MAX_SAMPLES:
+        if (numbers := _whole(fields, len(FIELDS))) is not None:
+            lines.loop_time_s.append(time_s)
+            lines.loop.extend(numbers)
+            lines.aircraft = aircraft
+    elif message == b"ROTORCRAFT_FP" and len(lines.time_s) < _MAX_SAMPLES:
+        if (numbers := _whole(fields, 6)) is not None:
+            lines.time_s.append(time_s)
+            lines.up.append(numbers[2])
+            lines.up_speed.append(numbers[5])
+            lines.aircraft = aircraft
+    elif message == b"DL_VALUE" and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
+        number, value = _whole(fields, 1), _float(fields[1])
+        if number is not None and np.isfinite(value):
+            lines.values.append((time_s, number[0], value))
+
+
+def _whole(fields: Sequence[bytes], count: int) -> list[int] | None:
+    """The first fields as 32-bit integers; None when there are fewer, or others."""
+    if len(fields) < count or not all(map(_NUMBER.fullmatch, fields[:count])):
+        return None
+    numbers = [int(each) for each in fields[:count]]
+    return numbers if min(numbers) >= INT32_MIN and max(numbers) <= INT32_MAX else None
+
+
+def _float(text: bytes) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
+def _altitude(lines: _Lines) -> tuple[Samples, dict[str, Samples]]:
+    """Time and channels, from whichever message came more often. Raises TrajectoryError when there is neither."""
+    if not lines.loop_time_s and not lines.time_s:
+        raise refused("holds neither VERT_LOOP nor ROTORCRAFT_FP", _HINT)
+    loop = _loop_channels(lines.loop_log()) if lines.loop_time_s else {}
+    if len(lines.loop_time_s) >= len(lines.time_s):
+        return lines.loop_log().time_s, loop
+    time_s = np.array(lines.time_s)
+    rarer = {name: np.interp(time_s, lines.loop_log().time_s, values) for name, values in loop.items()}
+    position = {"altitude_m": np.array(lines.up) / 2**8, "climb_rate_m_s": np.array(lines.up_speed) / 2**19}
+    return time_s, rarer | position
+
+
+def _loop_channels(log: LoopLog) -> dict[str, Samples]:
+    """Altitudes up in metres, commands as shares of full thrust."""
+    return {
+        "altitude_m": -log["z"] / 2**8,
+        "climb_rate_m_s": -log["zd"] / 2**19,
+        "set_point_m": -log["z_sp"] / 2**8,
+        "reference_m": -log["z_ref"] / 2**8,
+        "thrust": log["thrust"] / FULL_THRUST,
+        "feed_forward": log["ff_cmd"] / FULL_THRUST,
+        "feedback": log["fb_cmd"] / FULL_THRUST,
+    }
+
+
+def _starts(log: LoopLog) -> list[Moment]:
+    """The last samples before the reference sets out on its own."""
+    idle = log.idle
+    sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
+    return [Moment(float(log.time_s[place]), "the reference setting out") for place in sets_out]
+
+
+def _ends(log: LoopLog) -> list[Moment]:
+    """Where a set point that was held for two seconds becomes another one, or the loop stops working."""
+    idle, set_point = log.idle, log["z_sp"]
+    stops = np.flatnonzero(~idle[:-1] & idle[1:])
+    moments = [Moment(float(log.time_s[place]), "the loop being switched off") for place in stops]
+    held_since_s = float(log.time_s[0])
+    for place in np.flatnonzero(np.diff(set_point) != 0).tolist():
+        now_s, is_working = float(log.time_s[place]), not idle[place] and not idle[place + 1]
+        if is_working and now_s - held_since_s >= _PLATEAU_S:
+            moments.append(Moment(now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m"))
+        held_since_s = float(log.time_s[place + 1])
+    return moments
+
+
+@dataclass(slots=True)
+class _Configuration:
+    """What the .log companion says about gains: those built in, and the numbers by which DL_VALUE names settings."""
+
+    _built_in: dict[str, float] = field(default_factory=dict)
+    _numbers: dict[int, str] = field(default_factory=dict)
+    _count: int = 0
+
+    def read(self, companion: BinaryIO) -> None:
+        """Raises TrajectoryError when it is not a .log file, or larger than 16 MiB."""
+        companion.seek(0)
+        text = companion.read(MAX_COMPANION_BYTES + 1)
+        if len(text) > MAX_COMPANION_BYTES:
+            raise refused("has a companion of more than 16 MiB", "Give the .log file that was written beside it.")
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = self._element
+        parser.EntityDeclHandler = _no_entities
+        try:
+            parser.Parse(text, True)
+        except (expat.ExpatError, ValueError) as error:
+            raise refused(
+                f"has a companion that is not XML: {error}", "Give the .log file that was written beside it, or none."
+            ) from error
+
+    def settings(self, values: Sequence[tuple[float, int, float]]) -> list[Setting]:
+        """The gains built in, and every value that the vehicle reported later."""
+        found = [Setting(-np.inf, name, value) for name, value in self._built_in.items()]
+        found += [Setting(time_s, self._numbers[n], value) for time_s, n, value in values if n in self._numbers]
+        return found
+
+    def _element(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "dl_setting":
+            if match := _GAIN.fullmatch(attributes.get("var", "")):
+                self._numbers[self._count] = f"k{match[1].lower()}"
+            self._count += 1
+        elif tag == "define" and (match := _AIRFRAME_GAIN.fullmatch(attributes.get("name", ""))):
+            value = _float(attributes.get("value", "").encode())
+            if np.isfinite(value):
+                self._built_in[f"k{match[1].lower()}"] = abs(value)
+
+
+def _no_entities(*_declared: object) -> None:
+    raise ValueError("it declares entities")

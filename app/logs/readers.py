@@ -1,0 +1,74 @@
+"""Every kind of log that is read here, told by how it begins; a new one is one line of `READERS`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import BinaryIO, Final
+
+from app.core.errors import Problem, TrajectoryError
+from app.logs.dataflash import is_dataflash, read_dataflash
+from app.logs.paparazzi import is_paparazzi, read_paparazzi
+from app.logs.takeoff_csv import read_takeoff_csv
+from app.logs.takeoffs import FlightLog, Takeoff, choose, find_takeoffs
+from app.logs.tlog import is_tlog, read_tlog
+from app.logs.ulog import is_ulog, read_ulog
+
+_HEAD_BYTES: Final = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """One kind of log: what its files are called and how they begin, and who reads them."""
+
+    suffix: str
+    title: str
+    recognises: Callable[[bytes], bool]
+    read: Callable[[BinaryIO, BinaryIO | None], FlightLog]
+
+
+def _alone(read: Callable[[BinaryIO], FlightLog]) -> Callable[[BinaryIO, BinaryIO | None], FlightLog]:
+    """A reader of logs that have no companion."""
+    return lambda stream, _companion: read(stream)
+
+
+READERS: Final = (
+    Reader(".tlog", "MAVLink telemetry log", is_tlog, _alone(read_tlog)),
+    Reader(".bin", "ArduPilot's on-board log", is_dataflash, _alone(read_dataflash)),
+    Reader(".ulg", "PX4's log", is_ulog, _alone(read_ulog)),
+    Reader(".data", "Paparazzi's ground log", is_paparazzi, read_paparazzi),
+)
+
+SUFFIXES: Final = (".csv", *(reader.suffix for reader in READERS))
+
+
+def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | None = None) -> Sequence[Takeoff]:
+    """Every takeoff in a log, or the one that a CSV file is.
+
+    The content says what it is; `name`, the file's, only what it should have been. `companion` is the .log file of a
+    .data file. Raises TrajectoryError in words for whatever cannot be read.
+    """
+    stream.seek(0)
+    head = stream.read(_HEAD_BYTES)
+    stream.seek(0)
+    reader = next((reader for reader in READERS if reader.recognises(head)), None)
+    if reader is not None:
+        return find_takeoffs(reader.read(stream, companion))
+    suffix = PurePath(name).suffix.lower()
+    expected = next((reader for reader in READERS if reader.suffix == suffix), None)
+    if expected is not None:
+        raise TrajectoryError(
+            f"{PurePath(name).name[:80]} is not what its name says.",
+            hint=f"A {suffix} file is {expected.title}; check that it was copied completely. Read here are "
+            f"{', '.join(SUFFIXES)}.",
+            problems=(Problem("file", "is empty" if not head else f"does not begin as {expected.title} does"),),
+        )
+    trajectory = read_takeoff_csv(stream)
+    return (Takeoff(number=1, start_s=0.0, begins_with="the command", trajectory=trajectory, gains={}),)
+
+
+def read_takeoff(
+    stream: BinaryIO, *, name: str = "", number: int | None = None, companion: BinaryIO | None = None
+) -> Takeoff:
+    """The takeoff of that number in a log, or its only one. Raises TrajectoryError, listing them when it is not clear
+    which one is meant."""
+    return choose(read_takeoffs(stream, name=name, companion=companion), number)

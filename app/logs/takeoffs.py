@@ -1,0 +1,276 @@
+"""Takeoffs in a flight log: where each begins and ends, the gains it was flown with, and its record.
+
+A reader brings a log into the form of `FlightLog`; what is a takeoff is decided here, alike for every format. Flights
+are told by altitude: off the ground by 0.15 m and on to at least 0.5 m. A flight begins with the command to take off
+where the log holds one, else where the vehicle leaves the ground, and ends with the command to land, with another
+gain, or on the ground.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.errors import Problem, TrajectoryError
+from app.core.policy import Gains
+from app.core.trajectory import Samples, Trajectory
+
+NEAR_GROUND_M: Final = 0.15
+HIGHEST_HOP_M: Final = 0.5
+LONGEST_S: Final = 600.0
+MIN_SAMPLES: Final = 20
+MAX_SAMPLES: Final = 200_000
+
+_RISE_S: Final = (0.5, 1.0, 2.0, 3.0)
+_STOOD_M: Final = 0.05
+_LANDED_S: Final = 2.0
+_BEFORE_S: Final = 1.0
+_COMMAND_AHEAD_S: Final = 10.0
+_LISTED: Final = 50
+_LARGEST: Final = 1e6
+_ALTITUDES: Final = frozenset({"altitude_m", "reference_m", "set_point_m"})
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Something that happened, in seconds of the log, and what it was: "the block Takeoff"."""
+
+    time_s: float
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A gain that the vehicle held from this time on."""
+
+    time_s: float
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightLog:
+    """What any log says, in seconds of the log's own `clock` (`vehicle` or `ground`), altitude up.
+
+    `time_s` has shape (n,) and may repeat or step back; `altitude_m` is among the channels, each of shape (n,), NaN
+    where a value is missing. `gain_sets` are the names of gains that make a set, the first one of which every name is
+    known holds. `from_ground` says that the altitude is to be counted from where the vehicle stood. Of `starts`
+    (commands to take off), `ends` (commands that end the flight under them) and `landings` (the vehicle is down, says
+    the autopilot) there may be none.
+    """
+
+    title: str
+    clock: str
+    time_s: Samples
+    channels: Mapping[str, Samples]
+    from_ground: bool
+    gain_sets: Sequence[Sequence[str]] = ()
+    settings: Sequence[Setting] = ()
+    starts: Sequence[Moment] = ()
+    ends: Sequence[Moment] = ()
+    landings: Sequence[Moment] = ()
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Takeoff:
+    """One takeoff: its record, time counted from its beginning; the gains held then, empty where the log does not say;
+    and what is to be known about how both were read. `start_s` is in seconds since the log's first sample."""
+
+    number: int
+    start_s: float
+    begins_with: str
+    trajectory: Trajectory
+    gains: Gains
+    notes: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """As in a list to choose from."""
+        held = ", ".join(f"{name} {value:g}" for name, value in self.gains.items()) or "gains not in the log"
+        return (
+            f"{self.start_s:.1f} s into the log, from {self.begins_with}, {self.trajectory.time_s[-1]:.1f} s long, "
+            f"up to {self.trajectory['altitude_m'].max():.2f} m, {held}"
+        )
+
+
+def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
+    """In the order of their times. Raises TrajectoryError when there is none."""
+    time_s, channels = _usable(log)
+    altitude_m = channels["altitude_m"]
+    found: list[Takeoff] = []
+    free_from_s = -np.inf
+    for stood, down in _flights(time_s, altitude_m, [landing.time_s for landing in log.landings]):
+        begin, is_commanded = _beginning(log, float(time_s[stood]), free_from_s)
+        held = _Held(log, begin.time_s)
+        kept, end = _kept(log, time_s, begin, held, Moment(float(time_s[down]), ""))
+        if np.count_nonzero(kept) >= MIN_SAMPLES:
+            ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
+            record = _Record(log, begin, end, is_commanded, ground_m, held)
+            found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
+        free_from_s = float(time_s[down])
+    if not found:
+        raise TrajectoryError(
+            "The log holds no takeoff.",
+            hint="Choose the log of the flight itself, recorded from before the takeoff on.",
+            problems=(
+                Problem(
+                    "altitude_m",
+                    f"varies by {np.ptp(altitude_m):.2f} m within {time_s[-1] - time_s[0]:.1f} s, without a rise by "
+                    f"{HIGHEST_HOP_M:g} m in {_RISE_S[-1]:g} s that {MIN_SAMPLES} samples show",
+                ),
+            ),
+        )
+    return tuple(found)
+
+
+def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
+    """The takeoff of that number, or the only one. Raises TrajectoryError that lists them where it is not clear."""
+    if number is None and len(takeoffs) == 1:
+        return takeoffs[0]
+    if number is not None and 1 <= number <= len(takeoffs):
+        return takeoffs[number - 1]
+    happened = "The log holds one takeoff" if len(takeoffs) == 1 else f"The log holds {len(takeoffs)} takeoffs"
+    raise TrajectoryError(
+        f"{happened}." if number is None else f"{happened}, and none with the number {number}.",
+        hint="Say which one is meant, by its number; nothing was stored.",
+        problems=tuple(Problem("takeoff", f"{each.number}: {each.summary}") for each in takeoffs[:_LISTED]),
+    )
+
+
+def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
+    """The samples whose altitude is a number and whose time rises. Raises TrajectoryError when too few are left."""
+    altitude_m = log.channels["altitude_m"]
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(altitude_m) & np.isfinite(log.time_s) & (np.abs(altitude_m) <= _LARGEST)
+    time_s = log.time_s[good]
+    rising = np.ones(len(time_s), dtype=np.bool_)
+    rising[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
+    time_s = time_s[rising]
+    if len(time_s) < MIN_SAMPLES:
+        raise TrajectoryError(
+            f"The log holds {len(time_s)} usable samples of the altitude; a flight needs at least {MIN_SAMPLES}.",
+            hint="Record the vehicle's local position at 20 Hz or more during the whole flight.",
+            problems=(Problem("altitude_m", "has too few samples"),),
+        )
+    return time_s, {name: values[good][rising] for name, values in log.channels.items()}
+
+
+def _flights(time_s: Samples, altitude_m: Samples, landings_s: Sequence[float]) -> Iterator[tuple[int, int]]:
+    """Every rise by more than a hop within three seconds: the last sample where the vehicle stood, and the first where
+    it is down again, or the last of all."""
+    landings = np.searchsorted(time_s, np.sort(np.asarray(landings_s, dtype=np.float64)))
+    earlier = np.searchsorted(time_s, time_s[None, :] - np.array(_RISE_S)[:, None])
+    risen = np.flatnonzero(altitude_m - altitude_m[earlier].min(axis=0) > HIGHEST_HOP_M)
+    free_from = 0
+    while (place := int(np.searchsorted(risen, free_from))) < len(risen):
+        up = int(risen[place])
+        first = min(max(free_from, int(earlier[-1, up])), up)
+        ground_m = float(altitude_m[first : up + 1].min())
+        stood = first + int(np.flatnonzero(altitude_m[first : up + 1] <= ground_m + _STOOD_M)[-1])
+        announced = landings[landings > up][:1].tolist()
+        down = min(_down(time_s, altitude_m, up, ground_m), *announced, len(time_s) - 1)
+        yield stood, down
+        free_from = down + 1
+
+
+def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int:
+    """The sample from which on the altitude stays near the ground for two seconds; past the last one without any."""
+    low = altitude_m[up:] <= ground_m + NEAR_GROUND_M
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], low, [False])).astype(np.int8))) + up
+    stays = ((int(first), int(past)) for first, past in edges.reshape(-1, 2))
+    return next((first for first, past in stays if time_s[past - 1] - time_s[first] >= _LANDED_S), len(time_s))
+
+
+def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[Moment, bool]:
+    """What time counts from, and whether it is a command: the first one, since what comes after repeats it."""
+    ahead_s = max(free_from_s, stood_s - _COMMAND_AHEAD_S)
+    commands = [start for start in log.starts if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
+    if not commands:
+        return Moment(stood_s, "lift-off"), False
+    return min(commands, key=lambda start: start.time_s), True
+
+
+def _kept(
+    log: FlightLog, time_s: Samples, begin: Moment, held: "_Held", down: Moment
+) -> tuple[NDArray[np.bool_], Moment]:
+    """Which samples make the record, and what ends it; nothing in words where that is the landing or the log's end."""
+    ends = (moment for moment in (*log.ends, *held.changes) if moment.time_s > begin.time_s)
+    too_long = Moment(begin.time_s + LONGEST_S, "the longest record that is kept")
+    end = min((*ends, down, too_long), key=lambda moment: moment.time_s)
+    kept = (time_s >= begin.time_s - _BEFORE_S) & (time_s <= end.time_s)
+    return kept & (np.cumsum(kept) <= MAX_SAMPLES), end
+
+
+def _ground_m(time_s: Samples, altitude_m: Samples, begin_s: float, stood: int) -> float:
+    before = (time_s >= begin_s - _BEFORE_S) & (time_s <= begin_s)
+    return float(altitude_m[before].mean() if before.any() else altitude_m[stood])
+
+
+class _Held:
+    """The gains that the vehicle held at a time, and when they became others."""
+
+    def __init__(self, log: FlightLog, at_s: float) -> None:
+        known = {setting.name for setting in log.settings}
+        names = next((names for names in log.gain_sets if known.issuperset(names)), ())
+        settings = sorted((each for each in log.settings if each.name in names), key=lambda each: each.time_s)
+        gains: dict[str, float] = {}
+        for each in settings:
+            if each.time_s <= at_s:
+                gains[each.name] = each.value
+        self.learned_late = sorted(set(names) - set(gains))
+        for each in settings:
+            gains.setdefault(each.name, each.value)
+        self.gains: Gains = {name: gains[name] for name in names}
+        self.changes = [
+            Moment(each.time_s, f"{each.name} becoming {each.value:g}")
+            for each in settings
+            if each.time_s > at_s and each.value != gains[each.name]
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """What is known about one takeoff, to be put together."""
+
+    log: FlightLog
+    begin: Moment
+    end: Moment
+    is_commanded: bool
+    ground_m: float
+    held: _Held
+
+    def takeoff(
+        self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: NDArray[np.bool_]
+    ) -> Takeoff:
+        ground_m = self.ground_m if self.log.from_ground else 0.0
+        cut = {name: values[kept] - (ground_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
+        complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}
+        notes = (*self.log.notes, *self._notes([name for name in cut if name not in complete]))
+        return Takeoff(
+            number=number,
+            start_s=self.begin.time_s - float(time_s[0]),
+            begins_with=self.begin.what,
+            trajectory=Trajectory(
+                time_s[kept] - self.begin.time_s,
+                complete,
+                source="; ".join((self.log.title, f"time from {self.begin.what}", *notes)),
+                clock=self.log.clock,
+            ),
+            gains=self.held.gains,
+            notes=notes,
+        )
+
+    def _notes(self, left_out: Sequence[str]) -> Iterator[str]:
+        if not self.is_commanded:
+            yield "no command to take off in the log, so the delay before lift-off is not in the record"
+        if self.log.from_ground:
+            yield f"altitude counted from the ground, where the log has {self.ground_m:.2f} m"
+        if self.held.learned_late:
+            yield f"known only from after the takeoff: {', '.join(self.held.learned_late)}"
+        if left_out:
+            yield f"left out, with values missing: {', '.join(left_out)}"
+        if self.end.what:
+            yield f"ends after {self.end.time_s - self.begin.time_s:.1f} s with {self.end.what}"

@@ -1,0 +1,347 @@
+"""Reader of telemetry logs (.tlog): both directions of a MAVLink connection, each frame after its time in µs.
+
+Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock; the takeoff from the command that the ground
+station sent (a block named so, NAV_TAKEOFF, the takeoff mode), the gains from what the vehicle answered.
+"""
+
+import re
+import struct
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType, ModuleType
+from typing import BinaryIO, Final, Protocol
+
+import numpy as np
+from pymavlink.dialects.v10 import paparazzi
+from pymavlink.dialects.v20 import ardupilotmega, common
+
+from app.core.trajectory import Samples
+from app.logs.contents import Contents, contents, refused
+from app.logs.gains import ARDUPILOT_SETS, PAPARAZZI, PAPARAZZI_SETS, PX4_SETS, names_in
+from app.logs.takeoffs import FlightLog, Moment, Setting
+
+_STAMP_BYTES: Final = 8
+_MAGICS: Final = (0xFE, 0xFD)
+_MAGIC: Final = re.compile(rb"[\xfe\xfd]")
+_SIGNED: Final = 0x01
+_FIRST_US, _LAST_US = 631_152_000_000_000, 4_102_444_800_000_000
+"""Stamps of the years 1990 … 2100."""
+_POSITION: Final = struct.Struct("<I6f")
+_RESTART_S: Final = 1.0
+_ARMED: Final = 128
+_ACCEPTED: Final = (0, 5)
+_MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
+_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
+
+_HINT: Final = (
+    "Give a .tlog that holds the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff on; the ground "
+    "station's own commands should be in it too."
+)
+
+
+class _Message(Protocol):
+    """What pymavlink decodes: fields are attributes of the names in the dialect's definition."""
+
+    def get_type(self) -> str: ...
+    def get_srcSystem(self) -> int: ...  # noqa: N802 - pymavlink's name
+    def __getattr__(self, name: str) -> float | int | str: ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Autopilot:
+    """What differs between autopilots. `parameters` maps their names to those of the gains."""
+
+    title: str
+    dialect: ModuleType
+    gain_sets: Sequence[Sequence[str]]
+    parameters: Mapping[str, str]
+    from_ground: bool
+
+
+def _own_names(sets: Sequence[Sequence[str]]) -> Mapping[str, str]:
+    return {name: name for name in names_in(sets)}
+
+
+_AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
+    {
+        9: _Autopilot("Paparazzi", paparazzi, PAPARAZZI_SETS, PAPARAZZI, from_ground=False),
+        3: _Autopilot("ArduPilot", ardupilotmega, ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
+        12: _Autopilot("PX4", common, PX4_SETS, _own_names(PX4_SETS), from_ground=True),
+    }
+)
+"""By the number in their heartbeat. Paparazzi flies to altitudes above its local origin, others above the ground."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """Where a frame lies: its first byte and the one past its last; its message's number, sender and time."""
+
+    start: int
+    end: int
+    message: int
+    system: int
+    payload: int
+
+    def stamp_s(self, data: Contents) -> float:
+        return int.from_bytes(data[self.start - _STAMP_BYTES : self.start], "big") / 1e6
+
+
+def is_tlog(head: bytes) -> bool:
+    """Whether a file that begins so is one: a stamp of our time, and a frame's first byte."""
+    return (
+        len(head) > _STAMP_BYTES
+        and head[_STAMP_BYTES] in _MAGICS
+        and _FIRST_US <= int.from_bytes(head[:_STAMP_BYTES], "big") <= _LAST_US
+    )
+
+
+def read_tlog(stream: BinaryIO) -> FlightLog:
+    """Read a whole log. Raises TrajectoryError when nothing in it is a flight of a vehicle that is known here."""
+    data = contents(stream)
+    system, autopilot = _vehicle(data)
+    conversation = _Conversation(autopilot, system)
+    decoder = autopilot.dialect.MAVLink(None)
+    extra = bytes([autopilot.dialect.MAVLink_local_position_ned_message.crc_extra])
+    for frame in _frames(data):
+        if frame.message == autopilot.dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
+            if frame.system == system and _is_whole(autopilot.dialect, data, frame, extra):
+                conversation.position(_payload(data, frame, _POSITION.size), frame.stamp_s(data))
+        elif frame.message in conversation.heard:
+            try:
+                message: _Message = decoder.decode(bytearray(data[frame.start : frame.end]))
+            except autopilot.dialect.MAVError:
+                continue
+            conversation.heard[frame.message](message)
+    return conversation.log()
+
+
+def _frames(data: Contents) -> Iterator[_Frame]:
+    """Every frame that another one follows, or the log's end; what is damaged is passed over."""
+    position, size = _STAMP_BYTES, len(data)
+    while position + 12 <= size:
+        frame = _frame_at(data, position, size)
+        if frame is None:
+            found = _MAGIC.search(data, position + 1)
+            position = found.start() if found else size
+        else:
+            yield frame
+            position = frame.end + _STAMP_BYTES
+
+
+def _frame_at(data: Contents, start: int, size: int) -> _Frame | None:
+    magic, length = data[start], data[start + 1]
+    if magic == 0xFE:
+        end, payload, system, message = start + 8 + length, start + 6, data[start + 3], data[start + 5]
+    elif magic == 0xFD:
+        end, payload, system = start + 12 + length, start + 10, data[start + 5]
+        end += 13 if data[start + 2] & _SIGNED else 0
+        message = int.from_bytes(data[start + 7 : start + 10], "little")
+    else:
+        return None
+    following = end + _STAMP_BYTES
+    if end > size or (following < size and data[following] not in _MAGICS):
+        return None
+    return _Frame(start, end, message, system, payload)
+
+
+def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
+    """The system that sends the first heartbeat of a known autopilot."""
+    for frame in _frames(data):
+        if frame.message == 0 and frame.end - frame.payload >= 9:
+            autopilot = _AUTOPILOTS.get(data[frame.payload + 5])
+            if autopilot is not None:
+                return frame.system, autopilot
+    known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
+    raise refused(f"holds no MAVLink heartbeat of {known}", _HINT)
+
+
+def _is_whole(dialect: ModuleType, data: Contents, frame: _Frame, extra: bytes) -> bool:
+    """Whether the checksum is right; pymavlink's own decoding takes ten times as long."""
+    past = _past_payload(data, frame)
+    checksum = int.from_bytes(data[past : past + 2], "little")
+    return bool(dialect.x25crc(data[frame.start + 1 : past] + extra).crc == checksum)
+
+
+def _past_payload(data: Contents, frame: _Frame) -> int:
+    return frame.payload + data[frame.start + 1]
+
+
+def _payload(data: Contents, frame: _Frame, size: int) -> bytes:
+    """MAVLink 2 leaves out zeros at the end."""
+    return data[frame.payload : _past_payload(data, frame)][:size].ljust(size, b"\0")
+
+
+@dataclass(slots=True)
+class _Sent:
+    """A command that waits for its answer."""
+
+    moment: Moment
+    moments: list[Moment]
+
+
+@dataclass(slots=True)
+class _Conversation:
+    """What ground and vehicle said to each other, in the vehicle's time; that of the last position holds for all."""
+
+    autopilot: _Autopilot
+    system: int
+    heard: dict[int, Callable[[_Message], None]] = field(init=False)
+    _now_s: float = -np.inf
+    _offset_s: float = 0.0
+    _stamp_s: float = 0.0
+    _restarts: int = 0
+    _time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    _altitude_m: "array[float]" = field(default_factory=lambda: array("d"))
+    _climb_rate_m_s: "array[float]" = field(default_factory=lambda: array("d"))
+    _battery: list[tuple[float, float]] = field(default_factory=list)
+    _blocks: dict[int, str] = field(default_factory=dict)
+    _activated: list[tuple[float, int]] = field(default_factory=list)
+    _settings: list[Setting] = field(default_factory=list)
+    _asked: dict[str, float] = field(default_factory=dict)
+    _sent: dict[int, _Sent] = field(default_factory=dict)
+    _starts: list[Moment] = field(default_factory=list)
+    _ends: list[Moment] = field(default_factory=list)
+    _landings: list[Moment] = field(default_factory=list)
+    _armed: bool = False
+    _mode: int | None = None
+
+    def __post_init__(self) -> None:
+        by_name = {
+            "HEARTBEAT": self._heartbeat,
+            "SYS_STATUS": self._status,
+            "SET_MODE": self._set_mode,
+            "PARAM_VALUE": self._parameter,
+            "PARAM_SET": self._parameter_asked,
+            "COMMAND_INT": self._command,
+            "COMMAND_LONG": self._command,
+            "COMMAND_ACK": self._answer,
+            "SCRIPT_ITEM": self._block,
+        }
+        numbers = {name: getattr(self.autopilot.dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
+        self.heard = {number: by_name[name] for name, number in numbers.items() if number is not None}
+
+    def position(self, payload: bytes, stamp_s: float) -> None:
+        boot_ms, _, _, down_m, _, _, down_m_s = _POSITION.unpack(payload)
+        now_s = boot_ms / 1000 + self._offset_s
+        if now_s < self._now_s - _RESTART_S:  # its clock begins again: go on by the ground's
+            self._offset_s += self._now_s - now_s + max(stamp_s - self._stamp_s, 0.0)
+            now_s = boot_ms / 1000 + self._offset_s
+            self._restarts += 1
+        self._now_s, self._stamp_s = now_s, stamp_s
+        self._time_s.append(now_s)
+        self._altitude_m.append(-down_m)
+        self._climb_rate_m_s.append(-down_m_s)
+
+    def log(self) -> FlightLog:
+        """Raises TrajectoryError when there was no position."""
+        if not self._time_s:
+            raise refused("holds no LOCAL_POSITION_NED of the vehicle", _HINT)
+        for sent in self._sent.values():  # an answer that is missing in the log refuses nothing
+            sent.moments.append(sent.moment)
+        for time_s, number in self._activated:
+            name = self._blocks.get(number, "")
+            moments = self._starts if "takeoff" in name.casefold().replace(" ", "").replace("_", "") else self._ends
+            moments.append(Moment(time_s, f"the block {name}" if name else f"block {number}"))
+        return FlightLog(
+            title=f"MAVLink log of {self.autopilot.title}",
+            clock="vehicle",
+            time_s=np.array(self._time_s),
+            channels=self._channels(),
+            from_ground=self.autopilot.from_ground,
+            gain_sets=self.autopilot.gain_sets,
+            settings=self._settings,
+            starts=self._starts,
+            ends=[*self._ends, *self._landings],
+            landings=self._landings,
+            notes=tuple(self._notes()),
+        )
+
+    def _channels(self) -> dict[str, Samples]:
+        channels = {"altitude_m": np.array(self._altitude_m), "climb_rate_m_s": np.array(self._climb_rate_m_s)}
+        if self._battery:
+            times, volts = np.array(self._battery).T
+            channels["battery_v"] = np.interp(np.array(self._time_s), times, volts)
+        return channels
+
+    def _notes(self) -> Iterator[str]:
+        if self._restarts:
+            yield f"the vehicle restarted: its clock began anew ({self._restarts}×)"
+        for name, value in self._asked.items():
+            yield f"{name} was to become {value:g}, which the vehicle never confirmed"
+
+    def _is_vehicle(self, message: _Message) -> bool:
+        return message.get_srcSystem() == self.system
+
+    def _heartbeat(self, message: _Message) -> None:
+        if not self._is_vehicle(message):
+            return
+        armed, mode = bool(int(message.base_mode) & _ARMED), int(message.custom_mode)
+        if self._armed and not armed:
+            self._landings.append(Moment(self._now_s, "motors off"))
+        if self._mode not in {None, mode} and self._armed:
+            self._mode_changed(mode)
+        self._armed, self._mode = armed, mode
+
+    def _mode_changed(self, mode: int) -> None:
+        main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
+        if self.autopilot.title == "PX4" and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
+            if sub == _PX4_TAKEOFF_MODE:
+                self._starts.append(Moment(self._now_s, "takeoff mode"))
+            return
+        self._ends.append(Moment(self._now_s, f"mode {sub or mode}"))
+
+    def _status(self, message: _Message) -> None:
+        millivolt = int(message.voltage_battery)
+        if self._is_vehicle(message) and 0 < millivolt < 0xFFFF and np.isfinite(self._now_s):
+            self._battery.append((self._now_s, millivolt / 1000))
+
+    def _set_mode(self, message: _Message) -> None:
+        if not self._is_vehicle(message):
+            self._ends.append(Moment(self._now_s, "SET_MODE"))
+
+    def _parameter(self, message: _Message) -> None:
+        name, value = str(message.param_id), float(message.param_value)
+        if not self._is_vehicle(message) or not np.isfinite(value):
+            return
+        if name in self.autopilot.parameters:
+            gain = self.autopilot.parameters[name]
+            self._settings.append(Setting(self._now_s, gain, value))
+            if self._asked.get(gain) == value:
+                del self._asked[gain]
+        elif name == "kil_thr" and value:
+            self._landings.append(Moment(self._now_s, "motors off"))
+
+    def _parameter_asked(self, message: _Message) -> None:
+        name, value = str(message.param_id), float(message.param_value)
+        if name in self.autopilot.parameters and not self._is_vehicle(message) and np.isfinite(value):
+            whole = self.autopilot.dialect is paparazzi  # it keeps the integer part
+            self._asked[self.autopilot.parameters[name]] = float(int(value)) if whole else value
+
+    def _command(self, message: _Message) -> None:
+        if self._is_vehicle(message):
+            return
+        number = int(message.command)
+        takeoff = number == _TAKEOFF or (
+            number == _SET_MODE and self.autopilot.title == "PX4" and message.param3 == _PX4_TAKEOFF_MODE
+        )
+        lands = number == _LAND or (number == _MOTORS and not message.param1)
+        if takeoff:
+            self._sent[number] = _Sent(Moment(self._now_s, f"the command {_spoken(number)}"), self._starts)
+        elif lands or number == _SET_MODE:
+            self._sent[number] = _Sent(Moment(self._now_s, f"the command {_spoken(number)}"), self._ends)
+
+    def _answer(self, message: _Message) -> None:
+        sent = self._sent.pop(int(message.command), None) if self._is_vehicle(message) else None
+        if sent is not None and message.result in _ACCEPTED:
+            sent.moments.append(sent.moment)
+
+    def _block(self, message: _Message) -> None:
+        if self._is_vehicle(message):
+            self._blocks[int(message.seq)] = str(message.name)
+        else:
+            self._activated.append((self._now_s, int(message.seq)))
+
+
+def _spoken(command: int) -> str:
+    return {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}[command]

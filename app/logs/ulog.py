@@ -1,0 +1,249 @@
+"""Reader of PX4's logs (.ulg, "ULog").
+
+The file is sieved first: of the messages only those that tell of a takeoff go on to pyulog, and of their formats only
+flat and sensible ones. So memory and time stay bounded by the flight, whatever a file claims to hold.
+"""
+
+import io
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import BinaryIO, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pyulog import ULog
+from pyulog.exceptions import ULogException
+
+from app.core.trajectory import Samples
+from app.logs.contents import Contents, contents, refused
+from app.logs.gains import PX4_SETS, names_in
+from app.logs.takeoffs import FlightLog, Moment, Setting
+
+_MAGIC: Final = b"ULog\x01\x12\x35"
+_HEADER_BYTES: Final = 16
+_SYNC: Final = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+_TYPES: Final = frozenset(b"BFIMPQARDLCSO")
+_LARGEST_MESSAGE: Final = 10_000
+_LARGEST_ARRAY: Final = 64
+_MOST_FIELDS: Final = 300
+_FIELD: Final = re.compile(r"(u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,3})\])? (\w+)")
+_APPENDED: Final = 0x01
+
+_POSITION, _SET_POINT, _THRUST = "vehicle_local_position", "vehicle_local_position_setpoint", "vehicle_thrust_setpoint"
+_BATTERY, _STATUS, _LANDED = "battery_status", "vehicle_status", "vehicle_land_detected"
+_COMMAND, _ANSWER = "vehicle_command", "vehicle_command_ack"
+_TOPICS: Final = frozenset({_POSITION, _SET_POINT, _THRUST, _BATTERY, _STATUS, _LANDED, _COMMAND, _ANSWER})
+
+_TAKEOFF, _LAND = 22, 21
+_ACCEPTED: Final = 0
+_ANSWERED_WITHIN_S: Final = 2.0
+_TAKEOFF_MODE, _HOVER_MODE = 17, 4
+_MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position", 3: "mission", 5: "return", 18: "land"}
+
+_HINT: Final = "Give PX4's .ulg log of the flight, with vehicle_local_position in it."
+
+Topic = Mapping[str, NDArray[np.generic]]
+
+
+def is_ulog(head: bytes) -> bool:
+    """Whether a file that begins so is one."""
+    return head.startswith(_MAGIC)
+
+
+def read_ulog(stream: BinaryIO) -> FlightLog:
+    """Read a whole log. Raises TrajectoryError when there is no altitude in it."""
+    data = contents(stream)
+    if not is_ulog(data[:_HEADER_BYTES]) or len(data) < _HEADER_BYTES:
+        raise refused("is no ULog", _HINT)
+    sieve = _Sieve()
+    sieve.sift(data)
+    try:
+        log = ULog(io.BytesIO(sieve.kept))
+    except (ULogException, ValueError, KeyError, IndexError, TypeError) as error:
+        raise refused(f"is damaged: {error}", _HINT) from error
+    topics: dict[str, Topic] = {each.name: each.data for each in log.data_list}
+    position = topics.get(_POSITION, {})
+    if not {"timestamp", "z"} <= position.keys():
+        raise refused("holds no vehicle_local_position.z, the altitude", _HINT)
+    starts, ends, landings = _moments(topics)
+    return FlightLog(
+        title="PX4's log (ULog)",
+        clock="vehicle",
+        time_s=_seconds(position),
+        channels=_channels(position, topics),
+        from_ground=True,
+        gain_sets=PX4_SETS,
+        settings=tuple(_settings(log)),
+        starts=starts,
+        ends=[*ends, *landings],
+        landings=landings,
+        notes=tuple(_notes(sieve, log)),
+    )
+
+
+@dataclass(slots=True)
+class _Sieve:
+    """What of a log is worth reading. `damages` counts the stretches that were passed over."""
+
+    kept: bytearray = field(default_factory=bytearray)
+    damages: int = 0
+    _formats: set[str] = field(default_factory=set)
+    _subscribed: set[int] = field(default_factory=set)
+    _appended: list[int] = field(default_factory=list)
+
+    def sift(self, data: Contents) -> None:
+        """Go through all messages; after damage, on from the next mark that the logger sets for that."""
+        self.kept += data[:_HEADER_BYTES]
+        position, size = _HEADER_BYTES, len(data)
+        while position + 3 <= size:
+            length, kind = data[position] | data[position + 1] << 8, data[position + 2]
+            end = position + 3 + length
+            if self._appended and end > self._appended[0]:
+                position = max(self._appended.pop(0), position)
+            elif end > size:
+                break
+            elif kind not in _TYPES or not 0 < length <= _LARGEST_MESSAGE:
+                self.damages += 1
+                found = data.find(_SYNC, position + 1)
+                position = found + len(_SYNC) if found >= 0 else size
+            else:
+                if self._is_wanted(kind, data, position + 3, end):
+                    self.kept += data[position:end]
+                position = end
+
+    def _is_wanted(self, kind: int, data: Contents, start: int, end: int) -> bool:
+        if kind == ord("D"):
+            return end - start > 2 and (data[start] | data[start + 1] << 8) in self._subscribed
+        if kind == ord("O"):
+            return end - start == 2
+        if kind == ord("F"):
+            return self._takes_format(data[start:end])
+        if kind == ord("A"):
+            return self._subscribes(data[start:end])
+        if kind == ord("P"):
+            return _is_gain(data[start:end])
+        if kind == ord("B"):
+            self._flags(data[start:end])
+        return False
+
+    def _takes_format(self, body: bytes) -> bool:
+        """Whether it is that of a wanted topic: flat, every name once, a time among them."""
+        name, _, described = body.decode("ascii", "replace").partition(":")
+        parts = [part for part in described.split(";") if part]
+        if name not in _TOPICS or len(parts) > _MOST_FIELDS:
+            return False
+        found = [_FIELD.fullmatch(part) for part in parts]
+        fields = [each.groups() for each in found if each is not None]
+        names = [each[2] for each in fields]
+        sound = (
+            len(fields) == len(parts)
+            and len(set(names)) == len(names)
+            and ("uint64_t", None, "timestamp") in fields
+            and all(size is None or 0 < int(size) <= _LARGEST_ARRAY for _, size, _ in fields)
+        )
+        if sound:
+            self._formats.add(name)
+        return sound
+
+    def _subscribes(self, body: bytes) -> bool:
+        """Whether it is for the first instance of a wanted topic."""
+        if len(body) < 4:
+            return False
+        instance, number, name = body[0], body[1] | body[2] << 8, body[3:].decode("ascii", "replace")
+        if instance or name not in self._formats or number in self._subscribed:
+            return False
+        self._subscribed.add(number)
+        return True
+
+    def _flags(self, body: bytes) -> None:
+        if len(body) < 40:
+            return
+        if body[8] & ~_APPENDED or any(body[9:16]):
+            raise refused("was written by a newer PX4 in a way that is not read here", _HINT)
+        offsets = [int.from_bytes(body[at : at + 8], "little") for at in (16, 24, 32)]
+        self._appended = sorted(offset for offset in offsets if offset)
+
+
+def _is_gain(body: bytes) -> bool:
+    """Whether a parameter is one of the gains, in the form that PX4 writes: "float NAME" and its value."""
+    key = body[1 : 1 + body[0]].decode("ascii", "replace")
+    kind, _, name = key.partition(" ")
+    return kind == "float" and name in names_in(PX4_SETS) and len(body) == 1 + body[0] + 4
+
+
+def _settings(log: ULog) -> Iterator[Setting]:
+    for name, value in log.initial_parameters.items():
+        if np.isfinite(value):
+            yield Setting(-np.inf, name, float(value))
+    for time_us, name, value in log.changed_parameters:
+        if np.isfinite(value):
+            yield Setting(time_us / 1e6, name, float(value))
+
+
+def _channels(position: Topic, topics: Mapping[str, Topic]) -> dict[str, Samples]:
+    """Altitude where the estimator calls it valid, and what else was logged, at the times of the position."""
+    time_s, altitude_m = _seconds(position), -_numbers(position["z"])
+    if "z_valid" in position:
+        altitude_m = np.where(_numbers(position["z_valid"]) != 0.0, altitude_m, np.nan)
+    channels = {"altitude_m": altitude_m}
+    if "vz" in position:
+        channels["climb_rate_m_s"] = -_numbers(position["vz"])
+    for channel, topic, name, sign in (
+        ("reference_m", _SET_POINT, "z", -1.0),
+        ("thrust", _THRUST, "xyz[2]", -1.0),
+        ("battery_v", _BATTERY, "voltage_v", 1.0),
+    ):
+        table = topics.get(topic, {})
+        if {"timestamp", name} <= table.keys():
+            channels[channel] = np.interp(time_s, _seconds(table), sign * _numbers(table[name]))
+    return channels
+
+
+def _moments(topics: Mapping[str, Topic]) -> tuple[list[Moment], list[Moment], list[Moment]]:
+    """Commands and modes that take off, those that end a flight, and landings."""
+    starts: list[Moment] = []
+    ends: list[Moment] = []
+    landings: list[Moment] = []
+    refusals = [(time_s, command) for time_s, command, result in _rows(topics, _ANSWER, "command", "result") if result]
+    for time_s, command in _rows(topics, _COMMAND, "command"):
+        refused_at = [at for at, what in refusals if what == command and 0.0 <= at - time_s <= _ANSWERED_WITHIN_S]
+        if command in {_TAKEOFF, _LAND} and not refused_at:
+            moments, spoken = (starts, "NAV_TAKEOFF") if command == _TAKEOFF else (ends, "NAV_LAND")
+            moments.append(Moment(time_s, f"the command {spoken}"))
+    before: float | None = None
+    for time_s, mode in _rows(topics, _STATUS, "nav_state"):
+        if mode == _TAKEOFF_MODE != before:
+            starts.append(Moment(time_s, "the takeoff mode"))
+        elif before not in {None, mode} and mode != _HOVER_MODE:
+            ends.append(Moment(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}"))
+        before = mode
+    before = None
+    for time_s, landed in _rows(topics, _LANDED, "landed"):
+        if landed and before == 0.0:
+            landings.append(Moment(time_s, "the landing"))
+        before = landed
+    return starts, ends, landings
+
+
+def _notes(sieve: _Sieve, log: ULog) -> Iterator[str]:
+    if sieve.damages:
+        yield f"{sieve.damages} damaged stretches passed over"
+    if log.dropouts:
+        lost_s = sum(each.duration for each in log.dropouts) / 1000
+        yield f"the logger dropped data {len(log.dropouts)} times, {lost_s:.2f} s in all"
+
+
+def _rows(topics: Mapping[str, Topic], topic: str, *names: str) -> Iterator[tuple[float, ...]]:
+    """Time and columns of a topic, row by row; none where a column is missing."""
+    table = topics.get(topic, {})
+    if {"timestamp", *names} <= table.keys():
+        yield from zip(_seconds(table).tolist(), *(_numbers(table[name]).tolist() for name in names), strict=True)
+
+
+def _numbers(column: NDArray[np.generic]) -> Samples:
+    return column.astype(np.float64)
+
+
+def _seconds(table: Topic) -> Samples:
+    return _numbers(table["timestamp"]) / 1e6

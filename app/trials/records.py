@@ -1,0 +1,64 @@
+"""Records of flights made elsewhere: the gains that a log says it was flown with, held against those of the trial."""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.core.policy import Gains
+from app.db.models import CampaignRow, TrialRow
+from app.errors import Problem, UnconfirmedError
+from app.logs.takeoffs import Takeoff
+from app.trials.judging import judge_flown
+
+_SINGLE_PRECISION: Final = 1e-6
+"""Logs carry gains as single-precision numbers."""
+
+
+def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
+    """Have the trial say what the log does about its gains.
+
+    A log without gains leaves them as planned. Where both differ and that is `confirmed`, the trial becomes one of the
+    gains that were flown, without the prediction for the others; gains under other names are kept beside it.
+
+    Raises UnconfirmedError naming both sets, GainsError when what was flown is outside the campaign's bounds.
+    """
+    if not flown.gains:
+        return
+    if _same(row.gains, flown.gains):
+        row.read_back = row.read_back or dict(row.gains)
+        return
+    if not confirmed:
+        raise UnconfirmedError(
+            f"The log was flown with {_spoken(flown.gains)}; trial {row.number} was planned with {_spoken(row.gains)}.",
+            hint=f"Choose the log of this trial, or confirm that {_consequence(row.gains, flown.gains)}.",
+            problems=(Problem("confirm", f"the gains in the log, {_spoken(flown.gains)}, are not the trial's"),),
+        )
+    row.read_back = dict(flown.gains)
+    if _alike(row.gains, flown.gains):
+        judged = judge_flown(session, campaign, flown.gains)
+        row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
+        row.predicted_error = row.predicted_interval = None
+
+
+def _alike(planned: Gains, flown: Gains) -> bool:
+    """Whether both sets name the same gains."""
+    return planned.keys() == flown.keys()
+
+
+def _same(planned: Gains, flown: Gains) -> bool:
+    return _alike(planned, flown) and all(
+        math.isclose(value, flown[name], rel_tol=_SINGLE_PRECISION, abs_tol=_SINGLE_PRECISION)
+        for name, value in planned.items()
+    )
+
+
+def _consequence(planned: Gains, flown: Gains) -> str:
+    if _alike(planned, flown):
+        return "the trial shall stand for the gains in the log"
+    return "the flight shall count for the planned gains, which this log does not name"
+
+
+def _spoken(gains: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
