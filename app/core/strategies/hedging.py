@@ -6,6 +6,7 @@ over the box, cut short after 8 s and on half the models; then Nelder–Mead on 
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -53,8 +54,12 @@ def best_in(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector
     first = merit(takeoff, points, models[::2], _COARSE_S)
     starts = points[np.argsort(first, kind="stable")[: len(_EVALUATIONS)]]
 
+    @cache
+    def flown(counts: tuple[float, ...]) -> float:
+        return float(merit(takeoff, np.array([counts]), models)[0])
+
     def fine(gains: Vector) -> float:
-        return float(merit(takeoff, box.nearest(gains)[np.newaxis], models)[0])
+        return flown(tuple(box.nearest(gains).tolist()))
 
     steps = (box.high - box.low) / 10.0
     ends = [
