@@ -112,7 +112,7 @@ class Dialect:
 class Codec:
     """One end of one conversation: packs with its own identity and sequence numbers, and parses a stream of bytes.
 
-    For one thread.
+    One thread may pack while another parses, for the library's state of the two is kept apart.
     """
 
     def __init__(self, dialect: Dialect, *, system: int, component: int, signing_key: bytes | None) -> None:
@@ -122,19 +122,22 @@ class Codec:
                 problems=(Problem("signing_key", "needs MAVLink 2"),),
                 hint="Leave the signing key away, and keep strangers off the vehicle's network.",
             )
-        self._mav = _load(dialect.module).MAVLink(None, srcSystem=system, srcComponent=component)
-        self._mav.robust_parsing = True
+        library = _load(dialect.module)
+        self._out = library.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._in = library.MAVLink(None)
+        self._in.robust_parsing = True
         self._signs = signing_key is not None
         if signing_key is not None:
-            signing.enable(self._mav.signing, signing_key)
+            signing.enable(self._out.signing, signing_key)
+            signing.enable(self._in.signing, signing_key)
 
     def pack(self, message: Message) -> bytes:
         """The frame of `message` (of `Dialect.message`), with the next sequence number, signed when that was set up."""
         if self._signs:
-            signing.refresh(self._mav.signing)
+            signing.refresh(self._out.signing, seen=self._in.signing.timestamp)
         packable: _Packable = message  # type: ignore[assignment]  # every message of the library can
-        frame = packable.pack(self._mav)
-        self._mav.seq = (self._mav.seq + 1) % 256
+        frame = packable.pack(self._out)
+        self._out.seq = (self._out.seq + 1) % 256
         return frame
 
     def parse(self, data: bytes) -> list[Message]:
@@ -143,9 +146,9 @@ class Codec:
         while (message := self._next(data)) is not None:
             found.append(message)
             data = b""
-        if self._mav.buf_index > _SPENT_BYTES:  # the library frees its buffer only when that happens to run empty
-            del self._mav.buf[: self._mav.buf_index]
-            self._mav.buf_index = 0
+        if self._in.buf_index > _SPENT_BYTES:  # the library frees its buffer only when that happens to run empty
+            del self._in.buf[: self._in.buf_index]
+            self._in.buf_index = 0
         return found
 
     def _next(self, data: bytes) -> Message | None:
@@ -154,10 +157,10 @@ class Codec:
         The library believes the time stamp of a frame before it has checked the signature: one flipped bit, or one
         forged frame, and everything after it would be refused as old. So what a bad frame said of time is forgotten.
         """
-        times = dict(self._mav.signing.stream_timestamps)
-        message: Message | None = self._mav.parse_char(data)
+        times = dict(self._in.signing.stream_timestamps)
+        message: Message | None = self._in.parse_char(data)
         if message is not None and message.get_type() == BAD_DATA:
-            self._mav.signing.stream_timestamps = times
+            self._in.signing.stream_timestamps = times
         return message
 
 

@@ -1,7 +1,7 @@
 """One conversation with one vehicle.
 
-A thread of its own does all input and output, so that a command leaves within milliseconds of `send`, whatever else
-the program is at.
+A thread of its own hears the vehicle. A command leaves from the thread that sends it, without waiting: handed to the
+other thread, it would stand in line with every thread of the program that computes (bench/link.py measures it).
 """
 
 import threading
@@ -131,9 +131,9 @@ class Link:
         self._last_heartbeat_s: float | None = None
         self._next_heartbeat_s = self._attended_s = self._opened_s
         self._listeners = 0
-        self._outbox: deque[Message] = deque()
         self._inbox: deque[Received] = deque()
         self._news = threading.Condition()
+        self._sending = threading.Lock()
         self._is_closing = self._is_closed = False
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name=f"link {address}", daemon=True)
@@ -173,16 +173,15 @@ class Link:
             )
 
     def send(self, kind: str, **fields: FieldValue) -> None:
-        """Have the message `kind` ("PARAM_SET") leave within milliseconds; returns at once.
+        """Send the message `kind` ("PARAM_SET"); it has left, or was counted as unsent, when this returns, at once.
 
         Raises ValueError for a message or fields that the dialect does not have, LinkError when the link is closed.
         """
         message = self._dialect.message(kind, fields)
-        with self._news:
+        with self._sending:
             if self._is_closing or self._is_closed:
                 raise self._closed_error()
-            self._outbox.append(message)
-            self._transport.wake()
+            self._write(message)
 
     def receive(self, timeout_s: float) -> list[Received]:
         """Everything heard since the last call, oldest first; waits at most `timeout_s` of the clock for the first.
@@ -203,8 +202,8 @@ class Link:
         return heard
 
     def close(self) -> None:
-        """Send what is waiting, then end the conversation; returns once the log is stored. Again is harmless."""
-        with self._news:
+        """End the conversation; returns once the log is stored. Again is harmless."""
+        with self._sending:
             self._is_closing = True
             if not self._is_closed:
                 self._transport.wake()
@@ -221,35 +220,34 @@ class Link:
     def _run(self) -> None:
         try:
             while not self._is_closing:
-                self._send_what_is_due()
+                self._beat()
                 for data, peer in self._transport.read(self._patience_s()):
                     self._take_in(data, peer)
-            self._send_what_is_due()
         except Exception as error:
             self._failure = error
             raise
         finally:
-            with self._news:
+            with self._sending, self._news:
                 self._is_closed = True
-                self._news.notify_all()
                 self._transport.close()
+                self._news.notify_all()
 
     def _patience_s(self) -> float:
         """How long to wait for news, s on the wall."""
         return self._clock.wall_s(max(self._next_heartbeat_s - self._clock.now_s(), 0.0))
 
-    def _send_what_is_due(self) -> None:
-        while self._outbox:
-            self._write(self._outbox.popleft())
+    def _beat(self) -> None:
         now_s = self._clock.now_s()
         if now_s < self._next_heartbeat_s:
             return
         self._next_heartbeat_s = now_s + HEARTBEAT_EVERY_S
         is_attended = self._listeners > 0 or now_s - self._attended_s < UNATTENDED_AFTER_S
         if self._dialect.heeds_heartbeats and is_attended:
-            self._write(self._heartbeat)
+            with self._sending:
+                self._write(self._heartbeat)
 
     def _write(self, message: Message) -> None:
+        """Under the lock of sending."""
         frame = self._codec.pack(message)
         if self._transport.write(frame):
             self._sent += 1

@@ -51,12 +51,13 @@ def enable(state: SigningState, key: bytes, *, link_id: int = 0) -> None:
     state.secret_key = key
     state.link_id = link_id
     state.sign_outgoing = True
-    refresh(state)
+    state.timestamp = timestamp_now()
 
 
-def refresh(state: SigningState) -> None:
-    """Bring the time stamp of the next frame up to now, for it must neither fall behind nor repeat."""
-    state.timestamp = max(state.timestamp, timestamp_now())
+def refresh(state: SigningState, *, seen: int) -> None:
+    """Bring the time stamp of the next frame up to now and to the latest one `seen` from the other end, whose clock may
+    be ahead: it must neither fall behind nor repeat."""
+    state.timestamp = max(state.timestamp, seen, timestamp_now())
 
 
 def timestamp_now() -> int:

@@ -60,7 +60,8 @@ class TlogWriter:
                 while not self._frames.empty():
                     waiting.append(self._frames.get())
                 more = waiting[-1] is not None
-                unstored = self._store(unstored + b"".join(record(*each) for each in waiting if each is not None))
+                frames = sorted(each for each in waiting if each is not None)  # of several threads
+                unstored = self._store(unstored + b"".join(record(*each) for each in frames))
 
     def _store(self, data: bytes) -> bytes:
         """Write `data`; what the disk did not take, to be tried again before all that follows."""

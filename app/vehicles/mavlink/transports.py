@@ -9,6 +9,7 @@ import os
 import selectors
 import socket
 import termios
+import threading
 import time
 from collections.abc import Callable
 from typing import Final, Protocol
@@ -44,7 +45,7 @@ class LinkError(VehicleError):
 
 
 class Transport(Protocol):
-    """Bytes to and from one peer. For one thread, save `wake`."""
+    """Bytes to and from one peer. One thread reads and closes; any may `write` and `wake` until then."""
 
     @property
     def remote(self) -> Peer | None:
@@ -167,14 +168,16 @@ class StreamTransport:
         """`opened` opens the stream or raises OSError. Raises LinkError when that fails now."""
         self._peer = peer
         self._opened = opened
-        self._backlog = bytearray()
-        self._next_try_s = 0.0
         try:
             self._stream: _Stream | None = opened()
         except OSError as error:
             raise _cannot_open(f"{peer[0]}:{peer[1]}", error) from error
         self._waiter = _Waiter()
-        self._waiter.watch(self._stream.fileno())
+        self._next_try_s = 0.0
+        # Of the stream, other threads use but the descriptor, under this lock; a broken one is closed by the reader.
+        self._writing = threading.Lock()
+        self._backlog = bytearray()
+        self._is_broken = False
 
     @property
     def remote(self) -> Peer | None:
@@ -185,23 +188,29 @@ class StreamTransport:
         return 0
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        if self._is_broken:
+            self._break()
         if self._stream is None:
-            timeout_s = min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0))
-        events = self._waiter.wait(timeout_s)
-        if self._stream is None:
+            self._waiter.wait(min(timeout_s, max(self._next_try_s - time.monotonic(), 0.0)))
             self._reopen()
             return []
+        self._waiter.watch(self._stream.fileno(), writable=bool(self._backlog))
+        events = self._waiter.wait(timeout_s)
         if events & selectors.EVENT_WRITE:
-            self._flush()
-        data = self._receive() if events & selectors.EVENT_READ else b""
+            with self._writing:
+                self._flush(self._stream)
+        data = self._receive(self._stream) if events & selectors.EVENT_READ else b""
         return [(data, self._peer)] if data else []
 
     def write(self, data: bytes) -> bool:
-        if self._stream is None or len(self._backlog) + len(data) > BACKLOG:
-            return False
-        self._backlog += data
-        self._flush()
-        return self._stream is not None
+        with self._writing:
+            if self._stream is None or self._is_broken or len(self._backlog) + len(data) > BACKLOG:
+                return False
+            self._backlog += data
+            self._flush(self._stream)
+            if self._backlog or self._is_broken:
+                self._waiter.wake()
+            return not self._is_broken
 
     def adopt(self, peer: Peer) -> None:
         """There is but one."""
@@ -214,39 +223,34 @@ class StreamTransport:
             self._stream.close()
         self._waiter.close()
 
-    def _receive(self) -> bytes:
+    def _receive(self, stream: _Stream) -> bytes:
         """What a readable stream holds; one that holds nothing has ended."""
-        if self._stream is None:
-            return b""
         try:
-            data = os.read(self._stream.fileno(), LARGEST_READ)
+            data = os.read(stream.fileno(), LARGEST_READ)
         except BlockingIOError:
             return b""
         except OSError:
             data = b""
-        if not data:
-            self._break()
+        self._is_broken |= not data
         return data
 
-    def _flush(self) -> None:
+    def _flush(self, stream: _Stream) -> None:
         """Write what the stream takes now; the rest follows when it takes more."""
-        if self._stream is None:
-            return
         try:
-            del self._backlog[: os.write(self._stream.fileno(), self._backlog)]
+            del self._backlog[: os.write(stream.fileno(), self._backlog)]
         except BlockingIOError:
             pass
         except OSError:
-            self._break()
-            return
-        self._waiter.watch(self._stream.fileno(), writable=bool(self._backlog))
+            self._is_broken = True
 
     def _break(self) -> None:
-        if self._stream is not None:
-            self._waiter.forget()
-            self._stream.close()
-        self._stream = None
-        self._backlog.clear()
+        self._waiter.forget()
+        with self._writing:
+            if self._stream is not None:
+                self._stream.close()
+            self._stream = None
+            self._backlog.clear()
+            self._is_broken = False
         self._next_try_s = time.monotonic() + REOPEN_EVERY_S
 
     def _reopen(self) -> None:
@@ -256,8 +260,6 @@ class StreamTransport:
             self._stream = self._opened()
         except OSError:
             self._next_try_s = time.monotonic() + REOPEN_EVERY_S
-        else:
-            self._waiter.watch(self._stream.fileno())
 
 
 class _Waiter:

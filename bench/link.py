@@ -1,0 +1,211 @@
+"""How soon a command is on the wire while telemetry streams to many readers, and what recording telemetry costs.
+
+    ./dev exec python -m bench.link [--seconds 20]
+
+A process of its own is the vehicle: it streams over the loopback interface and notes when each packet arrives. Here,
+commands of an abort are sent at random instants, while 20 threads read every sample and write it as JSON; in the last
+case one more thread computes without pause. Then telemetry is only recorded, to memory and to a telemetry log, and the
+processor time of this process is counted. Prints the figures; exits 1 when a latency is above 50 ms at the 99th
+percentile, a command or a sample was lost, or recording takes more than a tenth of a core.
+"""
+
+import argparse
+import json
+import multiprocessing
+import queue
+import random
+import select
+import socket
+import struct
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from app.vehicles.mavlink.addresses import UdpAddress
+from app.vehicles.mavlink.clock import ScaledClock
+from app.vehicles.mavlink.dialects import PAPARAZZI, FieldValue, Message, number
+from app.vehicles.mavlink.link import Link
+
+LIMIT_S: Final = 0.05
+CORE_SHARE_LIMIT: Final = 0.1
+READERS: Final = 20
+COMMANDS_A_SECOND: Final = 100.0
+LOOPBACK: Final = "127.0.0.1"
+SYSTEM: Final = 31
+SO_TIMESTAMPNS: Final = 35
+"""Of Linux: each packet comes with the time at which it was received, however busy the receiver is."""
+SEED: Final = 20261121
+FIELDS: Final = ("time_boot_ms", "x", "y", "z", "vx", "vy", "vz")
+
+Arrivals = dict[int, int]
+"""When the operating system received each command, ns since 1970."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """The streaming process: where it is reached, and the pipe that ends it."""
+
+    address: UdpAddress
+    pipe: Connection
+
+    def end(self) -> tuple[int, Arrivals]:
+        """How many samples it sent, and when commands arrived."""
+        self.pipe.send("end")
+        sent: int
+        arrivals: Arrivals
+        sent, arrivals = self.pipe.recv()
+        return sent, arrivals
+
+
+def fly(pipe: Connection, rate_hz: float) -> None:
+    """The vehicle's process: stream positions at `rate_hz`, and note what arrives, until told to end."""
+    codec = PAPARAZZI.codec(system=SYSTEM, component=190)
+    arrived: list[tuple[int, bytes]] = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
+        wire.bind((LOOPBACK, 0))
+        wire.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+        pipe.send(wire.getsockname()[1])
+        ground = (LOOPBACK, pipe.recv())
+        start_s, sent = time.monotonic(), 0
+        while not pipe.poll():
+            wait_s = start_s + sent / rate_hz - time.monotonic()
+            if select.select([wire], [], [], max(wait_s, 0.0))[0]:
+                frame, ((_, _, stamp),), _, _ = wire.recvmsg(4096, 64)
+                seconds, nanoseconds = struct.unpack("@qq", stamp)
+                arrived.append((seconds * 10**9 + nanoseconds, frame))
+            elif wait_s <= 0.0:
+                wire.sendto(codec.pack(PAPARAZZI.message("LOCAL_POSITION_NED", sample(sent, rate_hz))), ground)
+                sent += 1
+    commands = [(at_ns, message) for at_ns, frame in arrived for message in codec.parse(frame)]
+    pipe.send((sent, {int(number(message, "param1")): at_ns for at_ns, message in commands}))
+
+
+def sample(step: int, rate_hz: float) -> dict[str, FieldValue]:
+    return dict(zip(FIELDS, (round(1e3 * step / rate_hz), 0.1, -0.2, -3.0, 0.01, -0.01, 0.5), strict=True))
+
+
+@contextmanager
+def vehicle(rate_hz: float) -> Iterator[Vehicle]:
+    """A vehicle that streams from here on."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((LOOPBACK, 0))
+        local = probe.getsockname()[1]
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=fly, args=(theirs, rate_hz), daemon=True)
+    process.start()
+    port = ours.recv()
+    ours.send(local)
+    yield Vehicle(UdpAddress(LOOPBACK, port, local), ours)
+    process.join()
+
+
+def serve(samples: "queue.SimpleQueue[Message | None]") -> None:
+    """One reader: every sample as JSON, as a live view would send it."""
+    while (message := samples.get()) is not None:
+        json.dumps({field: number(message, field) for field in FIELDS})
+
+
+def distribute(link: Link, readers: list["queue.SimpleQueue[Message | None]"], done: threading.Event) -> None:
+    """Hand everything heard to all readers."""
+    while not done.is_set():
+        for each in link.receive(0.05):
+            for reader in readers:
+                reader.put(each.message)
+    for reader in readers:
+        reader.put(None)
+
+
+def compute(done: threading.Event) -> None:
+    while not done.is_set():
+        sum(range(1000))
+
+
+@contextmanager
+def audience(link: Link, *, is_computing: bool) -> Iterator[None]:
+    done = threading.Event()
+    readers: list[queue.SimpleQueue[Message | None]] = [queue.SimpleQueue() for _ in range(READERS)]
+    threads = [threading.Thread(target=serve, args=(reader,)) for reader in readers]
+    threads.append(threading.Thread(target=distribute, args=(link, readers, done)))
+    if is_computing:
+        threads.append(threading.Thread(target=compute, args=(done,)))
+    for thread in threads:
+        thread.start()
+    yield
+    done.set()
+    for thread in threads:
+        thread.join()
+
+
+def latencies_s(rate_hz: float, seconds: float, *, is_computing: bool) -> tuple[list[float], int]:
+    """From `Link.send` to arrival, for each command that arrived, and how many did not."""
+    randomness = random.Random(SEED)
+    sent_ns: list[int] = []
+    with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "flight.tlog"
+        with Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log) as link:
+            with audience(link, is_computing=is_computing):
+                until_s = time.monotonic() + seconds
+                while time.monotonic() < until_s:
+                    time.sleep(randomness.expovariate(COMMANDS_A_SECOND))
+                    sent_ns.append(time.time_ns())
+                    link.send("COMMAND_LONG", **command(len(sent_ns) - 1))
+                time.sleep(0.2)
+            _, arrivals = drone.end()
+    return [(at_ns - sent_ns[index]) * 1e-9 for index, at_ns in arrivals.items()], len(sent_ns) - len(arrivals)
+
+
+def command(index: int) -> dict[str, FieldValue]:
+    parameters: dict[str, FieldValue] = {f"param{place}": 0.0 for place in range(2, 8)}
+    header: dict[str, FieldValue] = {"target_system": SYSTEM, "target_component": 0, "command": 21, "confirmation": 0}
+    return header | parameters | {"param1": float(index)}
+
+
+def recording_share(rate_hz: float, seconds: float) -> tuple[float, int, int]:
+    """The processor time of recording over the time it took, how many samples were recorded, and how many sent."""
+    recorded: list[Message] = []
+    with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "flight.tlog"
+        with Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log) as link:
+            start_s, used_s = time.monotonic(), time.process_time()
+            while time.monotonic() - start_s < seconds:
+                recorded += [each.message for each in link.receive(0.05)]
+            share = (time.process_time() - used_s) / (time.monotonic() - start_s)
+            sent, _ = drone.end()
+            recorded += [each.message for each in link.receive(0.2)]
+    return share, len(recorded), sent
+
+
+def main() -> int:
+    asked = argparse.ArgumentParser(prog="bench.link")
+    asked.add_argument("--seconds", type=float, default=2.5, help="for each figure")
+    seconds = asked.parse_args().seconds
+    failed = False
+    for rate_hz, is_computing in ((50.0, False), (500.0, False), (500.0, True)):
+        delays_s, missing = latencies_s(rate_hz, seconds, is_computing=is_computing)
+        median_s, high_s = np.quantile(delays_s, [0.5, 0.99])
+        print(
+            f"telemetry at {rate_hz:.0f} Hz to {READERS} readers{', one thread computing' if is_computing else ''}: "
+            f"{len(delays_s)} commands, p50 {median_s * 1e3:.2f} ms, p99 {high_s * 1e3:.2f} ms "
+            f"(limit {LIMIT_S * 1e3:.0f}), max {max(delays_s) * 1e3:.2f} ms, {missing} lost"
+        )
+        failed |= high_s > LIMIT_S or missing > 0
+    for rate_hz in (50.0, 500.0):
+        share, recorded, sent = recording_share(rate_hz, seconds)
+        limit = f" (limit {CORE_SHARE_LIMIT:.0%})" if rate_hz == 50.0 else ""
+        print(f"recording {rate_hz:.0f} Hz: {share:.1%} of a core{limit}, {recorded} of {sent} samples")
+        failed |= recorded < sent or (bool(limit) and share > CORE_SHARE_LIMIT)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
