@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 from scipy.linalg import hadamard, solve_toeplitz
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
 
 from app.core.definition import Flight
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, fitted_parameters
@@ -43,6 +43,11 @@ _DIFFERENCE: Final = 0.1
 """Steps of the difference quotients, in prior standard deviations: well above the steps of the loop's integers."""
 _STARTS: Final = 32
 _WIDEST_OWN: Final = 4.0
+_MOST_TRIALS: Final = 20
+_LEAST_GAIN: Final = 0.2
+"""A step that promises to lower half the sum of squares by less ends the search: it goes under a standard deviation."""
+_DAMPING: Final = 1.0
+"""The first that a failed step brings, in units of the priors."""
 _UNMODELLED: Final = 0.05
 """What no fit can rule out, in prior standard deviations."""
 
@@ -103,7 +108,7 @@ def calibrate(experiment: Experiment, flights: Sequence[Flight]) -> Calibration:
         start = fit.minimum(start)
         fit.learn_noise(start)
     m = len(experiment.model_parameters)
-    slopes = fit.slopes(start)
+    slopes = fit.slopes(start, fit.outputs(start))
     covariance: Matrix = np.linalg.inv(slopes.T @ slopes)[:m, :m].astype(np.float64)
     sd = np.sqrt(np.diag(covariance))
     model = np.clip(np.rint(start[:m] / sd * 1e6) * sd.round(12) / 1e6, fit.lower, fit.upper)
@@ -188,37 +193,41 @@ class _Fit:
         return np.concatenate((likely[np.argmin(cost)], np.zeros(len(self.gains) * len(self.own))))
 
     def minimum(self, start: Vector) -> Vector:
+        """Gauss–Newton within the bounds, damped (Levenberg–Marquardt) where the misses do not fall as foretold."""
         others = len(start) - len(self.mean)
         lower = np.concatenate((self.lower, np.full(others, -_WIDEST_OWN)))
         upper = np.concatenate((self.upper, np.full(others, _WIDEST_OWN)))
-        inset = 1e-4 * (upper - lower)
-        found = least_squares(
-            self.misses,
-            np.clip(start, lower + inset, upper - inset),
-            self.slopes,
-            bounds=(lower, upper),
-            x_scale=np.concatenate((self.sd, np.ones(others))),
-            ftol=1e-3,
-            xtol=1e-4,
-            max_nfev=20,
-        )
-        return np.asarray(found.x)
+        scale = np.concatenate((self.sd, np.ones(others)))
+        at, damping = np.clip(start, lower, upper), 0.0
+        outputs, misses = self._flown(at)
+        slopes = self.slopes(at, outputs)
+        for _ in range(_MOST_TRIALS):
+            there, gain = _bounded_step(slopes, misses, at, lower, upper, damping / scale)
+            if gain < _LEAST_GAIN:
+                break
+            outputs, tried = self._flown(there)
+            gained = 0.5 * float(misses @ misses - tried @ tried)
+            damping = damping / 4.0 if gained > 0.25 * gain else max(4.0 * damping, _DAMPING)
+            if gained > 0.0:
+                at, misses = there, tried
+                slopes = self.slopes(at, outputs)
+        return at
 
-    def misses(self, unknowns: Vector) -> Vector:
-        """Whitened deviations of the model from the flights, then those of the unknowns from what was known."""
-        deviations = self._outputs(self.gains, self.models(unknowns)) - self.measured
-        m = len(self.mean)
-        return np.concatenate((self._whitened(deviations).ravel(), (unknowns[:m] - self.mean) / self.sd, unknowns[m:]))
+    def _flown(self, unknowns: Vector) -> tuple[Matrix, Vector]:
+        """The models' outputs, shape (k, s), and the misses: their whitened deviations from the flights, then those of
+        the unknowns from what was known."""
+        outputs, m = self.outputs(unknowns), len(self.mean)
+        deviations = self._whitened(outputs - self.measured).ravel()
+        return outputs, np.concatenate((deviations, (unknowns[:m] - self.mean) / self.sd, unknowns[m:]))
 
-    def slopes(self, unknowns: Vector) -> Matrix:
-        """∂misses/∂unknowns by one-sided differences, all in one compiled call."""
+    def slopes(self, unknowns: Vector, outputs: Matrix) -> Matrix:
+        """∂misses/∂unknowns where the models fly `outputs`, by one-sided differences, all in one call."""
         models = self.models(unknowns)
         k, m = models.shape
         step = np.where(models + _DIFFERENCE * self.sd > self.upper, -_DIFFERENCE, _DIFFERENCE) * self.sd
-        moved = np.repeat(models[:, np.newaxis], m + 1, axis=1)
-        moved[:, 1:] += np.eye(m) * step[:, :, np.newaxis]
-        outputs = self._outputs(np.repeat(self.gains, m + 1, axis=0), moved.reshape(-1, m)).reshape(k, m + 1, -1)
-        of_model = self._whitened((outputs[:, 1:] - outputs[:, :1]) / step[:, :, np.newaxis])
+        moved = (models[:, np.newaxis] + np.eye(m) * step[:, :, np.newaxis]).reshape(-1, m)
+        there = self._outputs(np.repeat(self.gains, m, axis=0), moved).reshape(k, m, -1)
+        of_model = self._whitened((there - outputs[:, np.newaxis]) / step[:, :, np.newaxis])
         samples, q = of_model.shape[2], len(self.own)
         slopes = np.zeros((k * samples + len(unknowns), len(unknowns)))
         for flight in range(k):
@@ -230,12 +239,16 @@ class _Fit:
 
     def learn_noise(self, unknowns: Vector) -> None:
         """Fit the autoregression to what is left over (Yule–Walker), white noise of the assumed floor added."""
-        left = self._outputs(self.gains, self.models(unknowns)) - self.measured
+        left = self.outputs(unknowns) - self.measured
         samples = left.shape[1]
         lags = [float(np.sum(left[:, lag:] * left[:, : samples - lag])) / left.size for lag in range(_ORDER + 1)]
         lags[0] += (_FLOOR * self.experiment.scatter.sd) ** 2
         self.memory = np.asarray(solve_toeplitz(lags[:-1], lags[1:]))
         self.noise = np.sqrt([lags[0], lags[0] - float(self.memory @ lags[1:])])
+
+    def outputs(self, unknowns: Vector) -> Matrix:
+        """What each flight's own model flies, ten times a second: (k, s)."""
+        return self._outputs(self.gains, self.models(unknowns))
 
     def _outputs(self, gains: Matrix, models: Matrix) -> Matrix:
         return self.experiment.outputs(gains, models)[:, :: self.every]
@@ -249,3 +262,15 @@ class _Fit:
         new[..., :order] /= self.noise[0]
         new[..., order:] /= self.noise[1]
         return new
+
+
+def _bounded_step(
+    slopes: Matrix, misses: Vector, at: Vector, lower: Vector, upper: Vector, damping: Vector
+) -> tuple[Vector, float]:
+    """Where the linearised misses are smallest within the bounds, each change held back by its `damping`, all of shape
+    (n,); and by how much half their sum of squares is less there."""
+    q, r = np.linalg.qr(np.vstack((slopes, np.diag(damping))))
+    aim = -q[: len(misses)].T @ misses
+    step = lsq_linear(r, aim, (lower - at, upper - at), method="bvls").x
+    linear = slopes @ step
+    return np.clip(at + step, lower, upper), -float(misses @ linear + 0.5 * linear @ linear)
