@@ -122,7 +122,7 @@ def get_catalogue() -> Catalogue:
                 for each in EXPERIMENTS.values()
             ],
             "strategies": list(STRATEGIES.values()),
-            "vehicle_kinds": list(VEHICLE_KINDS.values()),
+            "vehicle_kinds": [kind for kind in VEHICLE_KINDS.values() if kind.served],
             "presets": [_preset(name) for name in preset_names()],
         },
         from_attributes=True,

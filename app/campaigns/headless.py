@@ -78,6 +78,7 @@ def fly_campaign(
     """
     _require_no_donor(definition)
     experiment = experiment_of(definition)
+    is_real = get_kind(vehicle).is_real_with(options)
     trials: list[HeadlessTrial] = []
     history: list[Flight] = []
     battery_v: float | None = None
@@ -86,7 +87,7 @@ def fly_campaign(
         proposal = next_proposal(definition, history)
         if why := _ended_because(definition, trials, history, proposal, battery_v):
             return HeadlessCampaign(trials=tuple(trials), stopped_because=why)
-        overruled = _require_flyable(definition, experiment, proposal, history, overrule, get_kind(vehicle).is_real)
+        overruled = _require_flyable(definition, experiment, proposal, history, overrule, is_real)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
         battery_v = landing_battery_v(record.trajectory)
@@ -175,7 +176,7 @@ def _fly(
 def _assess(
     experiment: Experiment, number: int, proposal: Proposal, record: FlightRecord, overrule_reason: str
 ) -> HeadlessTrial:
-    outcome: Outcome = "aborted" if record.ending == "aborted" else "valid"
+    outcome: Outcome = "valid" if record.ending == "completed" else record.ending
     error: float | None = None
     reason = record.reason
     if outcome == "valid":

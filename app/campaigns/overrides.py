@@ -26,11 +26,13 @@ def override(
 ) -> CampaignFile:
     """The file with what was given on the command line in place of its own.
 
-    Another vehicle or strategy starts from its default options. Raises InputError naming what cannot be used.
+    Another vehicle or strategy starts from its default options; `vehicle` may name an address too, as in
+    mavlink:udp:127.0.0.1:4245. Raises InputError naming what cannot be used.
     """
     chosen: dict[Path, object] = {}
     if vehicle is not None and vehicle != file.vehicle.kind:
-        chosen |= {("vehicle", "kind"): vehicle, ("vehicle", "options"): {}}
+        kind, _, address = vehicle.partition(":")
+        chosen |= {("vehicle", "kind"): kind, ("vehicle", "options"): {"address": address} if address else {}}
     if strategy is not None and strategy != file.definition.strategy:
         chosen |= {("definition", "strategy"): strategy, ("definition", "options"): {}}
     if start is not None:

@@ -46,7 +46,7 @@ def run_campaign(
         settings=settings,
     )
     definition, options = check_campaign(file.definition, file.vehicle)
-    _require_wings(file)
+    _require_wings(file.vehicle.kind, options)
     experiment = experiment_of(definition)
     out = console(json_out)
     with _Display(definition, experiment) as display:
@@ -59,13 +59,14 @@ def _read(source: str) -> CampaignFile:
     return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
 
 
-def _require_wings(file: CampaignFile) -> None:
-    kind = get_kind(file.vehicle.kind)
-    if not kind.can_fly or kind.is_real:
+def _require_wings(kind: str, options: Mapping[str, OptionValue]) -> None:
+    described = get_kind(kind)
+    if not described.can_fly or described.is_real_with(options):
         raise InputError(
-            f"{kind.title} cannot be flown from the command line.",
-            problems=(Problem("vehicle.kind", f"{kind.name} is not a simulation"),),
-            hint="Choose a simulation (--vehicle jsbsim, twin or lti), or use the dashboard.",
+            f"{described.title} cannot be flown from the command line.",
+            problems=(Problem("vehicle.kind", f"{kind} is not a simulation"),),
+            hint="Choose a simulation: --vehicle jsbsim, twin or lti, or mavlink:ADDRESS --set simulated=true with an "
+            "address on this computer. Real vehicles fly on a person's act in the dashboard only.",
         )
 
 

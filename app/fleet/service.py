@@ -27,7 +27,7 @@ def vehicle_of_kind(session: Session, kind: str, *, safe_gains: Gains) -> Vehicl
         title=described.title,
         is_real=described.is_real,
         safe_gains=dict(safe_gains),
-        state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
+        state=VehicleState.READY if described.can_fly and described.served else VehicleState.DISCONNECTED,
         concern="",
     )
     session.add(row)
@@ -65,7 +65,7 @@ def settle_vehicle(row: VehicleRow, *, concern: str = "") -> None:
 
 def can_fly(row: VehicleRow) -> bool:
     """Whether the program can fly it, rather than take records of flights made elsewhere."""
-    return row.kind in VEHICLE_KINDS and VEHICLE_KINDS[row.kind].can_fly
+    return row.kind in VEHICLE_KINDS and VEHICLE_KINDS[row.kind].can_fly and VEHICLE_KINDS[row.kind].served
 
 
 def classed_by_program(row: VehicleRow) -> bool:

@@ -8,7 +8,8 @@ from app.core.policy import Gains
 from app.core.trajectory import Trajectory
 
 OptionValue = bool | int | float | str
-Ending = Literal["completed", "aborted"]
+Ending = Literal["completed", "aborted", "invalid"]
+"""aborted: cut short, a safety limit or a person; invalid: the measurement is no good, whatever the gains."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,12 +14,18 @@ def _nothing(_options: Options) -> tuple[Problem, ...]:
     return ()
 
 
+def _never(_options: Options) -> bool:
+    return False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleKind:
     """A registered kind of vehicle.
 
     `experiments` names those that it can fly. `open(options, safe_gains)` gets complete, checked options and returns a
-    vehicle that holds its safe gains; `conflicts(options)` names options that are possible one by one but not together.
+    vehicle that holds its safe gains; `conflicts(options)` names options that are possible one by one but not together;
+    `simulates(options)` says whether a vehicle of a real kind is a simulation all the same. The dashboard offers and
+    flies those that are `served`.
     """
 
     name: str
@@ -31,6 +37,12 @@ class VehicleKind:
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains], Vehicle]
     conflicts: Callable[[Options], tuple[Problem, ...]] = _nothing
+    simulates: Callable[[Options], bool] = _never
+    served: bool = True
+
+    def is_real_with(self, options: Options) -> bool:
+        """Whether a vehicle with these options, complete and checked, is REAL."""
+        return self.is_real and not self.simulates(options)
 
     def check(self, options: Mapping[str, object], *, field: str) -> dict[str, OptionValue]:
         """The options completed with the defaults. Raises InputError naming every unknown or impossible one."""

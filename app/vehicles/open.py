@@ -13,10 +13,11 @@ from app.vehicles.imported import IMPORT
 from app.vehicles.jsbsim.kind import JSBSIM
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.lti import LTI
+from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.twin import TWIN
 
 VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
-    {kind.name: kind for kind in (JSBSIM, TWIN, LTI, IMPORT)}
+    {kind.name: kind for kind in (JSBSIM, TWIN, LTI, MAVLINK, IMPORT)}
 )
 
 

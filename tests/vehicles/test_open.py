@@ -69,7 +69,7 @@ def test_an_unknown_kind_names_the_field_and_the_choices() -> None:
     with pytest.raises(InputError) as refusal:
         get_kind("balloon")
     assert refusal.value.problems[0].field == "vehicle.kind"
-    assert "jsbsim, twin, lti, import" in refusal.value.hint
+    assert "jsbsim, twin, lti, mavlink, import" in refusal.value.hint
 
 
 def test_options_are_completed_with_their_defaults() -> None:

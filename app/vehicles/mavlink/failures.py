@@ -1,0 +1,106 @@
+"""What can go wrong in a trial: how it is noticed, what is done, what the trial is then worth, and what a person is
+told. The order of the table is that of severity: the first that holds is the one that counts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final, Literal
+
+Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
+"""refused: nothing flew. aborted: a safety limit was met, which says something about the gains. invalid: the
+measurement is no good. quarantine: as invalid, and the vehicle's state is in doubt."""
+
+Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land", "repeat land", "cease", "note"]
+
+
+class Failure(StrEnum):
+    """By the numbers of the documentation."""
+
+    NO_HEARTBEAT = "F1"
+    PARAMETER = "F2"
+    NOT_ARMED = "F3"
+    NO_LIFT_OFF = "F4"
+    LINK = "F5"
+    ENVELOPE = "F6"
+    BATTERY = "F7"
+    OPERATOR = "F8"
+    FROZEN = "F9a"
+    GLITCHES = "F9b"
+    DISAGREEMENT = "F9c"
+    UNEXPECTED = "F10"
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """`detection`: when it holds; `reaction`: what the program does at once; `text`: what a person is told."""
+
+    detection: str
+    reaction: Reaction
+    outcome: Outcome
+    text: str
+
+
+RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
+    {
+        Failure.NO_HEARTBEAT: Response(
+            "no heartbeat within 5 s", "none", "refused", "No heartbeat was heard; nothing was sent."
+        ),
+        Failure.PARAMETER: Response(
+            "a gain unconfirmed after five attempts, 0.5 s apart, or read back unequal",
+            "restore gains",
+            "refused",
+            "The vehicle did not confirm its gains; it was not armed.",
+        ),
+        Failure.NOT_ARMED: Response(
+            "arming refused, or not armed 2 s after it", "disarm", "refused", "The vehicle would not arm."
+        ),
+        Failure.NO_LIFT_OFF: Response(
+            "take-off refused, or less than 0.15 m above the ground by the autopilot's time",
+            "disarm",
+            "aborted",
+            "The vehicle did not lift off.",
+        ),
+        Failure.LINK: Response(
+            "no packet for 1 s, or three heartbeats missed",
+            "repeat land",
+            "invalid",
+            "The link was lost in the air; Land was repeated, the vehicle's own failsafe decides.",
+        ),
+        Failure.ENVELOPE: Response(
+            "a limit of altitude, place, speed or oscillation, or the vehicle's own fence",
+            "land, gains first",
+            "aborted",
+            "A safety limit was met.",
+        ),
+        Failure.BATTERY: Response(
+            "below the limit for 1 s, or unknown for 10 s", "land", "invalid", "The battery is low, or unknown."
+        ),
+        Failure.OPERATOR: Response("asked for", "land, gains first", "aborted", "Aborted."),
+        Failure.FROZEN: Response(
+            "packets, but a clock that stands still for 0.25 s",
+            "land",
+            "invalid",
+            "The vehicle's position stood still while it went on talking.",
+        ),
+        Failure.GLITCHES: Response(
+            "more than three lone samples that jump by 0.3 m or are faster than 6 m/s",
+            "note",
+            "invalid",
+            "Too many samples had to be dropped.",
+        ),
+        Failure.DISAGREEMENT: Response(
+            "two sources more than 0.3 m apart for 0.3 s", "land", "invalid", "Two sources of altitude disagree."
+        ),
+        Failure.UNEXPECTED: Response(
+            "a mode, a disarming or a reboot that was not asked for",
+            "cease",
+            "quarantine",
+            "The vehicle changed its state without being asked; it was left alone.",
+        ),
+    }
+)
+
+SUSPECT: Final = frozenset({failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"})
+"""Failures that speak against the gains: the safe ones are sent before Land. A vehicle that lifted off late, its
+integrator wound up, is treated in the same way."""

@@ -1,0 +1,73 @@
+"""The kind `mavlink`: vehicles under Paparazzi, ArduCopter or PX4 at the other end of a link."""
+
+from typing import Final
+
+from app.core.errors import InputError, Problem
+from app.core.policy import Gains
+from app.vehicles.base import Vehicle, VehicleOption
+from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.mavlink import addresses
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+
+
+def is_simulated(options: Options) -> bool:
+    """Said to be simulated, and nothing beyond this computer can be reached by its address."""
+    return bool(options["simulated"]) and addresses.is_loopback(addresses.parse(str(options["address"])))
+
+
+def _open(options: Options, safe_gains: Gains) -> Vehicle:
+    return MavlinkVehicle(options, safe_gains, is_real=not is_simulated(options))
+
+
+def _conflicts(options: Options) -> tuple[Problem, ...]:
+    problems = []
+    if options["autopilot"] not in PROFILES:
+        problems.append(Problem("autopilot", f"must be {', '.join(PROFILES)}, got {options['autopilot']}"))
+    try:
+        address = addresses.parse(str(options["address"]))
+    except InputError as error:
+        return (*problems, *error.problems)
+    if options["simulated"] and not addresses.is_loopback(address):
+        problems.append(Problem("simulated", f"is not believed of {address}: only a loopback address can be simulated"))
+    if options["clock_speed"] != 1.0 and not options["simulated"]:
+        problems.append(Problem("clock_speed", "must be 1: a real vehicle's time is that of life"))
+    return tuple(problems)
+
+
+def _number(name: str, title: str, unit: str, default: float, lower: float, upper: float) -> VehicleOption:
+    return VehicleOption(name=name, title=title, unit=unit, default=default, lower=lower, upper=upper)
+
+
+MAVLINK: Final = VehicleKind(
+    name="mavlink",
+    title="Vehicle over MAVLink",
+    line="A real vehicle under Paparazzi, ArduCopter or PX4, or a simulated one that speaks like it.",
+    is_real=True,
+    can_fly=True,
+    experiments=("takeoff",),
+    options=(
+        VehicleOption(name="autopilot", title="Autopilot: paparazzi, ardupilot or px4", unit="", default="paparazzi"),
+        VehicleOption(
+            name="address",
+            title="Where the vehicle is reached: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
+            unit="",
+            default="udp:127.0.0.1:4245@4244",
+        ),
+        VehicleOption(name="simulated", title="It is a simulated vehicle on this computer", unit="", default=False),
+        _number("system_id", "Its MAVLink system id; 0: the first autopilot heard", "", 0.0, 0.0, 255.0),
+        _number("aircraft_id", "Paparazzi's aircraft id (AC_ID); 0: the same as the system id", "", 0.0, 0.0, 255.0),
+        _number("telemetry_hz", "Positions a second that are asked for", "Hz", 50.0, 40.0, 200.0),
+        _number("climb_waypoint", "Paparazzi: number of the waypoint that its take-off climbs to", "", 2.0, 1.0, 254.0),
+        _number("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
+        _number("radius_m", "How far from its start it may drift", "m", 5.0, 0.5, 100.0),
+        _number("clock_speed", "Speed of its time: 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
+        VehicleOption(
+            name="log_folder", title="Folder for telemetry logs of every flight; empty: none", unit="", default=""
+        ),
+    ),
+    open=_open,
+    conflicts=_conflicts,
+    simulates=is_simulated,
+    served=False,
+)

@@ -1,0 +1,230 @@
+"""What a trial keeps an eye on: a pure memory of what was heard, and the limits that it is held against."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.measurements import Battery, Breach, Heartbeat, Measurement, Position
+
+GROUND_M: Final = 0.15
+"""Nearer to the ground than this a vehicle may stand on it."""
+RESTING_M_S: Final = 0.1
+FRESH_S: Final = 0.5
+"""A sample older than this says nothing about where the vehicle is now."""
+
+_SILENT_S: Final = 1.0
+_HEARTBEATS_MISSED: Final = 3.5
+_STUCK_S: Final = 0.25
+_JUMP_M: Final = 0.3
+_JUMP_M_S: Final = 6.0
+_ACCELERATION_M_S2: Final = 20.0
+_MOST_GLITCHES: Final = 3
+_LOW_BATTERY_S: Final = 1.0
+_NO_BATTERY_S: Final = 10.0
+_REBOOT_S: Final = 1.0
+"""A clock that falls back by less is a packet that came late."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it;
+    modes are as `Heartbeat` names them, empty where any will do."""
+
+    set_point_m: float
+    heartbeat_s: float
+    min_battery_v: float
+    ceiling_m: float = 4.5
+    radius_m: float = 5.0
+    climb_rate_m_s: float = 4.0
+    crossing_m: float = 0.3
+    crossings: int = 4
+    flying_modes: frozenset[str] = frozenset()
+    landing_modes: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """A limit that is not kept, in words."""
+
+    failure: Failure
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watch:
+    """What was heard so far. Times in s by the ground's clock, apart from those inside a Position."""
+
+    begun_s: float
+    heard_s: float
+    heartbeat_s: float
+    advanced_s: float
+    battery_s: float
+    battery_v: float | None = None
+    low_since_s: float | None = None
+    stuck_since_s: float | None = None
+    last: Position | None = None
+    origin: Position | None = None
+    doubted: Position | None = None
+    glitches: int = 0
+    side: int = -1
+    crossings: int = 0
+    armed: bool = False
+    mode: str = ""
+    rebooted: bool = False
+    breached: bool = False
+
+
+def begin(now_s: float, *, last: Position | None = None, battery_v: float | None = None) -> Watch:
+    """Nothing is late yet. `last` is where the vehicle stands."""
+    return Watch(
+        begun_s=now_s,
+        heard_s=now_s,
+        heartbeat_s=now_s,
+        advanced_s=now_s,
+        battery_s=now_s,
+        battery_v=battery_v,
+        last=last,
+        origin=last,
+    )
+
+
+def hear(
+    watch: Watch, measurement: Measurement | None, now_s: float, limits: Limits
+) -> tuple[Watch, tuple[Position, ...]]:
+    """The memory after one packet (None: one that measures nothing), and the positions that it makes certain."""
+    watch = replace(watch, heard_s=now_s)
+    match measurement:
+        case Position():
+            return _hear_position(watch, measurement, now_s, limits)
+        case Heartbeat(armed=armed, mode=mode):
+            watch = replace(watch, heartbeat_s=now_s, armed=armed, mode=mode)
+        case Battery(voltage_v=volts):
+            low = volts < limits.min_battery_v
+            since = (watch.low_since_s if watch.low_since_s is not None else now_s) if low else None
+            watch = replace(watch, battery_v=volts, battery_s=now_s, low_since_s=since)
+        case Breach():
+            watch = replace(watch, breached=True)
+        case _:
+            pass
+    return _stuck(watch, now_s), ()
+
+
+def find_on_ground(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    """The gravest limit that a vehicle does not keep that has not been told to take off."""
+    if watch.rebooted:
+        return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
+    return find_link(watch, limits, now_s) or find_frozen(watch) or find_battery(watch, now_s)
+
+
+def too_many_glitches(watch: Watch) -> bool:
+    return watch.glitches > _MOST_GLITCHES
+
+
+def is_fresh(watch: Watch, now_s: float) -> bool:
+    return watch.last is not None and now_s - watch.advanced_s < FRESH_S
+
+
+def is_grounded(watch: Watch, now_s: float, ground_m: float) -> bool:
+    """On the ground by height and by speed, as a fresh sample has it."""
+    last = watch.last
+    return (
+        last is not None
+        and is_fresh(watch, now_s)
+        and watch.doubted is None
+        and last.altitude_m - ground_m < GROUND_M
+        and abs(last.climb_rate_m_s) < RESTING_M_S
+    )
+
+
+def is_airborne(watch: Watch, now_s: float, ground_m: float) -> bool:
+    """Above the ground by height, as a fresh sample has it."""
+    return watch.last is not None and is_fresh(watch, now_s) and watch.last.altitude_m - ground_m > GROUND_M
+
+
+def _hear_position(
+    watch: Watch, position: Position, now_s: float, limits: Limits
+) -> tuple[Watch, tuple[Position, ...]]:
+    newest = watch.doubted or watch.last
+    if newest is not None and position.time_boot_s <= newest.time_boot_s:
+        rebooted = position.time_boot_s < newest.time_boot_s - _REBOOT_S
+        return _stuck(replace(watch, rebooted=watch.rebooted or rebooted), now_s), ()
+    watch = replace(watch, advanced_s=now_s, stuck_since_s=None)
+    if watch.last is None or _follows(watch.last, position):
+        lone = watch.doubted is not None
+        watch = replace(watch, doubted=None, glitches=watch.glitches + lone)
+        return _accept(watch, position, limits), (position,)
+    if watch.doubted is None:
+        return replace(watch, doubted=position), ()
+    if _follows(watch.doubted, position):
+        return _accept(replace(watch, doubted=None), position, limits), (watch.doubted, position)
+    return replace(watch, doubted=position, glitches=watch.glitches + 1), ()
+
+
+def _follows(one: Position, other: Position) -> bool:
+    """Whether a vehicle can have come from one sample to the other."""
+    elapsed_s = other.time_boot_s - one.time_boot_s
+    expected_m = one.altitude_m + one.climb_rate_m_s * elapsed_s
+    reach_m = _JUMP_M + 0.5 * _ACCELERATION_M_S2 * elapsed_s**2
+    sudden = abs(other.climb_rate_m_s) > _JUMP_M_S >= abs(one.climb_rate_m_s)
+    return abs(other.altitude_m - expected_m) <= reach_m and not sudden
+
+
+def _accept(watch: Watch, position: Position, limits: Limits) -> Watch:
+    above_m = position.altitude_m - limits.set_point_m
+    side = watch.side if abs(above_m) <= limits.crossing_m else (1 if above_m > 0.0 else -1)
+    crossed = watch.crossings + (side != watch.side)
+    return replace(watch, last=position, origin=watch.origin or position, side=side, crossings=crossed)
+
+
+def _stuck(watch: Watch, now_s: float) -> Watch:
+    return watch if watch.stuck_since_s is not None else replace(watch, stuck_since_s=now_s)
+
+
+def find_unexpected(watch: Watch, modes: frozenset[str]) -> Finding | None:
+    if watch.rebooted:
+        return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
+    if not watch.armed:
+        return Finding(failure=Failure.UNEXPECTED, why="The vehicle disarmed itself in the air.")
+    if modes and watch.mode not in modes:
+        return Finding(failure=Failure.UNEXPECTED, why=f"The vehicle went into mode {watch.mode}.")
+    return None
+
+
+def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    if now_s - watch.heard_s > _SILENT_S:
+        return Finding(failure=Failure.LINK, why=f"Nothing was heard for {_SILENT_S:g} s.")
+    if now_s - watch.heartbeat_s > _HEARTBEATS_MISSED * limits.heartbeat_s:
+        return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
+    return None
+
+
+def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bool) -> Finding | None:
+    why = ""
+    if watch.breached:
+        why = "The vehicle's own fence was crossed."
+    elif watch.last is not None and watch.origin is not None:
+        last, origin = watch.last, watch.origin
+        away_m = ((last.north_m - origin.north_m) ** 2 + (last.east_m - origin.east_m) ** 2) ** 0.5
+        if (height_m := last.altitude_m - ground_m) > limits.ceiling_m:
+            why = f"It flew at {height_m:.2f} m above the ground, over {limits.ceiling_m:g} m."
+        elif abs(last.climb_rate_m_s) > limits.climb_rate_m_s:
+            why = f"It flew at {last.climb_rate_m_s:+.1f} m/s, beyond {limits.climb_rate_m_s:g} m/s."
+        elif away_m > limits.radius_m:
+            why = f"It flew {away_m:.1f} m away from its start, over {limits.radius_m:g} m."
+        elif settling and watch.crossings >= limits.crossings:
+            why = f"It crossed its set point {watch.crossings} times, beyond ±{limits.crossing_m:g} m."
+    return Finding(failure=Failure.ENVELOPE, why=why) if why else None
+
+
+def find_frozen(watch: Watch) -> Finding | None:
+    if watch.stuck_since_s is None or watch.heard_s - watch.stuck_since_s <= _STUCK_S:
+        return None
+    return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {_STUCK_S:g} s.")
+
+
+def find_battery(watch: Watch, now_s: float) -> Finding | None:
+    if watch.low_since_s is not None and now_s - watch.low_since_s > _LOW_BATTERY_S:
+        return Finding(failure=Failure.BATTERY, why=f"The battery was at {watch.battery_v:.1f} V.")
+    if now_s - watch.battery_s > _NO_BATTERY_S:
+        return Finding(failure=Failure.BATTERY, why=f"No battery voltage was heard for {_NO_BATTERY_S:g} s.")
+    return None

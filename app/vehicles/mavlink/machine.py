@@ -1,0 +1,467 @@
+"""One trial from arming to the safe gains read back, as a pure reducer: (trial, event) → (trial, commands).
+
+It knows no autopilot and no clock: events carry their time, commands are data that `trial.py` carries out.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+from app.vehicles.mavlink import limits as watching
+from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Outcome, Reaction
+from app.vehicles.mavlink.limits import Finding, Limits, Watch
+from app.vehicles.mavlink.measurements import Heartbeat, Measurement, Parameter, Position
+from app.vehicles.mavlink.states import COMMANDED, MOVES, OVER, State
+
+BASELINE_S: Final = 1.0
+ARMED_WITHIN_S: Final = 2.0
+GAIN_S: Final = 0.1
+GAINS_S: Final = 0.3
+REPEAT_S: Final = 1.0
+LANDED_S: Final = 2.0
+LANDING_S: Final = 40.0
+DISARMED_WITHIN_S: Final = 5.0
+LINK_LOST_S: Final = 60.0
+_MODE_KNOWN_S: Final = 1.0
+_DESCENDING_M_S: Final = -0.2
+_ASKING_S: Final = 15.0
+"""The longest that arming may take altogether, with every repetition."""
+
+
+class Action(StrEnum):
+    """What a vehicle is told to do, by whatever messages its autopilot wants."""
+
+    ARM = "arm"
+    TAKE_OFF = "take off"
+    LAND = "land"
+    MOTORS_OFF = "motors off"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter by its name on the vehicle, with the value to send."""
+
+    parameter: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground and the zero of
+    the record's altitude are on the vehicle's datum, how long to record after the command, how soon the vehicle has to
+    lift off, and its limits."""
+
+    safe_gains: tuple[Setting, ...]
+    limits: Limits
+    ground_m: float
+    datum_m: float = 0.0
+    record_s: float = 33.0
+    lift_off_s: float = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A packet from the vehicle; None where it measures nothing."""
+
+    measurement: Measurement | None
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AbortWanted:
+    reason: str
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The vehicle has taken what an action sends."""
+
+    action: Action
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    action: Action
+    why: str
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """The safe gains were written and read back; `problem` says why not."""
+
+    now_s: float
+    problem: str = ""
+
+
+Event = Tick | Heard | AbortWanted | Done | Refused | Restored
+
+
+@dataclass(frozen=True, slots=True)
+class Perform:
+    action: Action
+
+
+@dataclass(frozen=True, slots=True)
+class SendGain:
+    """Once, without waiting for an answer."""
+
+    setting: Setting
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreGains:
+    """Write the safe gains and read them back, with repetitions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """A sample that belongs to the record, with what it was to be."""
+
+    position: Position
+    set_point_m: float
+    battery_v: float | None
+
+
+Command = Perform | SendGain | RestoreGains | Keep
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
+    `failure` is the first that happened."""
+
+    plan: Plan
+    state: State
+    since_s: float
+    watch: Watch
+    failure: Failure | None = None
+    why: str = ""
+    asked_s: float | None = None
+    armed_s: float | None = None
+    commanded_s: float | None = None
+    commanded_boot_s: float | None = None
+    unsent: tuple[Setting, ...] = ()
+    awaited: Setting | None = None
+    gains_since_s: float | None = None
+    sent_s: float = 0.0
+    repeated_s: float = 0.0
+    resting_since_s: float | None = None
+
+    @property
+    def is_over(self) -> bool:
+        return self.state in OVER
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """What the trial is worth; None when nothing went wrong."""
+        if self.state is State.QUARANTINE:
+            return "quarantine"
+        if self.failure is None:
+            return None
+        known = RESPONSES[self.failure].outcome
+        return "invalid" if known == "quarantine" else known
+
+
+Step = tuple[Trial, tuple[Command, ...]]
+
+
+def begin(plan: Plan, watch: Watch, now_s: float) -> Step:
+    """A vehicle that stands disarmed on the ground with its gains confirmed is told to arm."""
+    return Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch), (Perform(Action.ARM),)
+
+
+def advance(trial: Trial, event: Event) -> Step:
+    """The trial after an event, and what is to be done now."""
+    if trial.is_over:
+        return trial, ()
+    kept: tuple[Command, ...] = ()
+    if isinstance(event, Heard):
+        trial, kept = _hear(trial, event)
+    trial, commands = _react(trial, event)
+    return trial, (*kept, *commands)
+
+
+def _hear(trial: Trial, event: Heard) -> Step:
+    watch, positions = watching.hear(trial.watch, event.measurement, event.now_s, trial.plan.limits)
+    trial = replace(trial, watch=watch)
+    if trial.armed_s is None or trial.state not in _RECORDED:
+        return trial, ()
+    to_m = trial.plan.ground_m if trial.state not in _HOLDING else trial.plan.limits.set_point_m
+    return trial, tuple(Keep(position, to_m, watch.battery_v) for position in positions)
+
+
+def _react(trial: Trial, event: Event) -> Step:
+    if isinstance(event, AbortWanted) and trial.state in COMMANDED:
+        return _fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
+    return _COURSES[trial.state](trial, event)
+
+
+def _arm(trial: Trial, event: Event) -> Step:
+    now_s = event.now_s
+    if isinstance(event, Done) and event.action is Action.ARM:
+        trial = replace(trial, asked_s=now_s)
+    if trial.watch.armed and trial.armed_s is None:
+        trial = replace(trial, armed_s=now_s)
+    if finding := watching.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
+        return _fail(trial, finding, now_s)
+    if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or trial.watch.last is None:
+        return trial, ()
+    trial = replace(trial, commanded_s=now_s, commanded_boot_s=trial.watch.last.time_boot_s)
+    return _enter(trial, State.TAKEOFF, now_s), (Perform(Action.TAKE_OFF),)
+
+
+def _not_armed(trial: Trial, event: Event) -> Finding | None:
+    why = ""
+    if isinstance(event, Refused):
+        why = event.why
+    elif trial.armed_s is not None and not trial.watch.armed:
+        why = "It disarmed itself."
+    elif trial.armed_s is None:
+        late = trial.asked_s is not None and event.now_s - trial.asked_s > ARMED_WITHIN_S
+        why = "It did not say that it is armed." if late or event.now_s - trial.since_s > _ASKING_S else ""
+    return Finding(failure=Failure.NOT_ARMED, why=why) if why else None
+
+
+def _take_off(trial: Trial, event: Event) -> Step:
+    now_s = event.now_s
+    if finding := _finding(trial, now_s):
+        return _fail(trial, finding, now_s)
+    if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
+        return _enter(trial, State.RECORD, now_s), ()
+    if isinstance(event, Refused):
+        return _fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
+    if now_s - trial.since_s > trial.plan.lift_off_s:
+        why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
+        return _fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
+    return trial, ()
+
+
+def _record(trial: Trial, event: Event) -> Step:
+    now_s = event.now_s
+    if finding := _finding(trial, now_s):
+        return _fail(trial, finding, now_s)
+    last, start_s = trial.watch.last, trial.commanded_boot_s
+    if last is None or start_s is None or last.time_boot_s - start_s < trial.plan.record_s:
+        return trial, ()
+    if watching.too_many_glitches(trial.watch):
+        trial = _note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
+    return _land(trial, State.LAND, now_s)
+
+
+def _landing(trial: Trial, event: Event) -> Step:
+    """Land and abort-land: the safe gains that are still to be sent, Land until the vehicle descends, the ground."""
+    now_s = event.now_s
+    if trial.awaited is not None:
+        return _send_gains(trial, event)
+    if finding := _taken_over(trial) or (_envelope(trial) if trial.gains_since_s is None else None):
+        return _fail(trial, finding, now_s)
+    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    since_s = (trial.resting_since_s if trial.resting_since_s is not None else now_s) if grounded else None
+    trial = replace(trial, resting_since_s=since_s)
+    if _has_landed(trial, now_s):
+        return _disarm(trial, now_s)
+    if now_s - trial.since_s > LANDING_S:
+        return _quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
+    if now_s - trial.repeated_s >= REPEAT_S and not grounded and not _descends(trial, now_s):
+        return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
+    return trial, ()
+
+
+def _has_landed(trial: Trial, now_s: float) -> bool:
+    """At rest near the ground for 2 s; or it has disarmed itself there, as some autopilots do."""
+    if not trial.watch.armed:
+        return not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    return trial.resting_since_s is not None and now_s - trial.resting_since_s >= LANDED_S
+
+
+def _link_lost(trial: Trial, event: Event) -> Step:
+    now_s = event.now_s
+    if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat):
+        return _land(trial, State.ABORT_LAND, now_s)
+    if now_s - trial.since_s > LINK_LOST_S:
+        return _quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
+    if now_s - trial.repeated_s >= REPEAT_S:
+        return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
+    return trial, ()
+
+
+def _disarming(trial: Trial, event: Event) -> Step:
+    now_s = event.now_s
+    if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat) and not event.measurement.armed:
+        return _enter(trial, State.RESTORE, now_s), (RestoreGains(),)
+    if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
+        why = "It was found in the air while its motors were to be stopped."
+        return _abort(_note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
+    if now_s - trial.since_s > DISARMED_WITHIN_S:
+        return _quarantine(trial, f"It has not disarmed within {DISARMED_WITHIN_S:g} s.", now_s)
+    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    if grounded and now_s - trial.repeated_s >= REPEAT_S:
+        return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
+    return trial, ()
+
+
+def _restoring(trial: Trial, event: Event) -> Step:
+    if not isinstance(event, Restored):
+        return trial, ()
+    if event.problem:
+        return _quarantine(trial, f"Its safe gains could not be verified: {event.problem}", event.now_s)
+    return _enter(trial, State.IDLE, event.now_s), ()
+
+
+_COURSES: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
+    State.ARM: _arm,
+    State.TAKEOFF: _take_off,
+    State.RECORD: _record,
+    State.LAND: _landing,
+    State.ABORT_LAND: _landing,
+    State.LINK_LOST: _link_lost,
+    State.DISARM: _disarming,
+    State.RESTORE: _restoring,
+}
+_HOLDING: Final = frozenset({State.TAKEOFF, State.RECORD})
+_RECORDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.ABORT_LAND, State.LINK_LOST})
+
+
+def _finding(trial: Trial, now_s: float) -> Finding | None:
+    """The gravest limit that is not kept between the command and the end of the record."""
+    plan, watch = trial.plan, trial.watch
+    return (
+        watching.find_unexpected(watch, _modes(trial))
+        or watching.find_link(watch, plan.limits, now_s)
+        or watching.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
+        or watching.find_frozen(watch)
+        or watching.find_battery(watch, now_s)
+    )
+
+
+def _envelope(trial: Trial) -> Finding | None:
+    return watching.find_envelope(trial.watch, trial.plan.limits, ground_m=trial.plan.ground_m, settling=False)
+
+
+def _taken_over(trial: Trial) -> Finding | None:
+    """A reboot, or a mode that is neither flight nor landing: both end in disarming on the ground."""
+    return watching.find_unexpected(replace(trial.watch, armed=True), _modes(trial))
+
+
+def _modes(trial: Trial) -> frozenset[str]:
+    """The modes that the vehicle may be in; any (empty) until a heartbeat that has certainly seen the command."""
+    limits = trial.plan.limits
+    if trial.commanded_s is None or trial.watch.heartbeat_s - trial.commanded_s < _MODE_KNOWN_S:
+        return frozenset()
+    return limits.flying_modes if trial.state in _HOLDING else limits.flying_modes | limits.landing_modes
+
+
+def _fail(trial: Trial, finding: Finding, now_s: float) -> Step:
+    """What a failure leads to, from a state in which the vehicle obeys."""
+    trial = _note(trial, finding)
+    if trial.state is State.ARM:
+        return _disarm(trial, now_s)
+    reaction = RESPONSES[finding.failure].reaction
+    if trial.state is State.ABORT_LAND and reaction != "cease":
+        return _save(trial, now_s) if finding.failure in SUSPECT and trial.gains_since_s is None else (trial, ())
+    return _REACTIONS[reaction](trial, now_s)
+
+
+def _lose_link(trial: Trial, now_s: float) -> Step:
+    return _land(trial, State.LINK_LOST, now_s)
+
+
+def _give_up_take_off(trial: Trial, now_s: float) -> Step:
+    """Motors off where it is on the ground by height and speed. In the air its integrator is wound up."""
+    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    return _disarm(trial, now_s) if grounded else _abort(trial, now_s)
+
+
+def _cease(trial: Trial, now_s: float) -> Step:
+    return _quarantine(trial, "", now_s)
+
+
+def _abort_landing(trial: Trial, now_s: float) -> Step:
+    return _land(trial, State.ABORT_LAND, now_s)
+
+
+def _note(trial: Trial, finding: Finding) -> Trial:
+    if trial.failure is not None:
+        return trial
+    return replace(trial, failure=finding.failure, why=finding.why)
+
+
+def _enter(trial: Trial, state: State, now_s: float) -> Trial:
+    if state not in MOVES[trial.state]:
+        raise AssertionError(f"A trial cannot go from {trial.state} to {state}.")
+    return replace(trial, state=state, since_s=now_s, resting_since_s=None)
+
+
+def _abort(trial: Trial, now_s: float) -> Step:
+    return _save(_enter(trial, State.ABORT_LAND, now_s), now_s)
+
+
+def _save(trial: Trial, now_s: float) -> Step:
+    """The gains are suspect: the first safe gain leaves at once, Land follows the last."""
+    first, *others = trial.plan.safe_gains
+    trial = replace(trial, awaited=first, unsent=tuple(others), gains_since_s=now_s, sent_s=now_s)
+    return trial, (SendGain(first),)
+
+
+def _send_gains(trial: Trial, event: Event) -> Step:
+    """One request in flight: the next safe gain when the last was echoed or 0.1 s have passed; Land after 0.3 s."""
+    now_s = event.now_s
+    echoed = (
+        isinstance(event, Heard)
+        and isinstance(event.measurement, Parameter)
+        and trial.awaited is not None
+        and event.measurement.name == trial.awaited.parameter
+    )
+    late = now_s - (trial.gains_since_s or now_s) >= GAINS_S
+    if not late and not echoed and now_s - trial.sent_s < GAIN_S:
+        return trial, ()
+    if trial.unsent and not late:
+        following, *others = trial.unsent
+        return replace(trial, awaited=following, unsent=tuple(others), sent_s=now_s), (SendGain(following),)
+    rest = tuple(SendGain(setting) for setting in trial.unsent)
+    trial = replace(trial, awaited=None, unsent=(), repeated_s=now_s)
+    return trial, (*rest, Perform(Action.LAND))
+
+
+def _land(trial: Trial, state: State, now_s: float) -> Step:
+    """Land now; it is repeated from `state`."""
+    return replace(_enter(trial, state, now_s), repeated_s=now_s), (Perform(Action.LAND),)
+
+
+def _disarm(trial: Trial, now_s: float) -> Step:
+    """Motors off at once where the vehicle is on the ground by height and speed; else only once it is."""
+    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    trial = _enter(trial, State.DISARM, now_s)
+    if not grounded:
+        return trial, ()
+    return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
+
+
+def _quarantine(trial: Trial, why: str, now_s: float) -> Step:
+    whole = " ".join(part for part in (trial.why, why) if part)
+    return replace(_enter(trial, State.QUARANTINE, now_s), why=whole), ()
+
+
+def _descends(trial: Trial, now_s: float) -> bool:
+    """Whether the vehicle's telemetry agrees that it is landing."""
+    last = trial.watch.last
+    return last is not None and watching.is_fresh(trial.watch, now_s) and last.climb_rate_m_s < _DESCENDING_M_S
+
+
+_REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
+    "land, gains first": _abort,
+    "land": _abort_landing,
+    "repeat land": _lose_link,
+    "disarm": _give_up_take_off,
+    "cease": _cease,
+}
+"""By what the failure's row in the table says, for a vehicle that has been told to take off."""

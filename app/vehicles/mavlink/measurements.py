@@ -1,0 +1,74 @@
+"""What a vehicle's messages mean, whichever autopilot sent them: SI, altitude and climb positive up."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """By the vehicle's own clock and origin; `climb_rate_m_s` is the vehicle's own estimate."""
+
+    time_boot_s: float
+    altitude_m: float
+    climb_rate_m_s: float
+    north_m: float = 0.0
+    east_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """`mode` in the autopilot's own numbers, as text; `autopilot` is MAVLink's number of its make."""
+
+    autopilot: int
+    armed: bool
+    mode: str
+    system: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    voltage_v: float
+
+
+@dataclass(frozen=True, slots=True)
+class Spoken:
+    """A line of text from the vehicle."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """The vehicle's answer to what was asked: `to` is "command 400" or "waypoint"."""
+
+    to: str
+    accepted: bool
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """The vehicle's own fence was crossed."""
+
+
+@dataclass(frozen=True, slots=True)
+class BlockCount:
+    """How many blocks Paparazzi's flight plan has."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block of Paparazzi's flight plan."""
+
+    number: int
+    name: str
+
+
+Measurement = Position | Heartbeat | Battery | Spoken | Parameter | Reply | Breach | BlockCount | Block

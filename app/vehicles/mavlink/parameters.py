@@ -1,0 +1,86 @@
+"""Gains on the vehicle: written, read back, one request in flight, five attempts of 0.5 s each."""
+
+from app.core.errors import GainsError, Problem
+from app.core.policy import Gains
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink.machine import Setting
+from app.vehicles.mavlink.measurements import Measurement, Parameter
+from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing
+from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, Radio
+
+
+def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
+    """The gains, complete and in order. Raises GainsError for those that may not be written: no autopilot checks."""
+    known = {gain.gain: gain for gain in gain_set}
+    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in known]
+    for name, gain in known.items():
+        reason = gain.refusal(gains[name]) if name in gains else "is missing"
+        if reason is not None:
+            problems.append(Problem(f"gains.{name}", reason))
+    if problems:
+        raise GainsError(
+            "These gains may not be written to the vehicle.",
+            problems=tuple(problems),
+            hint=f"Send {', '.join(known)}, each within its range.",
+        )
+    return {name: int(gains[name]) if gain.whole else float(gains[name]) for name, gain in known.items()}
+
+
+def find_gain_set(radio: Radio) -> GainSet:
+    """The gains by the names that this vehicle has for them. Raises VehicleError when it answers to none."""
+    for gain_set in radio.profile.gain_sets:
+        if read_parameter(radio, gain_set[0].parameter) is not None:
+            return gain_set
+    tried = ", ".join(gain_set[0].parameter for gain_set in radio.profile.gain_sets)
+    raise VehicleError(
+        f"{RESPONSES[Failure.PARAMETER].text} It did not answer to {tried}.",
+        hint=f"See that it runs {radio.profile.title}, and that nobody else is asking it for parameters.",
+    )
+
+
+def write_gains(radio: Radio, gain_set: GainSet, gains: Gains) -> dict[str, float]:
+    """Write every gain, then read every one back: what the vehicle holds. Raises VehicleError for silence."""
+    for gain in gain_set:
+        wanted = gain.sent(gains[gain.gain])
+        request = radio.profile.set_parameter(radio.aim, gain.parameter, wanted)
+        if _ask(radio, request, gain.parameter) is None:
+            raise _unconfirmed(gain)
+    return read_gains(radio, gain_set, gains)
+
+
+def read_gains(radio: Radio, gain_set: GainSet, asked: Gains | None = None) -> dict[str, float]:
+    """What the vehicle holds, in the very numbers `asked` where it holds these. Raises VehicleError for silence."""
+    held_now: dict[str, float] = {}
+    for gain in gain_set:
+        wire = read_parameter(radio, gain.parameter)
+        if wire is None:
+            raise _unconfirmed(gain)
+        held_now[gain.gain] = gain.read(wire, None if asked is None else asked[gain.gain])
+    return held_now
+
+
+def read_parameter(radio: Radio, parameter: str) -> float | None:
+    """None when the vehicle does not answer: it has no such parameter, or no ears."""
+    return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter)
+
+
+def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
+    """In the order in which they are sent in the air: what clears an integrator comes last."""
+    ordered = sorted(gain_set, key=lambda gain: gain.integrates)
+    return tuple(Setting(gain.parameter, gain.sent(gains[gain.gain])) for gain in ordered)
+
+
+def _ask(radio: Radio, request: Outgoing, parameter: str) -> float | None:
+    def fits(heard: Measurement) -> bool:
+        return isinstance(heard, Parameter) and heard.name == parameter
+
+    answer = radio.ask(request, fits)
+    return answer.value if isinstance(answer, Parameter) else None
+
+
+def _unconfirmed(gain: GainParameter) -> VehicleError:
+    return VehicleError(
+        f"{RESPONSES[Failure.PARAMETER].text} {gain.parameter} was asked {ATTEMPTS} times, every {PATIENCE_S:g} s.",
+        hint="See that the vehicle is still there and that its identity (system and aircraft number) is right.",
+    )

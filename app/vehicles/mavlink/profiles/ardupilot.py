@@ -1,0 +1,98 @@
+"""ArduCopter: guided mode, and its vertical controllers' gains under the names of before and after release 4.7."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
+from app.vehicles.mavlink.machine import Action
+from app.vehicles.mavlink.measurements import Measurement
+from app.vehicles.mavlink.profiles import base
+from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+
+GUIDED: Final = 4
+LAND: Final = 9
+
+_ARM: Final = 400
+_SET_MODE: Final = 176
+_TAKE_OFF: Final = 22
+_SET_MESSAGE_INTERVAL: Final = 511
+_LOCAL_POSITION_NED: Final = 32
+_CUSTOM_MODE: Final = 1.0
+
+
+class ArduPilot:
+    """Gains are called as before 4.7; where a vehicle has the new names, its numbers are a tenth."""
+
+    name: Final = "ardupilot"
+    title: Final = "ArduCopter"
+    dialect: Final = ARDUPILOTMEGA
+    autopilot: Final = 3
+    heartbeat_s: Final = 1.0
+    lift_off_s: Final = 6.0
+    climbs_from_ground: Final = True
+    flying_modes: Final = frozenset({str(GUIDED)})
+    landing_modes: Final = frozenset({str(LAND)})
+    gain_sets: Final = (
+        (
+            GainParameter("PSC_POSZ_P", "PSC_POSZ_P", 0.1, 4.0),
+            GainParameter("PSC_VELZ_P", "PSC_VELZ_P", 0.5, 10.0),
+            GainParameter("PSC_ACCZ_P", "PSC_ACCZ_P", 0.05, 2.0),
+            GainParameter("PSC_ACCZ_D", "PSC_ACCZ_D", 0.0, 0.4),
+            GainParameter("PSC_ACCZ_I", "PSC_ACCZ_I", 0.0, 4.0, integrates=True),
+        ),
+        (
+            GainParameter("PSC_POSZ_P", "PSC_D_POS_P", 0.1, 4.0),
+            GainParameter("PSC_VELZ_P", "PSC_D_VEL_P", 0.5, 10.0),
+            GainParameter("PSC_ACCZ_P", "PSC_D_ACC_P", 0.05, 2.0, factor=0.1),
+            GainParameter("PSC_ACCZ_D", "PSC_D_ACC_D", 0.0, 0.4, factor=0.1),
+            GainParameter("PSC_ACCZ_I", "PSC_D_ACC_I", 0.0, 4.0, factor=0.1, integrates=True),
+        ),
+    )
+    requirements: Final = (
+        Requirement("FS_GCS_ENABLE", "land when the ground station is lost (5)"),
+        Requirement("FENCE_ENABLE", "keep inside its fence (1)"),
+    )
+
+    def measure(self, message: Message) -> Measurement | None:
+        return base.read(_READERS, message)
+
+    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
+        return {}
+
+    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+        return (request_positions(aim, telemetry_hz),)
+
+    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+        match action:
+            case Action.ARM:
+                return (
+                    Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, GUIDED),), awaits="command 176"),
+                    Step((base.command(aim, _ARM, 1.0),), awaits="command 400"),
+                )
+            case Action.TAKE_OFF:
+                above = base.command(aim, _TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, aim.altitude_m)
+                return (Step((above,), awaits="command 22", attempts=1),)
+            case Action.LAND:
+                return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, LAND),)),)
+            case Action.MOTORS_OFF:
+                return (Step((base.command(aim, _ARM, 0.0),)),)
+
+    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
+        return base.set_parameter(aim, parameter, value)
+
+    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
+        return base.read_parameter(aim, parameter)
+
+
+def request_positions(aim: Aim, telemetry_hz: float) -> Step:
+    """LOCAL_POSITION_NED at this rate."""
+    interval_us = round(1e6 / telemetry_hz)
+    asked = base.command(aim, _SET_MESSAGE_INTERVAL, _LOCAL_POSITION_NED, interval_us)
+    return Step((asked,), awaits="command 511")
+
+
+def _heartbeat(message: Message) -> Measurement:
+    return base.heartbeat(message, f"{number(message, 'custom_mode'):.0f}")
+
+
+_READERS: Final[base.Readers] = {**base.READERS, "HEARTBEAT": _heartbeat}

@@ -1,0 +1,272 @@
+"""What is particular to an autopilot: its gains, what its messages mean, and the messages that it wants."""
+
+import math
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final, Protocol
+
+from app.core.policy import shortened
+from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message, number, text
+from app.vehicles.mavlink.machine import Action
+from app.vehicles.mavlink.measurements import (
+    Battery,
+    Breach,
+    Heartbeat,
+    Measurement,
+    Parameter,
+    Position,
+    Reply,
+    Spoken,
+)
+
+ARMED_BIT: Final = 128
+REAL32: Final = 9
+_ACCEPTED: Final = 0
+_IN_PROGRESS: Final = 5
+_RESULTS: Final = ("accepted", "temporarily rejected", "denied", "unsupported", "failed", "in progress", "cancelled")
+_UNKNOWN_MV: Final = (0.0, 65535.0)
+
+
+@dataclass(frozen=True, slots=True)
+class GainParameter:
+    """A gain by its name here and on the vehicle, the values that may be written (autopilots take any), and the
+    vehicle's own number for a gain of 1. `whole`: the vehicle keeps the integer part only. `integrates`: writing it may
+    clear an integrator, so it comes last when the vehicle is in the air."""
+
+    gain: str
+    parameter: str
+    lower: float
+    upper: float
+    factor: float = 1.0
+    whole: bool = False
+    integrates: bool = False
+
+    def sent(self, value: float) -> float:
+        """What goes on the wire: single precision."""
+        return _single(value * self.factor)
+
+    def read(self, wire: float, asked: float | None = None) -> float:
+        """What the vehicle holds; the very number that was asked where it is that, to the precision of the wire."""
+        if self.whole:
+            return int(wire)
+        return asked if asked is not None and wire == self.sent(asked) else wire / self.factor
+
+    def refusal(self, value: float) -> str | None:
+        """Why this value may not be written, or None when it may."""
+        if not self.lower <= value <= self.upper:
+            return f"must lie in {self.lower:g} … {self.upper:g}, got {shortened(value)}"
+        return f"must be a whole number of counts, got {value:g}" if self.whole and value != int(value) else None
+
+
+GainSet = tuple[GainParameter, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A failsafe that has to be on before a flight: a parameter that must not be zero."""
+
+    parameter: str
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """A message to send, by its name and fields."""
+
+    kind: str
+    fields: Mapping[str, FieldValue]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Messages that belong together, and the reply that ends the step (see `Reply.to`), asked for up to `attempts`
+    times; without one the step ends after `pause_s`."""
+
+    sends: tuple[Outgoing, ...]
+    awaits: str = ""
+    attempts: int = 5
+    pause_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aim:
+    """Whom messages go to, and what is known about it: `aircraft` is the number that Paparazzi matches most messages
+    with, `blocks` are its flight plan's by name, east and north say where it stands."""
+
+    system: int
+    aircraft: int
+    waypoint: int = 2
+    blocks: Mapping[str, int] = field(default_factory=dict)
+    east_m: float = 0.0
+    north_m: float = 0.0
+    altitude_m: float = 3.0
+
+
+Ask = Callable[[Outgoing, Callable[[Measurement], bool]], Measurement | None]
+"""Send, again if need be, until an answer fits; None when there is none."""
+
+
+class Profile(Protocol):
+    """One autopilot. Pure data and pure functions: what is sent is decided here, when is decided elsewhere."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def dialect(self) -> Dialect: ...
+    @property
+    def autopilot(self) -> int:
+        """The number of its make in a heartbeat."""
+        ...
+
+    @property
+    def heartbeat_s(self) -> float: ...
+    @property
+    def lift_off_s(self) -> float:
+        """How long after the command it may still stand on the ground."""
+        ...
+
+    @property
+    def climbs_from_ground(self) -> bool:
+        """Whether the altitude commanded is above the place of take-off, rather than above the autopilot's origin."""
+        ...
+
+    @property
+    def flying_modes(self) -> frozenset[str]: ...
+    @property
+    def landing_modes(self) -> frozenset[str]: ...
+    @property
+    def gain_sets(self) -> tuple[GainSet, ...]:
+        """The gains under the names that releases have for them, newest last."""
+        ...
+
+    @property
+    def requirements(self) -> tuple[Requirement, ...]: ...
+    def measure(self, message: Message) -> Measurement | None: ...
+    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:
+        """The blocks of the flight plan, where there is one. Raises VehicleError when one is missing that is needed."""
+        ...
+
+    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+        """Set up telemetry and what a take-off needs, on the ground."""
+        ...
+
+    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]: ...
+    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing: ...
+    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing: ...
+
+
+def set_parameter(aim: Aim, parameter: str, value: float) -> Outgoing:
+    """A floating-point parameter, the only type that gains have."""
+    return Outgoing(
+        "PARAM_SET",
+        {
+            "target_system": aim.aircraft,
+            "target_component": 0,
+            "param_id": parameter,
+            "param_value": value,
+            "param_type": REAL32,
+        },
+    )
+
+
+def read_parameter(aim: Aim, parameter: str) -> Outgoing:
+    return Outgoing(
+        "PARAM_REQUEST_READ",
+        {"target_system": aim.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
+    )
+
+
+def command(aim: Aim, code: int, *parameters: float) -> Outgoing:
+    """COMMAND_LONG; what is not given is 0."""
+    filled = (*parameters, *(0.0 for _ in range(7 - len(parameters))))
+    return Outgoing(
+        "COMMAND_LONG",
+        {
+            "target_system": aim.aircraft,
+            "target_component": 0,
+            "command": code,
+            "confirmation": 0,
+            **{f"param{place + 1}": value for place, value in enumerate(filled)},
+        },
+    )
+
+
+def position(message: Message) -> Position:
+    """LOCAL_POSITION_NED, turned upside down."""
+    return Position(
+        time_boot_s=number(message, "time_boot_ms") / 1000.0,
+        altitude_m=-number(message, "z"),
+        climb_rate_m_s=-number(message, "vz"),
+        north_m=number(message, "x"),
+        east_m=number(message, "y"),
+    )
+
+
+def heartbeat(message: Message, mode: str) -> Heartbeat:
+    return Heartbeat(
+        autopilot=int(number(message, "autopilot")),
+        armed=bool(int(number(message, "base_mode")) & ARMED_BIT),
+        mode=mode,
+        system=message.get_srcSystem(),
+    )
+
+
+def battery(message: Message) -> Battery | None:
+    """SYS_STATUS, whose voltage is in mV; None where the vehicle does not know it."""
+    millivolts = number(message, "voltage_battery")
+    return None if millivolts in _UNKNOWN_MV else Battery(millivolts / 1000.0)
+
+
+def parameter(message: Message) -> Parameter:
+    return Parameter(text(message, "param_id"), number(message, "param_value"))
+
+
+def answer(message: Message) -> Reply | None:
+    """COMMAND_ACK; None while the vehicle is still at it."""
+    result = int(number(message, "result"))
+    if result == _IN_PROGRESS:
+        return None
+    known = _RESULTS[result] if result < len(_RESULTS) else "unknown"
+    return Reply(f"command {number(message, 'command'):.0f}", result == _ACCEPTED, f"result {result}, {known}")
+
+
+def spoken(message: Message) -> Spoken:
+    return Spoken(text(message, "text"))
+
+
+def breach(message: Message) -> Breach | None:
+    """FENCE_STATUS."""
+    return Breach() if number(message, "breach_status") else None
+
+
+def bytewise_integer(value: float) -> int:
+    """The 32-bit integer whose bytes a float field carries."""
+    return int(struct.unpack("<i", struct.pack("<f", value))[0])
+
+
+def _single(value: float) -> float:
+    return float(struct.unpack("<f", struct.pack("<f", value))[0]) if math.isfinite(value) else value
+
+
+Readers = Mapping[str, Callable[[Message], Measurement | None]]
+
+READERS: Final[Readers] = MappingProxyType(
+    {
+        "LOCAL_POSITION_NED": position,
+        "SYS_STATUS": battery,
+        "PARAM_VALUE": parameter,
+        "COMMAND_ACK": answer,
+        "STATUSTEXT": spoken,
+        "FENCE_STATUS": breach,
+    }
+)
+"""What most autopilots mean by their messages, by the message's name."""
+
+
+def read(readers: Readers, message: Message) -> Measurement | None:
+    reader = readers.get(message.get_type())
+    return None if reader is None else reader(message)

@@ -1,0 +1,155 @@
+"""Paparazzi: MAVLink 1, flight plan blocks instead of modes, gains that are integers."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.dialects import PAPARAZZI as DIALECT
+from app.vehicles.mavlink.dialects import Message, number, text
+from app.vehicles.mavlink.machine import Action
+from app.vehicles.mavlink.measurements import Block, BlockCount, Measurement, Reply
+from app.vehicles.mavlink.profiles import base
+from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+
+HOLDING: Final = "Holding point"
+START_ENGINE: Final = "Start Engine"
+TAKE_OFF: Final = "Takeoff"
+LAND: Final = "land here"
+BLOCKS: Final = (HOLDING, START_ENGINE, TAKE_OFF, LAND)
+
+_LOCAL_ENU: Final = 4
+_WAYPOINT: Final = 16
+_SETTLE_S: Final = 0.5
+_NAV: Final = "4"
+
+
+class Paparazzi:
+    """v5.8 or newer, with the `mavlink` module and the blocks of the stock flight plans."""
+
+    name: Final = "paparazzi"
+    title: Final = "Paparazzi"
+    dialect: Final = DIALECT
+    autopilot: Final = 9
+    heartbeat_s: Final = 0.5
+    lift_off_s: Final = 1.5
+    climbs_from_ground: Final = False
+    flying_modes: Final = frozenset({_NAV})
+    landing_modes: Final = frozenset({_NAV})
+    gain_sets: Final = (
+        (
+            GainParameter("kp", "gui_v_kp", 0.0, 4000.0, whole=True),
+            GainParameter("ki", "gui_v_ki", 0.0, 2000.0, whole=True, integrates=True),
+            GainParameter("kd", "gui_v_kd", 0.0, 800.0, whole=True),
+        ),
+    )
+    requirements: Final[tuple[Requirement, ...]] = ()
+
+    def measure(self, message: Message) -> Measurement | None:
+        """Only LOCAL_POSITION_NED tells the altitude: the other messages of it mix their units."""
+        return base.read(_READERS, message)
+
+    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:
+        """The list is asked for once; the acknowledgement that ends it comes before every change of block."""
+        request = Outgoing("SCRIPT_REQUEST_LIST", _to(aim))
+        counted = ask(request, lambda heard: isinstance(heard, BlockCount))
+        if not isinstance(counted, BlockCount):
+            raise _without_blocks("It did not list the blocks of its flight plan.")
+        blocks: dict[str, int] = {}
+        for seq in range(counted.count):
+            request = Outgoing("SCRIPT_REQUEST", _to(aim) | {"seq": seq})
+            found = ask(request, lambda heard, seq=seq: isinstance(heard, Block) and heard.number == seq)  # type: ignore[misc]
+            if not isinstance(found, Block):
+                raise _without_blocks(f"It did not name block {seq} of {counted.count}.")
+            blocks.setdefault(found.name, found.number)
+        if missing := [name for name in BLOCKS if name not in blocks]:
+            raise _without_blocks(f"Its flight plan has no block {', '.join(missing)}.")
+        return blocks
+
+    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
+        """Ends the listing of blocks, which else keeps every change of block away for 15 s."""
+        return (Step((_acknowledge(aim),)),)
+
+    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+        match action:
+            case Action.ARM:
+                return (
+                    Step((_climb_here(aim),), awaits="waypoint"),
+                    Step(_block(aim, HOLDING), pause_s=_SETTLE_S),
+                    Step(_block(aim, START_ENGINE)),
+                )
+            case Action.TAKE_OFF:
+                return (Step(_block(aim, TAKE_OFF)),)
+            case Action.LAND:
+                return (Step(_block(aim, LAND)),)
+            case Action.MOTORS_OFF:
+                return (Step((self.set_parameter(aim, "kil_thr", 1.0),)),)
+
+    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
+        return base.set_parameter(aim, parameter, value)
+
+    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
+        return base.read_parameter(aim, parameter)
+
+
+def _to(aim: Aim) -> dict[str, float]:
+    """Blocks and waypoints go by the MAVLink system id, all else by the aircraft's own."""
+    return {"target_system": aim.system, "target_component": 0}
+
+
+def _acknowledge(aim: Aim) -> Outgoing:
+    return Outgoing("MISSION_ACK", _to(aim) | {"type": 0})
+
+
+def _block(aim: Aim, name: str) -> tuple[Outgoing, ...]:
+    activate = Outgoing("SCRIPT_ITEM", {**_to(aim), "seq": aim.blocks[name], "name": ""})
+    return (_acknowledge(aim), activate)
+
+
+def _climb_here(aim: Aim) -> Outgoing:
+    """The waypoint that the take-off climbs to, straight above the vehicle."""
+    fields = {
+        "seq": aim.waypoint,
+        "frame": _LOCAL_ENU,
+        "command": _WAYPOINT,
+        "current": 0,
+        "autocontinue": 0,
+        **{f"param{place}": 0.0 for place in range(1, 5)},
+        "x": aim.east_m,
+        "y": aim.north_m,
+        "z": aim.altitude_m,
+    }
+    return Outgoing("MISSION_ITEM", _to(aim) | fields)
+
+
+def _without_blocks(what: str) -> VehicleError:
+    return VehicleError(
+        f"The vehicle cannot be flown by its flight plan. {what}",
+        hint=f"It takes Paparazzi v5.8 or newer and a flight plan with the blocks {', '.join(BLOCKS)}.",
+    )
+
+
+def _heartbeat(message: Message) -> Measurement:
+    """Its mode is the base mode without the bit for armed."""
+    return base.heartbeat(message, str(int(number(message, "base_mode")) & ~base.ARMED_BIT))
+
+
+def _taken(message: Message) -> Measurement:
+    result = int(number(message, "type"))
+    return Reply("waypoint", result == 0, f"result {result}")
+
+
+def _count(message: Message) -> Measurement:
+    return BlockCount(int(number(message, "count")))
+
+
+def _named(message: Message) -> Measurement:
+    return Block(int(number(message, "seq")), text(message, "name"))
+
+
+_READERS: Final[base.Readers] = {
+    **base.READERS,
+    "HEARTBEAT": _heartbeat,
+    "MISSION_ACK": _taken,
+    "SCRIPT_COUNT": _count,
+    "SCRIPT_ITEM": _named,
+}

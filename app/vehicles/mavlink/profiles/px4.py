@@ -1,0 +1,91 @@
+"""PX4: its take-off and landing modes, and the gains of its vertical controllers."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from app.vehicles.mavlink.dialects import COMMON, Message, number
+from app.vehicles.mavlink.machine import Action
+from app.vehicles.mavlink.measurements import Measurement, Parameter
+from app.vehicles.mavlink.profiles import base
+from app.vehicles.mavlink.profiles.ardupilot import request_positions
+from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+
+TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
+
+_ARM: Final = 400
+_SET_MODE: Final = 176
+_CUSTOM_MODE: Final = 1.0
+_AUTO: Final = 4
+_TAKE_OFF: Final = 2
+_LOITER: Final = 3
+_LAND: Final = 6
+_INT32: Final = 6
+
+
+class Px4:
+    """Integer parameters come bytewise in a float."""
+
+    name: Final = "px4"
+    title: Final = "PX4"
+    dialect: Final = COMMON
+    autopilot: Final = 12
+    heartbeat_s: Final = 1.0
+    lift_off_s: Final = 8.0
+    climbs_from_ground: Final = True
+    flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
+    landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
+    gain_sets: Final = (
+        (
+            GainParameter("MPC_Z_P", "MPC_Z_P", 0.1, 1.5),
+            GainParameter("MPC_Z_VEL_P_ACC", "MPC_Z_VEL_P_ACC", 2.0, 15.0),
+            GainParameter("MPC_Z_VEL_D_ACC", "MPC_Z_VEL_D_ACC", 0.0, 2.0),
+            GainParameter("MPC_Z_VEL_I_ACC", "MPC_Z_VEL_I_ACC", 0.2, 3.0, integrates=True),
+        ),
+    )
+    requirements: Final = (
+        Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)"),
+        Requirement("GF_ACTION", "act when it leaves its fence"),
+    )
+
+    def measure(self, message: Message) -> Measurement | None:
+        return base.read(_READERS, message)
+
+    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
+        return {}
+
+    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+        altitude = self.set_parameter(aim, TAKE_OFF_ALTITUDE, aim.altitude_m)
+        return (request_positions(aim, telemetry_hz), Step((altitude,), awaits=TAKE_OFF_ALTITUDE))
+
+    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+        match action:
+            case Action.ARM:
+                return (Step((base.command(aim, _ARM, 1.0),), awaits="command 400"),)
+            case Action.TAKE_OFF:
+                mode = base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
+                return (Step((mode,), awaits="command 176", attempts=1),)
+            case Action.LAND:
+                return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
+            case Action.MOTORS_OFF:
+                return (Step((base.command(aim, _ARM, 0.0),)),)
+
+    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
+        return base.set_parameter(aim, parameter, value)
+
+    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
+        return base.read_parameter(aim, parameter)
+
+
+def _parameter(message: Message) -> Parameter:
+    heard = base.parameter(message)
+    if number(message, "param_type") != _INT32:
+        return heard
+    return Parameter(heard.name, base.bytewise_integer(heard.value))
+
+
+def _heartbeat(message: Message) -> Measurement:
+    mode = int(number(message, "custom_mode"))
+    return base.heartbeat(message, f"{mode >> 16 & 0xFF}.{mode >> 24 & 0xFF}")
+
+
+_READERS: Final[base.Readers] = {**base.READERS, "HEARTBEAT": _heartbeat, "PARAM_VALUE": _parameter}

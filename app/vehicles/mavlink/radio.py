@@ -1,0 +1,148 @@
+"""Speaking with one vehicle in its profile's terms: asking with repetitions, one request in flight, and listening."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from app.vehicles.mavlink.clock import Clock
+from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.machine import Action, Done, Heard, Refused
+from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Parameter, Position, Reply, Spoken
+from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile, Step
+
+PATIENCE_S: Final = 0.5
+ATTEMPTS: Final = 5
+_POSITIONS: Final = 1000
+_SPOKEN: Final = 5
+
+
+@dataclass(slots=True)
+class Seen:
+    """The latest of what a vehicle said; positions with the time of their receipt."""
+
+    heartbeat: Heartbeat | None = None
+    battery_v: float | None = None
+    positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
+    spoken: deque[str] = field(default_factory=lambda: deque(maxlen=_SPOKEN))
+
+    def note(self, measurement: Measurement | None, now_s: float) -> None:
+        match measurement:
+            case Heartbeat():
+                self.heartbeat = measurement
+            case Battery(voltage_v=volts):
+                self.battery_v = volts
+            case Position():
+                self.positions.append((now_s, measurement))
+            case Spoken(text=text):
+                self.spoken.append(text)
+            case _:
+                pass
+
+
+class Radio:
+    """A link with a profile. For one thread."""
+
+    def __init__(self, link: Link, profile: Profile, clock: Clock, aim: Aim) -> None:
+        self.link: Final = link
+        self.profile: Final = profile
+        self.clock: Final = clock
+        self.aim = aim
+        self.seen: Final = Seen()
+
+    def send(self, *messages: Outgoing) -> None:
+        """Raises LinkError when the link is closed."""
+        for message in messages:
+            self.link.send(message.kind, **message.fields)
+
+    def listen(self, timeout_s: float) -> list[Heard]:
+        """What has come since the last call, waiting at most so long for the first. Raises LinkError as `send`."""
+        heard = [
+            Heard(self.profile.measure(received.message), received.received_s)
+            for received in self.link.receive(timeout_s)
+        ]
+        for each in heard:
+            self.seen.note(each.measurement, each.now_s)
+        return heard
+
+    def ask(
+        self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
+    ) -> Measurement | None:
+        """The answer to a request that is repeated every 0.5 s; None when there is none. Raises LinkError."""
+        self.listen(0.0)
+        for _ in range(attempts):
+            self.send(request)
+            until_s = self.clock.now_s() + PATIENCE_S
+            while (left_s := until_s - self.clock.now_s()) > 0.0:
+                for heard in self.listen(left_s):
+                    if heard.measurement is not None and fits(heard.measurement):
+                        return heard.measurement
+        return None
+
+    def perform(self, steps: tuple[Step, ...]) -> str:
+        """Carry out steps on the ground, waiting for them; why they were refused, or nothing. Raises LinkError."""
+        conversation = Conversation(Action.ARM, steps, self)
+        while True:
+            ended = conversation.proceed(self.listen(PATIENCE_S / 10.0))
+            if ended is not None:
+                return ended.why if isinstance(ended, Refused) else ""
+
+
+class Conversation:
+    """Steps under way: each begins when the one before it was answered; nothing here waits."""
+
+    def __init__(self, action: Action, steps: tuple[Step, ...], radio: Radio) -> None:
+        self._action, self._radio = action, radio
+        self._steps = list(steps)
+        self._sent_s = 0.0
+        self._attempts = 0
+        self._send()
+
+    def proceed(self, heard: list[Heard]) -> Done | Refused | None:
+        """Take in what came and send what is due; how it ended, once it has."""
+        for each in heard:
+            if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
+                if not accepted:
+                    return self._refused(each.measurement)
+                self._next()
+        now_s = self._radio.clock.now_s()
+        while self._steps and not self._steps[0].awaits and now_s - self._sent_s >= self._steps[0].pause_s:
+            self._next()
+        if not self._steps:
+            return Done(self._action, now_s)
+        if self._steps[0].awaits and now_s - self._sent_s >= PATIENCE_S:
+            if self._attempts >= self._steps[0].attempts:
+                return None if self._steps[0].attempts == 1 else self._unanswered()
+            self._send()
+        return None
+
+    def _next(self) -> None:
+        self._steps.pop(0)
+        self._attempts = 0
+        self._send()
+
+    def _send(self) -> None:
+        if self._steps:
+            self._sent_s = self._radio.clock.now_s()
+            self._attempts += 1
+            self._radio.send(*self._steps[0].sends)
+
+    def _refused(self, measurement: Measurement | None) -> Refused:
+        why = measurement.why if isinstance(measurement, Reply) else ""
+        said = f" It said: {' / '.join(self._radio.seen.spoken)}." if self._radio.seen.spoken else ""
+        return Refused(self._action, f"The vehicle refused to {self._action} ({why}).{said}", self._radio.clock.now_s())
+
+    def _unanswered(self) -> Refused:
+        why = f"The vehicle did not answer when it was to {self._action}."
+        return Refused(self._action, why, self._radio.clock.now_s())
+
+
+def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
+    """Whether what was heard ends the step, and how; None when it is no answer to it."""
+    match measurement:
+        case Reply(to=to, accepted=accepted) if to == step.awaits:
+            return accepted
+        case Parameter(name=name) if name == step.awaits:
+            return True
+        case _:
+            return None

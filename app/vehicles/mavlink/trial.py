@@ -1,0 +1,170 @@
+"""Carries out a trial: feeds the machine what is heard and what is wanted, and does what it says."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from app.vehicles.base import Sample
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.limits import Watch
+from app.vehicles.mavlink.machine import (
+    AbortWanted,
+    Action,
+    Command,
+    Event,
+    Heard,
+    Keep,
+    Perform,
+    Plan,
+    Restored,
+    RestoreGains,
+    SendGain,
+    Tick,
+    Trial,
+    advance,
+    begin,
+)
+from app.vehicles.mavlink.radio import Conversation, Radio
+from app.vehicles.mavlink.states import State
+from app.vehicles.mavlink.transports import LinkError
+
+LISTEN_S: Final = 0.01
+"""How long the loop is deaf to an abort, at the most."""
+_SAMPLE_EVERY_S: Final = 0.015
+"""Of telemetry; records keep every sample."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """How a trial ended, and its samples; `error` is what the caller's own functions raised meanwhile."""
+
+    trial: Trial
+    samples: tuple[Keep, ...]
+    error: BaseException | None
+
+
+class Flight:
+    """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
+
+    `restore` writes the safe gains, reads them back, and says what is wrong with them, or nothing.
+    """
+
+    def __init__(
+        self,
+        radio: Radio,
+        plan: Plan,
+        watch: Watch,
+        *,
+        restore: Callable[[], str],
+        on_sample: Callable[[Sample], None],
+        should_abort: Callable[[], str | None],
+    ) -> None:
+        self._radio, self._restore = radio, restore
+        self._on_sample, self._should_abort = on_sample, should_abort
+        self._samples: list[Keep] = []
+        self._conversation: Conversation | None = None
+        self._error: BaseException | None = None
+        self._shown_s = float("-inf")
+        self._trial, commands = begin(plan, watch, radio.clock.now_s())
+        self._begin_with = commands
+
+    def fly(self) -> Flown:
+        """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
+        self._guarded(lambda: self._carry_out(self._begin_with))
+        while not self._trial.is_over:
+            self._guarded(self._proceed)
+        return Flown(self._trial, tuple(self._samples), self._error)
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except LinkError:  # silence: the machine notices
+            self._radio.clock.wait_s(LISTEN_S)
+            self._advance(Tick(self._radio.clock.now_s()))
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; the vehicle comes first
+            self._error = self._error or error
+            self._advance(AbortWanted(_spoken(error), self._radio.clock.now_s()))
+
+    def _proceed(self) -> None:
+        if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
+            self._advance(Restored(self._radio.clock.now_s(), self._restored()))
+            return
+        heard = self._radio.listen(LISTEN_S)
+        for each in heard:
+            self._advance(each)
+        self._converse(heard)
+        if (reason := self._wanted()) is not None:
+            self._advance(AbortWanted(reason, self._radio.clock.now_s()))
+        self._advance(Tick(self._radio.clock.now_s()))
+
+    def _wanted(self) -> str | None:
+        return self._should_abort() if self._error is None else _spoken(self._error)
+
+    def _converse(self, heard: list[Heard]) -> None:
+        if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
+            self._conversation = None
+            self._advance(ended)
+
+    def _advance(self, event: Event) -> None:
+        before = self._trial.state
+        self._trial, commands = advance(self._trial, event)
+        if self._trial.state is not before:
+            self._conversation = None  # whatever was being asked for is not wanted any more
+        self._carry_out(commands)
+
+    def _carry_out(self, commands: tuple[Command, ...]) -> None:
+        for command in commands:
+            match command:
+                case Perform(action):
+                    self._perform(action)
+                case SendGain(setting):
+                    radio = self._radio
+                    radio.send(radio.profile.set_parameter(radio.aim, setting.parameter, setting.value))
+                case RestoreGains():
+                    self._advance(Restored(self._radio.clock.now_s(), self._restored()))
+                case Keep():
+                    self._keep(command)
+
+    def _perform(self, action: Action) -> None:
+        self._conversation = Conversation(action, self._radio.profile.steps(action, self._radio.aim), self._radio)
+
+    def _restored(self) -> str:
+        try:
+            return self._restore()
+        except VehicleError as error:
+            return str(error)
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; once more, for the gains come first
+            self._error = self._error or error
+            return self._restore()
+
+    def _keep(self, kept: Keep) -> None:
+        self._samples.append(kept)
+        start_s = self._trial.commanded_boot_s
+        if start_s is None or self._error is not None:
+            return
+        time_s = kept.position.time_boot_s - start_s
+        if time_s >= 0.0 and time_s - self._shown_s >= _SAMPLE_EVERY_S:
+            self._shown_s = time_s
+            self._show(Sample(time_s, channels_of(kept, self._trial.plan.datum_m)))
+
+    def _show(self, sample: Sample) -> None:
+        try:
+            self._on_sample(sample)
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; commands that follow must not be lost
+            self._error = error
+
+
+def channels_of(kept: Keep, datum_m: float) -> dict[str, float]:
+    """A sample's channels; altitudes count from `datum_m` on the vehicle's own."""
+    channels = {
+        "altitude_m": kept.position.altitude_m - datum_m,
+        "climb_rate_m_s": kept.position.climb_rate_m_s,
+        "set_point_m": kept.set_point_m - datum_m,
+    }
+    return channels if kept.battery_v is None else channels | {"battery_v": kept.battery_v}
+
+
+def _spoken(error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted from the keyboard"
+    return f"the program failed ({type(error).__name__}: {error})"

@@ -1,0 +1,29 @@
+from pathlib import Path
+
+import pytest
+
+from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure
+
+PAGE = (Path(__file__).parents[3] / "docs" / "real-flight.md").read_text(encoding="utf-8")
+
+
+def test_every_failure_has_its_response() -> None:
+    assert list(RESPONSES) == list(Failure)
+
+
+def test_only_a_safety_limit_and_a_person_speak_against_the_gains() -> None:
+    assert frozenset({Failure.ENVELOPE, Failure.OPERATOR}) == SUSPECT
+    assert all(RESPONSES[failure].outcome == "aborted" for failure in SUSPECT)
+
+
+def test_a_bad_measurement_never_counts_as_a_safety_limit() -> None:
+    for failure in (Failure.LINK, Failure.FROZEN, Failure.GLITCHES, Failure.DISAGREEMENT, Failure.BATTERY):
+        assert RESPONSES[failure].outcome == "invalid"
+
+
+@pytest.mark.parametrize("failure", Failure)
+def test_every_failure_is_described_for_the_operator(failure: Failure) -> None:
+    row = next(line for line in PAGE.splitlines() if line.startswith(f"| {failure} |"))
+    assert RESPONSES[failure].detection in row
+    assert RESPONSES[failure].reaction in row or RESPONSES[failure].reaction == "none"
+    assert RESPONSES[failure].outcome in row

@@ -1,0 +1,405 @@
+"""A trial as a pure machine: the good flight, then every failure in every state."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.machine import AbortWanted, Action, Perform, Refused, RestoreGains, SendGain
+from app.vehicles.mavlink.measurements import Breach, Parameter, Position
+from app.vehicles.mavlink.states import MOVES, State
+from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, Walk
+
+ABORT = "the operator pressed Abort"
+
+
+def arming() -> Walk:
+    return Walk().pass_s(0.2)
+
+
+def baseline() -> Walk:
+    walk = Walk()
+    walk.armed = True
+    return walk.pass_s(1.0)
+
+
+def taking_off() -> Walk:
+    return Walk().arm().pass_s(0.5)
+
+
+def recording() -> Walk:
+    return Walk().lift_off().pass_s(2.0)
+
+
+def landing() -> Walk:
+    return Walk().land()
+
+
+def aborting() -> Walk:
+    """Landing for a reason that does not speak against the gains."""
+    walk = recording()
+    walk.voltage_v = 10.0
+    walk.pass_s(2.5)
+    walk.climb_rate_m_s = -0.8
+    return walk.pass_s(0.5)
+
+
+def lost() -> Walk:
+    walk = recording()
+    walk.mute = True
+    return walk.pass_s(1.5)
+
+
+def disarming() -> Walk:
+    return Walk().land().touch_down()
+
+
+def restoring() -> Walk:
+    return disarming().disarm()
+
+
+STAGES: dict[State, Callable[[], Walk]] = {
+    State.ARM: arming,
+    State.TAKEOFF: taking_off,
+    State.RECORD: recording,
+    State.LAND: landing,
+    State.ABORT_LAND: aborting,
+    State.LINK_LOST: lost,
+    State.DISARM: disarming,
+    State.RESTORE: restoring,
+}
+
+
+def fall_silent(walk: Walk) -> None:
+    walk.mute = True
+    walk.pass_s(1.1)
+
+
+def lose_heartbeats(walk: Walk) -> None:
+    walk.heartless = True
+    walk.pass_s(2.3)
+
+
+def fly_too_high(walk: Walk) -> None:
+    walk.climb_rate_m_s = 3.0
+    walk.pass_s(3.0)
+
+
+def swing(walk: Walk) -> None:
+    for climb_rate_m_s in (1.2, -2.4, 2.4, -2.4, 2.4):
+        walk.climb_rate_m_s = climb_rate_m_s
+        walk.pass_s(0.5)
+
+
+def cross_its_fence(walk: Walk) -> None:
+    walk.hear(Breach())
+
+
+def drain(walk: Walk) -> None:
+    walk.voltage_v = 10.0
+    walk.pass_s(2.5)
+
+
+def press_abort(walk: Walk) -> None:
+    walk.give(AbortWanted(ABORT, walk.now_s))
+
+
+def freeze(walk: Walk) -> None:
+    walk.frozen = True
+    walk.pass_s(0.4)
+
+
+def reboot(walk: Walk) -> None:
+    walk.hear(Position(0.1, walk.altitude_m, 0.0))
+    walk.pass_s(STEP_S)
+
+
+def be_taken_over(walk: Walk) -> None:
+    walk.mode = "0"
+    walk.pass_s(1.6)
+
+
+def stop_by_itself(walk: Walk) -> None:
+    walk.armed = False
+    walk.pass_s(0.6)
+
+
+WALK: list[tuple[State, Callable[[Walk], None], State, Failure | None]] = [
+    (State.ARM, fall_silent, State.DISARM, Failure.LINK),
+    (State.ARM, lose_heartbeats, State.DISARM, Failure.LINK),
+    (State.ARM, drain, State.RESTORE, Failure.BATTERY),
+    (State.ARM, press_abort, State.DISARM, Failure.OPERATOR),
+    (State.ARM, freeze, State.RESTORE, Failure.FROZEN),
+    (State.ARM, reboot, State.DISARM, Failure.UNEXPECTED),
+    (State.TAKEOFF, fall_silent, State.LINK_LOST, Failure.LINK),
+    (State.TAKEOFF, cross_its_fence, State.ABORT_LAND, Failure.ENVELOPE),
+    (State.TAKEOFF, press_abort, State.ABORT_LAND, Failure.OPERATOR),
+    (State.TAKEOFF, freeze, State.ABORT_LAND, Failure.FROZEN),
+    (State.TAKEOFF, reboot, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.TAKEOFF, stop_by_itself, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.RECORD, fall_silent, State.LINK_LOST, Failure.LINK),
+    (State.RECORD, lose_heartbeats, State.LINK_LOST, Failure.LINK),
+    (State.RECORD, fly_too_high, State.ABORT_LAND, Failure.ENVELOPE),
+    (State.RECORD, swing, State.ABORT_LAND, Failure.ENVELOPE),
+    (State.RECORD, cross_its_fence, State.ABORT_LAND, Failure.ENVELOPE),
+    (State.RECORD, drain, State.ABORT_LAND, Failure.BATTERY),
+    (State.RECORD, press_abort, State.ABORT_LAND, Failure.OPERATOR),
+    (State.RECORD, freeze, State.ABORT_LAND, Failure.FROZEN),
+    (State.RECORD, reboot, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.RECORD, be_taken_over, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.RECORD, stop_by_itself, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.LAND, fall_silent, State.LAND, None),
+    (State.LAND, fly_too_high, State.ABORT_LAND, Failure.ENVELOPE),
+    (State.LAND, press_abort, State.ABORT_LAND, Failure.OPERATOR),
+    (State.LAND, drain, State.LAND, None),
+    (State.LAND, reboot, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.LAND, be_taken_over, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.ABORT_LAND, fall_silent, State.ABORT_LAND, Failure.BATTERY),
+    (State.ABORT_LAND, press_abort, State.ABORT_LAND, Failure.BATTERY),
+    (State.ABORT_LAND, reboot, State.QUARANTINE, Failure.BATTERY),
+    (State.ABORT_LAND, be_taken_over, State.QUARANTINE, Failure.BATTERY),
+    (State.LINK_LOST, press_abort, State.LINK_LOST, Failure.LINK),
+    (State.LINK_LOST, fall_silent, State.LINK_LOST, Failure.LINK),
+    (State.DISARM, fall_silent, State.DISARM, None),
+    (State.DISARM, press_abort, State.DISARM, None),
+    (State.DISARM, fly_too_high, State.ABORT_LAND, Failure.NO_LIFT_OFF),
+    (State.DISARM, stop_by_itself, State.RESTORE, None),
+    (State.RESTORE, fall_silent, State.RESTORE, None),
+    (State.RESTORE, press_abort, State.RESTORE, None),
+]
+
+
+@pytest.mark.parametrize(
+    ("state", "befall", "then", "failure"), WALK, ids=[f"{state}-{befall.__name__}" for state, befall, *_ in WALK]
+)
+def test_every_failure_in_every_state_leads_where_it_must(
+    state: State, befall: Callable[[Walk], None], then: State, failure: Failure | None
+) -> None:
+    walk = STAGES[state]()
+    assert walk.state is state
+    befall(walk)
+    assert (walk.state, walk.trial.failure) == (then, failure)
+
+
+@pytest.mark.parametrize("state", STAGES)
+def test_the_walk_keeps_to_the_table_of_moves(state: State) -> None:
+    states = STAGES[state]().states
+    assert all(later in MOVES[earlier] for earlier, later in pairwise(states))
+
+
+def test_a_flight_goes_through_its_states_and_ends_idle() -> None:
+    walk = restoring().restore()
+    assert walk.states == [
+        State.ARM,
+        State.TAKEOFF,
+        State.RECORD,
+        State.LAND,
+        State.DISARM,
+        State.RESTORE,
+        State.IDLE,
+    ]
+    assert walk.actions == [Action.ARM, Action.TAKE_OFF, Action.LAND, Action.MOTORS_OFF]
+    assert (walk.trial.failure, walk.trial.outcome) == (None, None)
+    assert walk.gains_sent == []
+    assert RestoreGains() in [command for _, command in walk.told]
+
+
+def test_the_record_begins_with_the_baseline_and_runs_33_s_from_the_command() -> None:
+    walk = Walk(plan=replace(PLAN, record_s=33.0)).land()
+    command_s = walk.trial.commanded_boot_s
+    assert command_s is not None
+    times = [kept.position.time_boot_s - command_s for kept in walk.kept]
+    assert times[0] == pytest.approx(-1.0, abs=0.05)
+    assert times[-1] == pytest.approx(33.0, abs=0.03)
+    assert 0.0 in times
+    set_points = {kept.set_point_m for kept in walk.kept if kept.position.time_boot_s > command_s}
+    assert set_points == {3.0}
+
+
+def test_an_abort_sends_the_safe_gains_first_and_land_within_0_3_s() -> None:
+    walk = recording()
+    abort_s = walk.now_s
+    press_abort(walk)
+    assert [command for at_s, command in walk.told if at_s == abort_s][-1] == SendGain(SAFE_GAINS[0])
+    walk.pass_s(0.5)
+    assert walk.gains_sent == list(SAFE_GAINS)
+    assert walk.when(Action.LAND)[0] - abort_s == pytest.approx(0.3, abs=0.03)
+
+
+def test_echoed_gains_let_land_follow_at_once() -> None:
+    walk = recording()
+    abort_s = walk.now_s
+    press_abort(walk)
+    for setting in SAFE_GAINS:
+        walk.pass_s(STEP_S).hear(Parameter(setting.parameter, setting.value))
+    assert walk.gains_sent == list(SAFE_GAINS)
+    assert walk.when(Action.LAND) == [pytest.approx(abort_s + 3 * STEP_S, abs=1e-6)]
+
+
+def test_the_echo_of_another_parameter_changes_nothing() -> None:
+    walk = recording()
+    press_abort(walk)
+    walk.hear(Parameter("gui_v_nom_thr", 0.655))
+    assert walk.gains_sent == [SAFE_GAINS[0]]
+
+
+def test_land_is_repeated_every_second_until_the_vehicle_descends() -> None:
+    walk = recording()
+    press_abort(walk)
+    walk.pass_s(3.5)
+    assert len(walk.when(Action.LAND)) == 4
+    walk.climb_rate_m_s = -0.8
+    walk.pass_s(2.0)
+    assert len(walk.when(Action.LAND)) == 4
+
+
+def test_an_abort_while_landing_for_another_reason_still_sends_the_safe_gains() -> None:
+    walk = aborting()
+    assert walk.gains_sent == []
+    press_abort(walk)
+    assert walk.pass_s(0.5).gains_sent == list(SAFE_GAINS)
+
+
+def test_a_held_down_abort_sends_everything_once() -> None:
+    walk = recording()
+    for _ in range(100):
+        press_abort(walk)
+        walk.pass_s(STEP_S)
+    assert walk.gains_sent == list(SAFE_GAINS)
+
+
+def test_a_lost_link_repeats_land_every_second_and_never_stops_the_motors() -> None:
+    walk = lost().pass_s(10.0)
+    assert len(walk.when(Action.LAND)) == 11
+    assert Action.MOTORS_OFF not in walk.actions
+    walk.pass_s(50.0)
+    assert walk.state is State.QUARANTINE
+    assert walk.trial.why == "Nothing was heard for 1 s. The link stayed lost for 60 s."
+    assert Action.MOTORS_OFF not in walk.actions
+
+
+def test_a_link_that_comes_back_lands_the_vehicle_and_restores_its_gains() -> None:
+    walk = lost()
+    walk.mute = False
+    walk.pass_s(1.0)
+    assert walk.state is State.ABORT_LAND
+    walk.touch_down().disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
+
+
+def test_the_motors_are_never_stopped_above_the_ground() -> None:
+    for stage in STAGES.values():
+        walk = stage()
+        for at_s, command in walk.told:
+            if command == Perform(Action.MOTORS_OFF):
+                assert at_s <= walk.now_s
+                assert walk.altitude_m - GROUND_M < 0.15
+
+
+def test_a_vehicle_that_does_not_lift_off_is_disarmed_after_1_5_s() -> None:
+    walk = taking_off().pass_s(0.9)
+    assert walk.state is State.TAKEOFF
+    walk.pass_s(0.2)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
+    assert walk.actions[-1] is Action.MOTORS_OFF
+    walk.disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, "aborted")
+
+
+def test_a_vehicle_that_lifts_off_too_late_is_landed_on_its_safe_gains() -> None:
+    walk = taking_off().pass_s(0.9)
+    walk.climb_rate_m_s = 0.3
+    walk.pass_s(0.2)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NO_LIFT_OFF)
+    assert Action.MOTORS_OFF not in walk.actions
+    assert walk.gains_sent == [SAFE_GAINS[0]]
+
+
+def test_a_refused_take_off_disarms_on_the_ground() -> None:
+    walk = taking_off()
+    walk.give(Refused(Action.TAKE_OFF, "The vehicle refused to take off (result 4, failed).", walk.now_s))
+    assert (walk.state, walk.actions[-1]) == (State.DISARM, Action.MOTORS_OFF)
+
+
+def test_a_refused_arming_disarms_restores_the_gains_and_says_why() -> None:
+    walk = arming()
+    walk.give(Refused(Action.ARM, "The vehicle refused to arm (result 4, failed).", walk.now_s))
+    assert (walk.state, walk.actions) == (State.DISARM, [Action.ARM, Action.MOTORS_OFF])
+    walk.disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, "refused")
+    assert walk.trial.why == "The vehicle refused to arm (result 4, failed)."
+
+
+def test_a_vehicle_that_does_not_say_that_it_is_armed_is_not_flown() -> None:
+    walk = Walk()
+    walk.pass_s(15.1)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NOT_ARMED)
+    assert Action.TAKE_OFF not in walk.actions
+
+
+def test_an_abort_before_the_command_only_disarms() -> None:
+    walk = baseline()
+    press_abort(walk)
+    assert (walk.state, walk.actions) == (State.DISARM, [Action.ARM, Action.MOTORS_OFF])
+
+
+def test_a_vehicle_that_does_not_land_within_40_s_is_quarantined() -> None:
+    walk = recording()
+    press_abort(walk)
+    walk.pass_s(40.1)
+    assert (walk.state, walk.trial.outcome) == (State.QUARANTINE, "quarantine")
+    assert "not landed within 40 s" in walk.trial.why
+
+
+def test_a_vehicle_that_stays_armed_is_told_again_and_then_quarantined() -> None:
+    walk = disarming().pass_s(4.9)
+    assert walk.state is State.DISARM
+    assert len(walk.when(Action.MOTORS_OFF)) == 5
+    assert walk.pass_s(0.2).state is State.QUARANTINE
+
+
+def test_safe_gains_that_cannot_be_verified_quarantine_the_vehicle() -> None:
+    walk = restoring().restore("it holds {'kp': 1600} instead of {'kp': 283}.")
+    assert walk.state is State.QUARANTINE
+    assert "Its safe gains could not be verified: it holds" in walk.trial.why
+
+
+def test_after_something_unexpected_nothing_more_is_sent() -> None:
+    walk = recording()
+    told = len(walk.told)
+    be_taken_over(walk)
+    walk.pass_s(5.0)
+    assert not [command for _, command in walk.told[told:] if isinstance(command, Perform | SendGain)]
+
+
+def test_a_vehicle_that_disarms_itself_after_landing_has_landed() -> None:
+    walk = landing()
+    walk.climb_rate_m_s = -0.8
+    while walk.altitude_m > GROUND_M + 0.02:
+        walk.pass_s(STEP_S)
+    walk.climb_rate_m_s = 0.0
+    walk.armed = False
+    walk.pass_s(1.2)
+    assert (walk.state, walk.trial.failure) == (State.RESTORE, None)
+
+
+def test_glitches_do_not_end_a_flight_but_too_many_void_it() -> None:
+    walk = recording()
+    for _ in range(4):
+        walk.boot_s += STEP_S
+        walk.hear(Position(round(walk.boot_s, 6), walk.altitude_m + 0.5, 0.0))
+        walk.pass_s(0.5)
+    assert walk.states[-1] is State.RECORD
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.LAND, Failure.GLITCHES, "invalid")
+    assert walk.trial.why == "4 samples were dropped."
+
+
+def test_the_first_failure_is_the_one_that_counts() -> None:
+    walk = recording()
+    press_abort(walk)
+    drain(walk)
+    assert (walk.trial.failure, walk.trial.why) == (Failure.OPERATOR, ABORT)

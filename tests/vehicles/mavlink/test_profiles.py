@@ -1,0 +1,297 @@
+"""What messages mean and what is sent, held against recorded traffic of the real Paparazzi and the facts of others."""
+
+import struct
+from collections.abc import Mapping
+
+import pytest
+
+from app.core.errors import GainsError
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.dialects import FieldValue, Message, number, text
+from app.vehicles.mavlink.machine import Action
+from app.vehicles.mavlink.measurements import (
+    Battery,
+    Block,
+    BlockCount,
+    Breach,
+    Heartbeat,
+    Measurement,
+    Parameter,
+    Position,
+    Reply,
+)
+from app.vehicles.mavlink.parameters import check_gains, settings
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile
+from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
+
+PAPARAZZI, ARDUPILOT, PX4 = (PROFILES[name] for name in ("paparazzi", "ardupilot", "px4"))
+SAFE = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def measured(gains: tuple[int, int, int], kind: str) -> list[Measurement]:
+    """What the profile makes of one kind of the vehicle's recorded messages."""
+    found = [PAPARAZZI.measure(each.message) for each in messages(gains, kind, from_vehicle=True)]
+    return [each for each in found if each is not None]
+
+
+def aim(gains: tuple[int, int, int] = FLOWN[0]) -> Aim:
+    """The recorded vehicle, its blocks as it listed them."""
+    blocks = {block.name: block.number for block in measured(gains, "SCRIPT_ITEM") if isinstance(block, Block)}
+    return Aim(system=VEHICLE, aircraft=VEHICLE, blocks=blocks)
+
+
+def heard(profile: Profile, kind: str, **fields: FieldValue) -> Measurement | None:
+    """What the profile makes of a message that came over the wire."""
+    codec = profile.dialect.codec(system=1, component=1)
+    [message] = codec.parse(codec.pack(profile.dialect.message(kind, fields)))
+    return profile.measure(message)
+
+
+def sent(profile: Profile, action: Action, aim: Aim) -> list[Outgoing]:
+    return [message for step in profile.steps(action, aim) for message in step.sends]
+
+
+def fields(message: Message) -> dict[str, FieldValue]:
+    return {name: getattr(message, name) for name in message.get_fieldnames()}
+
+
+def on_the_wire(outgoing: Outgoing) -> tuple[str, Mapping[str, FieldValue]]:
+    """As a receiver decodes it."""
+    codec = PAPARAZZI.dialect.codec(system=255, component=190)
+    [message] = codec.parse(codec.pack(PAPARAZZI.dialect.message(outgoing.kind, outgoing.fields)))
+    return message.get_type(), fields(message)
+
+
+@pytest.mark.parametrize("gains", FLOWN)
+def test_the_recorded_read_backs_are_the_gains_that_were_flown(gains: tuple[int, int, int]) -> None:
+    asked = [text(each.message, "param_id") for each in messages(gains, "PARAM_REQUEST_READ", from_vehicle=False)]
+    latest = {each.name: each.value for each in measured(gains, "PARAM_VALUE") if isinstance(each, Parameter)}
+    [gain_set] = PAPARAZZI.gain_sets
+    assert asked == ["gui_v_kp", "gui_v_ki", "gui_v_kd"]
+    assert tuple(gain.read(latest[gain.parameter]) for gain in gain_set) == gains
+
+
+@pytest.mark.parametrize("gains", FLOWN)
+def test_what_is_sent_is_what_the_recorded_trial_was_flown_with(gains: tuple[int, int, int]) -> None:
+    told = [
+        (each.kind, fields(each.message))
+        for each in recorded(gains)
+        if not each.is_from_vehicle and each.kind in {"MISSION_ACK", "SCRIPT_ITEM"}
+    ]
+    whom = aim(gains)
+    ends_listing = [message for step in PAPARAZZI.prepare(whom, 50.0) for message in step.sends]
+    arming = [message for message in sent(PAPARAZZI, Action.ARM, whom) if message.kind != "MISSION_ITEM"]
+    ours = [*ends_listing, *arming, *sent(PAPARAZZI, Action.TAKE_OFF, whom), *sent(PAPARAZZI, Action.LAND, whom)]
+    assert [on_the_wire(message) for message in ours] == told
+
+
+@pytest.mark.parametrize("gains", FLOWN)
+def test_the_waypoint_is_the_recorded_one_but_straight_above_the_vehicle(gains: tuple[int, int, int]) -> None:
+    [flown] = messages(gains, "MISSION_ITEM", from_vehicle=False)
+    [waypoint] = [message for message in sent(PAPARAZZI, Action.ARM, aim(gains)) if message.kind == "MISSION_ITEM"]
+    assert on_the_wire(waypoint) == ("MISSION_ITEM", fields(flown.message) | {"x": 0.0, "y": 0.0})
+    assert number(flown.message, "z") == 3.0
+
+
+@pytest.mark.parametrize("gains", FLOWN)
+def test_gains_and_the_kill_are_written_as_they_were_recorded(gains: tuple[int, int, int]) -> None:
+    told = [(each.kind, fields(each.message)) for each in messages(gains, "PARAM_SET", from_vehicle=False)]
+    [gain_set] = PAPARAZZI.gain_sets
+    whom = aim(gains)
+    writes = [
+        PAPARAZZI.set_parameter(whom, gain.parameter, gain.sent(value))
+        for gain, value in zip(gain_set, gains, strict=True)
+    ]
+    assert [on_the_wire(message) for message in [*writes, *sent(PAPARAZZI, Action.MOTORS_OFF, whom)]] == told
+
+
+def test_the_recorded_vehicle_is_paparazzi_armed_between_its_blocks_with_a_full_battery() -> None:
+    beats = [each for each in measured(FLOWN[0], "HEARTBEAT") if isinstance(each, Heartbeat)]
+    assert {(beat.autopilot, beat.mode, beat.system) for beat in beats} == {(9, "4", VEHICLE)}
+    armed = [beat.armed for beat in beats]
+    assert (armed[0], armed[len(armed) // 2], armed[-1]) == (False, True, False)
+    assert set(measured(FLOWN[0], "SYS_STATUS")) == {Battery(12.4)}
+    assert measured(FLOWN[0], "SCRIPT_COUNT") == [BlockCount(18)]
+
+
+def test_positions_are_turned_upside_down() -> None:
+    first = messages(FLOWN[0], "LOCAL_POSITION_NED", from_vehicle=True)[0].message
+    position = PAPARAZZI.measure(first)
+    assert isinstance(position, Position)
+    assert (position.time_boot_s, position.altitude_m) == (36.997, 0.10546875)
+    assert position.climb_rate_m_s == pytest.approx(0.00578, abs=1e-5)
+
+
+def test_messages_that_mix_their_units_measure_nothing() -> None:
+    for kind in ("GLOBAL_POSITION_INT", "VFR_HUD", "BATTERY_STATUS", "ATTITUDE"):
+        assert not measured(FLOWN[0], kind)
+        assert messages(FLOWN[0], kind, from_vehicle=True)
+
+
+def test_land_comes_with_the_acknowledgement_that_frees_the_blocks() -> None:
+    assert [message.kind for message in sent(PAPARAZZI, Action.LAND, aim())] == ["MISSION_ACK", "SCRIPT_ITEM"]
+
+
+def test_blocks_go_by_the_system_id_and_the_rest_by_the_aircraft_id() -> None:
+    whom = Aim(system=7, aircraft=31, blocks=aim().blocks)
+    by_kind = {
+        message.kind: message.fields["target_system"] for action in Action for message in sent(PAPARAZZI, action, whom)
+    }
+    assert by_kind == {"MISSION_ITEM": 7, "MISSION_ACK": 7, "SCRIPT_ITEM": 7, "PARAM_SET": 31}
+
+
+def answers(listed: Mapping[int, str], count: int) -> "Recorder":
+    return Recorder({number: Block(number, name) for number, name in listed.items()}, BlockCount(count))
+
+
+class Recorder:
+    """A vehicle that answers requests for its blocks."""
+
+    def __init__(self, blocks: Mapping[int, Block], count: BlockCount) -> None:
+        self.blocks, self.count = blocks, count
+        self.asked: list[str] = []
+
+    def __call__(self, request: Outgoing, fits: object) -> Measurement | None:
+        self.asked.append(request.kind)
+        seq = request.fields.get("seq")
+        return self.blocks.get(seq) if isinstance(seq, int) else self.count
+
+
+def test_the_flight_plan_is_listed_block_by_block() -> None:
+    names = {number: name for name, number in aim().blocks.items()}
+    ask = answers(names, len(names))
+    assert PAPARAZZI.explore(ask, aim()) == aim().blocks
+    assert ask.asked == ["SCRIPT_REQUEST_LIST", *["SCRIPT_REQUEST"] * len(names)]
+
+
+def test_a_flight_plan_without_a_block_to_land_is_not_flown() -> None:
+    with pytest.raises(VehicleError, match="no block land here"):
+        PAPARAZZI.explore(answers({0: "Holding point", 1: "Start Engine", 2: "Takeoff"}, 3), aim())
+    with pytest.raises(VehicleError, match="did not name block 1 of 2"):
+        PAPARAZZI.explore(answers({0: "Holding point"}, 2), aim())
+
+
+def test_gains_are_clamped_here_because_no_autopilot_does() -> None:
+    [gain_set] = PAPARAZZI.gain_sets
+    assert check_gains({"kd": 82.0, "kp": 283.0, "ki": 13.0}, gain_set) == SAFE
+    with pytest.raises(GainsError) as refusal:
+        check_gains({"kp": -5, "ki": 300.7, "kd": 82, "nom_thr": 1}, gain_set)
+    assert {(problem.field, problem.reason) for problem in refusal.value.problems} == {
+        ("gains.nom_thr", "is not a gain of this vehicle"),
+        ("gains.kp", "must lie in 0 … 4000, got -5"),
+        ("gains.ki", "must be a whole number of counts, got 300.7"),
+    }
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400])
+def test_what_is_no_number_is_never_written(value: float) -> None:
+    for profile in PROFILES.values():
+        for gain_set in profile.gain_sets:
+            with pytest.raises(GainsError):
+                check_gains({gain.gain: value for gain in gain_set}, gain_set)
+
+
+def test_in_the_air_the_gain_that_clears_the_integrator_comes_last() -> None:
+    [gain_set] = PAPARAZZI.gain_sets
+    assert [setting.parameter for setting in settings(gain_set, SAFE)] == ["gui_v_kp", "gui_v_kd", "gui_v_ki"]
+    for profile in PROFILES.values():
+        for known in profile.gain_sets:
+            assert settings(known, {gain.gain: gain.lower for gain in known})[-1].parameter.endswith(
+                ("i", "I", "I_ACC")
+            )
+
+
+def test_a_fraction_that_the_vehicle_cut_off_shows_in_the_read_back() -> None:
+    [gain_set] = PAPARAZZI.gain_sets
+    assert gain_set[0].read(300.7) == 300
+
+
+def test_a_gain_in_single_precision_is_read_back_as_it_was_asked() -> None:
+    gain = ARDUPILOT.gain_sets[1][2]
+    assert gain.parameter == "PSC_D_ACC_P"
+    wire = gain.sent(0.37)
+    assert wire == struct.unpack("<f", struct.pack("<f", 0.037))[0]
+    assert gain.read(wire, 0.37) == 0.37
+    assert gain.read(gain.sent(0.38), 0.37) == pytest.approx(0.38)
+
+
+def test_both_names_of_arducopters_gains_are_known_as_one() -> None:
+    old, new = ARDUPILOT.gain_sets
+    assert [gain.gain for gain in old] == [gain.gain for gain in new]
+    assert [gain.factor for gain in new] == [1.0, 1.0, 0.1, 0.1, 0.1]
+
+
+def test_px4s_whole_numbers_come_bytewise() -> None:
+    (as_float,) = struct.unpack("<f", struct.pack("<i", 3))
+    common: dict[str, FieldValue] = {"param_id": "NAV_DLL_ACT", "param_value": as_float, "param_type": 6}
+    assert heard(PX4, "PARAM_VALUE", **common, param_count=1, param_index=0) == Parameter("NAV_DLL_ACT", 3.0)
+    assert heard(
+        PX4, "PARAM_VALUE", param_id="MPC_Z_P", param_value=0.5, param_type=9, param_count=1, param_index=0
+    ) == Parameter("MPC_Z_P", 0.5)
+
+
+def heartbeat(profile: Profile, custom_mode: int, base_mode: int = 209) -> Measurement | None:
+    beat = {"type": 2, "autopilot": profile.autopilot, "base_mode": base_mode, "custom_mode": custom_mode}
+    return heard(profile, "HEARTBEAT", **beat, system_status=4, mavlink_version=3)
+
+
+def test_modes_are_told_apart() -> None:
+    guided, landing = heartbeat(ARDUPILOT, 4), heartbeat(ARDUPILOT, 9)
+    assert isinstance(guided, Heartbeat)
+    assert isinstance(landing, Heartbeat)
+    assert guided.mode in ARDUPILOT.flying_modes
+    assert landing.mode in ARDUPILOT.landing_modes
+    for sub, modes in ((2, PX4.flying_modes), (3, PX4.flying_modes), (6, PX4.landing_modes)):
+        beat = heartbeat(PX4, 4 << 16 | sub << 24)
+        assert isinstance(beat, Heartbeat)
+        assert beat.mode in modes
+
+
+def test_a_command_under_way_is_no_answer_yet() -> None:
+    assert heard(PX4, "COMMAND_ACK", command=400, result=5) is None
+    assert heard(PX4, "COMMAND_ACK", command=400, result=0) == Reply("command 400", True, "result 0, accepted")
+    assert heard(ARDUPILOT, "COMMAND_ACK", command=400, result=4) == Reply("command 400", False, "result 4, failed")
+
+
+def test_a_breached_fence_is_told() -> None:
+    known = {"breach_count": 1, "breach_type": 2, "breach_time": 0}
+    assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=1, **known) == Breach()
+    assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=0, **known) is None
+
+
+def commands(profile: Profile, action: Action) -> list[tuple[FieldValue, ...]]:
+    whom = Aim(system=1, aircraft=1)
+    return [
+        (message.fields["command"], *(message.fields[f"param{place}"] for place in range(1, 8)))
+        for message in sent(profile, action, whom)
+    ]
+
+
+def test_arducopter_takes_off_in_guided_mode_and_lands_in_its_own() -> None:
+    assert commands(ARDUPILOT, Action.ARM) == [(176, 1, 4, 0, 0, 0, 0, 0), (400, 1, 0, 0, 0, 0, 0, 0)]
+    assert commands(ARDUPILOT, Action.TAKE_OFF) == [(22, 0, 0, 0, 0, 0, 0, 3)]
+    assert commands(ARDUPILOT, Action.LAND) == [(176, 1, 9, 0, 0, 0, 0, 0)]
+
+
+def test_px4_takes_off_by_its_mode_to_the_altitude_of_its_parameter() -> None:
+    prepared = [message for step in PX4.prepare(Aim(system=1, aircraft=1), 125.0) for message in step.sends]
+    assert [prepared[0].fields[name] for name in ("command", "param1", "param2")] == [511, 32, 8000]
+    assert (prepared[1].fields["param_id"], prepared[1].fields["param_value"]) == ("MIS_TAKEOFF_ALT", 3.0)
+    assert commands(PX4, Action.ARM) == [(400, 1, 0, 0, 0, 0, 0, 0)]
+    assert commands(PX4, Action.TAKE_OFF) == [(176, 1, 4, 2, 0, 0, 0, 0)]
+    assert commands(PX4, Action.LAND) == [(176, 1, 4, 6, 0, 0, 0, 0)]
+
+
+@pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
+def test_nobody_is_armed_or_disarmed_by_force(profile: Profile) -> None:
+    for action in (Action.ARM, Action.MOTORS_OFF):
+        assert all(second == 0 for command, _, second, *_ in commands(profile, action) if command == 400)
+
+
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
+def test_everything_that_is_sent_can_be_packed(profile: Profile) -> None:
+    whom = aim()
+    steps = [*profile.prepare(whom, 50.0), *(step for action in Action for step in profile.steps(action, whom))]
+    for message in (message for step in steps for message in step.sends):
+        assert profile.dialect.message(message.kind, message.fields).get_type() == message.kind

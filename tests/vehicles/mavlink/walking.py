@@ -1,0 +1,161 @@
+"""A trial walked through by hand: a machine, a clock, and a vehicle that says what the test wants."""
+
+from dataclasses import dataclass, field
+
+from app.vehicles.mavlink import limits
+from app.vehicles.mavlink.limits import Limits
+from app.vehicles.mavlink.machine import (
+    Action,
+    Command,
+    Done,
+    Event,
+    Heard,
+    Keep,
+    Perform,
+    Plan,
+    Restored,
+    SendGain,
+    Setting,
+    Tick,
+    Trial,
+    advance,
+    begin,
+)
+from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Position
+from app.vehicles.mavlink.states import State
+
+GROUND_M = 0.1
+STEP_S = 0.02
+SAFE_GAINS = (Setting("gui_v_kp", 283.0), Setting("gui_v_kd", 82.0), Setting("gui_v_ki", 13.0))
+LIMITS = Limits(
+    set_point_m=3.0,
+    heartbeat_s=0.5,
+    min_battery_v=10.5,
+    flying_modes=frozenset({"4"}),
+    landing_modes=frozenset({"4"}),
+)
+PLAN = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=GROUND_M, record_s=8.0)
+
+
+@dataclass
+class Walk:
+    """Feeds a trial at 50 Hz with what its vehicle does; `told` are the commands with the time of each."""
+
+    plan: Plan = PLAN
+    now_s: float = 100.0
+    boot_s: float = 40.0
+    altitude_m: float = GROUND_M
+    climb_rate_m_s: float = 0.0
+    armed: bool = False
+    mode: str = "4"
+    voltage_v: float = 12.4
+    mute: bool = False
+    frozen: bool = False
+    heartless: bool = False
+    told: list[tuple[float, Command]] = field(default_factory=list)
+    states: list[State] = field(default_factory=list)
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        here = Position(self.boot_s, self.altitude_m, 0.0)
+        self.trial: Trial
+        watch = limits.begin(self.now_s, last=here, battery_v=self.voltage_v)
+        self.trial, commands = begin(self.plan, watch, self.now_s)
+        self._note(commands)
+
+    @property
+    def state(self) -> State:
+        return self.trial.state
+
+    @property
+    def actions(self) -> list[Action]:
+        return [command.action for _, command in self.told if isinstance(command, Perform)]
+
+    @property
+    def gains_sent(self) -> list[Setting]:
+        return [command.setting for _, command in self.told if isinstance(command, SendGain)]
+
+    @property
+    def kept(self) -> list[Keep]:
+        return [command for _, command in self.told if isinstance(command, Keep)]
+
+    def when(self, action: Action) -> list[float]:
+        return [at_s for at_s, command in self.told if isinstance(command, Perform) and command.action is action]
+
+    def give(self, event: Event) -> "Walk":
+        self.trial, commands = advance(self.trial, event)
+        self._note(commands)
+        return self
+
+    def hear(self, measurement: Measurement | None) -> "Walk":
+        return self.give(Heard(measurement, self.now_s))
+
+    def pass_s(self, seconds: float) -> "Walk":
+        """Let time pass, the vehicle saying what it does; altitude follows the climb rate."""
+        for _ in range(round(seconds / STEP_S)):
+            self.steps += 1
+            self.now_s += STEP_S
+            self.boot_s += STEP_S * (not self.frozen)
+            self.altitude_m += self.climb_rate_m_s * STEP_S
+            if not self.mute:
+                self._speak()
+            self.give(Tick(self.now_s))
+        return self
+
+    def _speak(self) -> None:
+        self.hear(Position(round(self.boot_s, 6), self.altitude_m, self.climb_rate_m_s))
+        if self.steps % 25 == 0 and not self.heartless:
+            self.hear(Heartbeat(9, self.armed, self.mode))
+        if self.steps % 50 == 0:
+            self.hear(Battery(self.voltage_v))
+
+    def _note(self, commands: tuple[Command, ...]) -> None:
+        self.told += [(self.now_s, command) for command in commands]
+        if not self.states or self.states[-1] is not self.trial.state:
+            self.states.append(self.trial.state)
+
+    # ---- as a flight goes
+
+    def arm(self) -> "Walk":
+        """To the take-off command."""
+        self.give(Done(Action.ARM, self.now_s))
+        self.armed = True
+        while self.state is State.ARM:
+            self.pass_s(STEP_S)
+        return self
+
+    def lift_off(self) -> "Walk":
+        """Until it hovers at 3 m, on record."""
+        self.arm()
+        self.climb_rate_m_s = 1.0
+        self.pass_s(3.0 - GROUND_M)
+        self.climb_rate_m_s = 0.0
+        return self
+
+    def land(self) -> "Walk":
+        """To the end of the record, and half a second of descent."""
+        self.lift_off()
+        while self.state is State.RECORD:
+            self.pass_s(STEP_S)
+        self.climb_rate_m_s = -0.8
+        return self.pass_s(0.5)
+
+    def touch_down(self) -> "Walk":
+        """Down from wherever it is, then at rest until something happens."""
+        self.climb_rate_m_s = -0.8
+        while self.altitude_m > GROUND_M + 0.02:
+            self.pass_s(STEP_S)
+        self.climb_rate_m_s = 0.0
+        state = self.state
+        while self.state is state and not self.trial.is_over:
+            self.pass_s(STEP_S)
+        return self
+
+    def disarm(self) -> "Walk":
+        """From the landed vehicle to its gains being restored."""
+        self.armed = False
+        self.pass_s(0.6)
+        return self
+
+    def restore(self, problem: str = "") -> "Walk":
+        return self.give(Restored(self.now_s, problem))
