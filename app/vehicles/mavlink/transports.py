@@ -231,7 +231,8 @@ class StreamTransport:
             return b""
         except OSError:
             data = b""
-        self._is_broken |= not data
+        if not data:
+            self._is_broken = True
         return data
 
     def _flush(self, stream: _Stream) -> None:
