@@ -14,7 +14,7 @@ from app.vehicles.base import Ending, FlightOrder, FlightRecord, Sample
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, limits, parameters, preflight
-from app.vehicles.mavlink.clock import ScaledClock
+from app.vehicles.mavlink.clock import Clock, ScaledClock
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.machine import Keep, Plan, Trial
@@ -41,16 +41,17 @@ class MavlinkVehicle:
 
     kind: Final = "mavlink"
 
-    def __init__(self, options: Options, safe_gains: Gains, *, is_real: bool) -> None:
-        """Connect, wait for the vehicle, check it on the ground, and write the safe gains. Raises VehicleError when it
-        is not there or not ready, SafeGainsError when it is armed, GainsError for safe gains that it cannot hold."""
+    def __init__(self, options: Options, safe_gains: Gains, *, is_real: bool, clock: Clock | None = None) -> None:
+        """Connect, wait for the vehicle, check it on the ground, and write the safe gains. `clock` is the vehicle's
+        time, by default that of its options. Raises VehicleError when it is not there or not ready, SafeGainsError when
+        it is armed, GainsError for safe gains that it cannot hold."""
         self.is_real: Final = is_real
         self._options = dict(options)
         self._state = State.CONNECT
         self._why = ""
         self._staged = False
         profile = PROFILES[str(options["autopilot"])]
-        clock = ScaledClock(float(options["clock_speed"]))
+        clock = clock or ScaledClock(float(options["clock_speed"]))
         self._link = Link(
             addresses.parse(str(options["address"])),
             profile.dialect,

@@ -1,0 +1,116 @@
+"""A simulated drone at the other end of real sockets, in a thread, whose own time is the time of both sides.
+
+However busy the machine is, neither side can be late for the other by more than a pause of the drone's.
+"""
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Final, Self
+
+from app.core.policy import Gains
+from app.vehicles.base import OptionValue
+from app.vehicles.mavlink.addresses import UdpAddress
+from app.vehicles.mavlink.dialects import Message, text
+from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.transports import open_transport
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.simdrone.autopilots.registry import get_autopilot
+from app.vehicles.simdrone.body import TICK_S, new_body
+from app.vehicles.simdrone.drone import Drone
+from app.vehicles.simdrone.faults import parse_fault
+from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
+
+SAFE: Final[Mapping[str, Mapping[str, float]]] = {
+    "paparazzi": {"kp": 283, "ki": 13, "kd": 82},
+    "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_D": 0.0, "PSC_ACCZ_I": 1.0},
+    "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 2.0},
+}
+_TICKS_AT_ONCE: Final = 4
+
+
+class Hangar:
+    """`heard` is everything that reached the drone, with the drone's time."""
+
+    def __init__(
+        self,
+        autopilot: str = "paparazzi",
+        faults: Sequence[str] = (),
+        *,
+        speed: float = 25.0,
+        release: str = "",
+        body: Mapping[str, OptionValue] | None = None,
+    ) -> None:
+        self.autopilot, self.speed = autopilot, speed
+        kind = get_autopilot(release or autopilot)
+        built = new_body("twin", {"scatter": 0.0, **(body or {})}, seed=1)
+        self.drone = Drone(built, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults])
+        self._ports = free_port(), free_port()
+        self._transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
+        self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
+        self.heard: list[tuple[float, Message]] = []
+        self.problem: BaseException | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._transport.close()
+        if self.problem is not None and error is None:
+            raise self.problem
+
+    # ---- the clock of both sides
+
+    def now_s(self) -> float:
+        if self.problem is not None:
+            raise RuntimeError("the simulated drone broke down") from self.problem
+        return self.drone.time_s
+
+    def wait_s(self, seconds: float) -> None:
+        time.sleep(max(self.wall_s(seconds), 0.0))
+
+    def wall_s(self, seconds: float) -> float:
+        return seconds / self.speed
+
+    # ---- the ground side
+
+    def options(self, **options: OptionValue) -> dict[str, OptionValue]:
+        address = str(UdpAddress(LOOPBACK, self._ports[1], self._ports[0]))
+        chosen = {"autopilot": self.autopilot, "address": address, "simulated": True, **options}
+        return MAVLINK.check(chosen, field="options")
+
+    def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
+        safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
+        return MavlinkVehicle(self.options(**options), safe, is_real=False, clock=self)
+
+    def told(self, *kinds: str) -> list[Message]:
+        return [message for _, message in self.heard if message.get_type() in kinds]
+
+    @property
+    def writes(self) -> list[str]:
+        """Parameters in the order in which they were written."""
+        return [text(message, "param_id") for message in self.told("PARAM_SET")]
+
+    # ---- the drone's thread
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping.is_set():
+                for data, _ in self._transport.read(0.0):
+                    self.heard += [(self.drone.time_s, message) for message in self._codec.parse(data)]
+                    self.drone.receive(data)
+                for _ in range(_TICKS_AT_ONCE):
+                    for frame in self.drone.tick():
+                        self._transport.write(frame)
+                time.sleep(_TICKS_AT_ONCE * TICK_S / self.speed)
+        except BaseException as error:  # noqa: BLE001 - told by the other thread
+            self.problem = error

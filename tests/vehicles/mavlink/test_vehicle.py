@@ -1,0 +1,254 @@
+"""Whole trials over real UDP against the simulated drone, which was built by another reading of the same facts."""
+
+import numpy as np
+import pytest
+
+from app.core.errors import InputError
+from app.core.experiments.takeoff import Takeoff
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.addresses import parse
+from app.vehicles.mavlink.dialects import PAPARAZZI, number, text
+from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.open import open_vehicle
+from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
+from tests.vehicles.mavlink.hangar import Hangar
+from tests.vehicles.mavlink.speaking import becomes
+
+ORDER = FlightOrder(seed=1)
+TAKEOFF = Takeoff()
+
+
+def fly(vehicle: MavlinkVehicle, gains: dict[str, float] | None = None) -> FlightRecord:
+    vehicle.stage(TUNED if gains is None else gains)
+    return vehicle.fly(ORDER, on_sample=unwatched, should_abort=never)
+
+
+def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
+    with open_vehicle("twin", {"scatter": 0.0}, safe_gains=SAFE) as twin:
+        twin.stage(TUNED)
+        alone = TAKEOFF.error(twin.fly(ORDER, on_sample=unwatched, should_abort=never).trajectory)
+    watcher = Watcher()
+    with Hangar() as hangar:
+        vehicle = hangar.vehicle()
+        assert vehicle.read_gains() == SAFE
+        assert vehicle.stage(TUNED) == TUNED
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_abort=never)
+        assert vehicle.read_gains() == SAFE
+        vehicle.close()
+    flight = record.trajectory
+    assert (record.ending, record.reason, flight.source, flight.clock) == ("completed", "", "mavlink", "vehicle")
+    assert TAKEOFF.error(flight) == pytest.approx(alone, rel=0.05)
+    assert flight.time_s[0] == pytest.approx(-1.0, abs=0.1)
+    assert 33.0 <= flight.time_s[-1] < 33.1
+    assert 0.0 in flight.time_s
+    assert np.diff(flight.time_s).max() < 0.03
+    assert set(flight.channels) == {"altitude_m", "climb_rate_m_s", "set_point_m", "battery_v"}
+    assert len(watcher.samples) == pytest.approx(33 * 50, rel=0.05)
+
+
+FAULTS = [
+    ("link-lost:3@3", "invalid", "The link was lost in the air"),
+    ("frozen-position:2@3", "invalid", "stood still while it went on talking"),
+    ("low-battery@3", "invalid", "The battery was at 9.0 V"),
+    ("no-lift-off@0", "aborted", "It was still on the ground 1.5 s after the command"),
+    ("jumping-position:3@3", "invalid", "samples were dropped"),
+    ("duplicated-packets@connect", "completed", ""),
+    ("reordered-packets@connect", "completed", ""),
+]
+
+
+@pytest.mark.parametrize(("fault", "ending", "reason"), FAULTS, ids=[fault for fault, *_ in FAULTS])
+def test_whatever_befalls_a_flight_it_ends_on_the_ground_with_the_safe_gains(
+    fault: str, ending: str, reason: str
+) -> None:
+    with Hangar(faults=[fault]) as hangar:
+        vehicle = hangar.vehicle()
+        record = fly(vehicle)
+        assert (record.ending, vehicle.read_gains()) == (ending, SAFE)
+        assert reason in record.reason
+        assert hangar.drone.body.stands
+        vehicle.close()
+
+
+def test_a_rebooted_vehicle_is_left_alone_and_quarantined() -> None:
+    with Hangar(faults=["reboot@3"]) as hangar:
+        vehicle = hangar.vehicle()
+        record = fly(vehicle)
+        assert record.ending == "invalid"
+        assert "rebooted" in record.reason or "disarmed itself" in record.reason or "Nothing was heard" in record.reason
+        for ask in (lambda: vehicle.stage(SAFE), lambda: fly(vehicle)):
+            with pytest.raises(SafeGainsError, match="quarantined"):
+                ask()
+        vehicle.close()
+
+
+def test_a_link_that_stays_lost_quarantines_the_vehicle_and_never_stops_its_motors() -> None:
+    with Hangar(faults=["link-lost@3"]) as hangar:
+        vehicle = hangar.vehicle()
+        record = fly(vehicle)
+        assert record.ending == "invalid"
+        assert "The link stayed lost for 60 s." in record.reason
+        assert "kil_thr" not in hangar.writes
+        with pytest.raises(SafeGainsError, match="quarantined"):
+            vehicle.stage(SAFE)
+        vehicle.close()
+
+
+def test_an_abort_sends_the_safe_gains_then_land_and_keeps_the_record() -> None:
+    watcher = Watcher(abort_at_s=2.0)
+    with Hangar() as hangar:
+        vehicle = hangar.vehicle()
+        vehicle.stage(TUNED)
+        before = len(hangar.heard)
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_abort=watcher.decide)
+        assert vehicle.read_gains() == SAFE
+        vehicle.close()
+    assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
+    told = [
+        text(message, "param_id") if message.get_type() == "PARAM_SET" else f"block {number(message, 'seq'):.0f}"
+        for _, message in hangar.heard[before:]
+        if message.get_type() in {"PARAM_SET", "SCRIPT_ITEM"}
+    ]
+    take_off = told.index("block 4")
+    assert told[take_off + 1 : take_off + 5] == ["gui_v_kp", "gui_v_kd", "gui_v_ki", "block 13"]
+    flight = record.trajectory
+    assert flight.time_s[-1] > 3.0
+    assert flight["altitude_m"][-1] < 0.3
+    assert flight["set_point_m"][-1] < 0.3
+
+
+def test_land_never_waits_for_the_list_of_blocks() -> None:
+    with Hangar(faults=["low-battery@1"]) as hangar:
+        vehicle = hangar.vehicle()
+        fly(vehicle)
+        vehicle.close()
+    told = [message.get_type() for _, message in hangar.heard]
+    activations = [place for place, kind in enumerate(told) if kind == "SCRIPT_ITEM"]
+    assert len(activations) >= 4
+    assert all(told[place - 1] == "MISSION_ACK" for place in activations)
+
+
+@pytest.mark.parametrize("error", [RuntimeError("the watcher's own"), KeyboardInterrupt()])
+def test_what_would_end_the_program_lands_the_vehicle_first(error: BaseException) -> None:
+    def fail(sample: Sample) -> None:
+        if sample.time_s > 1.0:
+            raise error
+
+    with Hangar() as hangar:
+        vehicle = hangar.vehicle()
+        vehicle.stage(TUNED)
+        with pytest.raises(type(error)):
+            vehicle.fly(ORDER, on_sample=fail, should_abort=never)
+        assert vehicle.read_gains() == SAFE
+        assert hangar.drone.body.stands
+        vehicle.close()
+
+
+def test_a_flight_aborted_before_it_starts_leaves_one_instant_and_arms_nothing() -> None:
+    with Hangar() as hangar:
+        vehicle = hangar.vehicle()
+        vehicle.stage(TUNED)
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_abort=lambda: "changed my mind")
+        assert (record.ending, record.reason) == ("aborted", "changed my mind")
+        assert record.trajectory.time_s.tolist() == [0.0]
+        assert not hangar.told("SCRIPT_ITEM")
+        vehicle.close()
+
+
+def test_nothing_flies_before_its_gains_are_staged() -> None:
+    with Hangar() as hangar:
+        vehicle = hangar.vehicle()
+        with pytest.raises(VehicleError, match="No gains were staged"):
+            vehicle.fly(ORDER, on_sample=unwatched, should_abort=never)
+        vehicle.close()
+
+
+def test_without_a_heartbeat_nothing_is_sent() -> None:
+    with Hangar(faults=["no-heartbeat@connect"]) as hangar:
+        with pytest.raises(VehicleError, match=r"No heartbeat was heard.*dialect paparazzi"):
+            hangar.vehicle()
+        assert hangar.heard == []
+
+
+def test_another_system_than_the_one_named_is_not_listened_to() -> None:
+    with Hangar() as hangar, pytest.raises(VehicleError, match="No heartbeat was heard"):
+        hangar.vehicle(system_id=32.0)
+
+
+def test_another_autopilot_is_not_flown() -> None:
+    with Hangar("ardupilot") as hangar:
+        options = hangar.options(autopilot="px4")
+        with pytest.raises(VehicleError, match=r"Others were heard: MAVLink's autopilots \[3\]"):
+            MavlinkVehicle(options, SAFE, is_real=False, clock=hangar)
+
+
+def test_a_vehicle_that_takes_no_parameters_is_refused() -> None:
+    with Hangar(faults=["param-unconfirmed@connect"]) as hangar, pytest.raises(VehicleError, match="did not confirm"):
+        hangar.vehicle()
+
+
+def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() -> None:
+    with Hangar(faults=["arm-refused@connect"]) as hangar:
+        vehicle = hangar.vehicle()
+        with pytest.raises(VehicleError, match="would not arm"):
+            fly(vehicle)
+        assert vehicle.read_gains() == SAFE
+        vehicle.close()
+
+
+def test_a_position_that_comes_too_seldom_is_refused() -> None:
+    with Hangar(release="paparazzi-bare") as hangar, pytest.raises(VehicleError, match=r"times a second, it takes 40"):
+        hangar.vehicle()
+
+
+def test_a_low_battery_stays_on_the_ground() -> None:
+    with Hangar() as hangar, pytest.raises(VehicleError, match=r"Its battery is at .* below 20 V"):
+        hangar.vehicle(min_battery_v=20.0)
+
+
+def test_an_armed_vehicle_is_met_with_quarantine() -> None:
+    with Hangar() as hangar:
+        link = Link(parse(str(hangar.options()["address"])), PAPARAZZI, clock=hangar, target_system=31)
+        for kind, fields in (("MISSION_ACK", {"type": 0}), ("SCRIPT_ITEM", {"seq": 3, "name": ""})):
+            link.send(kind, target_system=31, target_component=0, **fields)
+        link.close()
+        assert becomes(lambda: bool(hangar.told("SCRIPT_ITEM")))
+        with pytest.raises(SafeGainsError, match="although nobody here armed it"):
+            hangar.vehicle()
+
+
+@pytest.mark.parametrize(
+    ("options", "is_simulated"),
+    [
+        ({"simulated": True}, True),
+        ({"simulated": False}, False),
+        ({"simulated": True, "address": "udpin:127.0.0.1:14550"}, True),
+        ({"simulated": False, "address": "tcp:192.168.1.1:5760"}, False),
+    ],
+)
+def test_only_what_is_said_to_be_simulated_and_is_here_is_no_real_vehicle(
+    options: dict[str, OptionValue], is_simulated: bool
+) -> None:
+    complete = MAVLINK.check(options, field="options")
+    assert MAVLINK.is_real_with(complete) is not is_simulated
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "reason"),
+    [
+        ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "is not believed of udp:10.0.0.2:4245"),
+        ({"simulated": True, "address": "serial:/dev/ttyUSB0:57600"}, "simulated", "only a loopback address"),
+        ({"autopilot": "betaflight"}, "autopilot", "must be paparazzi, ardupilot, px4"),
+        ({"address": "nowhere"}, "address", "must be udp:"),
+        ({"clock_speed": 10.0}, "clock_speed", "must be 1"),
+    ],
+)
+def test_impossible_options_are_refused_by_name(options: dict[str, OptionValue], field: str, reason: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        MAVLINK.check(options, field="vehicle.options")
+    [problem] = refusal.value.problems
+    assert problem.field == f"vehicle.options.{field}"
+    assert reason in problem.reason
