@@ -16,6 +16,7 @@ from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
 from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, DIALECTS, PAPARAZZI, Dialect, FieldValue, number, text
 from app.vehicles.mavlink.link import INBOX, UNATTENDED_AFTER_S, Link, LinkError, LossCounter
+from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (
     LOOPBACK,
     SOON_S,
@@ -177,6 +178,20 @@ def test_paparazzis_other_counters_are_left_out_of_the_losses() -> None:
         losses.count("SCRIPT_CURRENT", 190, 200)
         losses.count("MISSION_ACK", 190, 77)
     assert losses.lost == 0
+
+
+@pytest.mark.parametrize("gains", FLOWN)
+def test_a_recorded_flight_of_the_real_paparazzi_is_heard_whole_with_nothing_lost(
+    gains: tuple[int, int, int], paparazzi: Speaker, link: Link
+) -> None:
+    said = [each.message for each in recorded(gains) if each.is_from_vehicle]
+    heard = []
+    for start in range(0, len(said), 200):
+        for message in said[start : start + 200]:
+            paparazzi.send(bytes(message.get_msgbuf()))
+        heard += collect(link, len(said[start : start + 200]))
+    assert [bytes(each.message.get_msgbuf()) for each in heard] == [bytes(message.get_msgbuf()) for message in said]
+    assert (link.health.received, link.health.lost, link.health.bad) == (len(said), 0, 0)
 
 
 def test_overtaken_and_repeated_packets_are_not_losses() -> None:
