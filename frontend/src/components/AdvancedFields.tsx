@@ -1,4 +1,5 @@
 import { SegmentedControl } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
 import type { ReactNode } from "react";
 import type { Catalogue, OptionInfo } from "../api/types";
 import { type CampaignForm, gainsOf, type OptionValue, optionsOf, type StopKind } from "../lib/newCampaign";
@@ -83,12 +84,14 @@ const STOPS: Record<StopKind, { label: string; line: string }> = {
 };
 
 function StopFields({ form, reasons, set }: Props) {
+  const narrow = useMediaQuery("(max-width: 620px)", false, { getInitialValueInEffect: false });
   return (
     <Group title="Stop">
       <SegmentedControl
         aria-label="Stop rule"
         size="md"
         className={classes["wide"]}
+        orientation={narrow ? "vertical" : "horizontal"}
         value={form.stop}
         onChange={(value) => set({ stop: value as StopKind })}
         data={Object.entries(STOPS).map(([value, { label }]) => ({ value, label }))}
