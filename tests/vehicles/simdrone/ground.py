@@ -26,6 +26,7 @@ MODULES: Final = {
 }
 SPEED: Final = 20.0
 WALL_LIMIT_S: Final = 30.0
+BOOTED_WITHIN_MS: Final = 1000
 STILL: Final[Mapping[str, OptionValue]] = {"scatter": 0.0, "start_latency_s": 0.0}
 """A twin without scatter, that starts at once."""
 
@@ -134,9 +135,14 @@ class Ground:
         with contextlib.suppress(TimeoutError):
             for message in self.mav.parse_buffer(self.radio.recv(65536)) or []:
                 self.heard.append(message)
-                boot_ms: int = getattr(message, "time_boot_ms", self._boot_ms)
-                self.elapsed_s += max(boot_ms - self._boot_ms, 0) / 1000
-                self._boot_ms = boot_ms
+                self._tell_time(getattr(message, "time_boot_ms", self._boot_ms))
+
+    def _tell_time(self, boot_ms: int) -> None:
+        """A message may be late, or repeat an old time; a reboot starts near 0."""
+        if boot_ms < BOOTED_WITHIN_MS < self._boot_ms - boot_ms:
+            self._boot_ms = boot_ms
+        self.elapsed_s += max(boot_ms - self._boot_ms, 0) / 1000
+        self._boot_ms = max(boot_ms, self._boot_ms)
 
 
 @contextlib.contextmanager

@@ -6,8 +6,10 @@ from types import MappingProxyType
 from typing import Final
 
 from app.core.errors import InputError, Problem
+from app.vehicles.simdrone.autopilots.ardupilot import ArduPilot, ArduPilot47
 from app.vehicles.simdrone.autopilots.base import Autopilot
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
+from app.vehicles.simdrone.autopilots.px4 import Px4
 from app.vehicles.simdrone.body import Body
 
 
@@ -26,6 +28,18 @@ class AutopilotKind:
 
 def _paparazzi(body: Body, system: int) -> Autopilot:
     return Paparazzi(body, system=system)
+
+
+def _ardupilot(body: Body, system: int) -> Autopilot:
+    return ArduPilot(body, system=system)
+
+
+def _ardupilot_47(body: Body, system: int) -> Autopilot:
+    return ArduPilot47(body, system=system)
+
+
+def _px4(body: Body, system: int) -> Autopilot:
+    return Px4(body, system=system)
 
 
 def _bare_paparazzi(body: Body, system: int) -> Autopilot:
@@ -50,6 +64,17 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
                 link="udp:127.0.0.1:4244@4245",
                 make=_bare_paparazzi,
             ),
+            AutopilotKind(
+                name="ardupilot", title="ArduCopter up to 4.6", system=1, link="udp:127.0.0.1:14550", make=_ardupilot
+            ),
+            AutopilotKind(
+                name="ardupilot-4.7",
+                title="ArduCopter from 4.7 on",
+                system=1,
+                link="udp:127.0.0.1:14550",
+                make=_ardupilot_47,
+            ),
+            AutopilotKind(name="px4", title="PX4", system=1, link="udp:127.0.0.1:14550", make=_px4),
         )
     }
 )

@@ -1,0 +1,432 @@
+"""The MAVLink 2 services that ArduPilot and PX4 share: parameters, commands, modes, rates, failsafes."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar, Final
+
+from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message, is_known, number, text
+from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, Letter, Timetable
+from app.vehicles.simdrone.autopilots.copter import telemetry
+from app.vehicles.simdrone.autopilots.copter.cascade import Cascade
+from app.vehicles.simdrone.autopilots.copter.flyer import Flyer, Phase
+from app.vehicles.simdrone.autopilots.copter.parameters import Coding, Kind, Parameter, Parameters
+from app.vehicles.simdrone.body import TICK_S, Body
+
+COMPONENT: Final = 1
+FORCE: Final = 21196
+"""The second parameter of 400 that makes it unconditional."""
+
+ESTIMATE_AFTER_S: Final = 3.0
+"""Since the start, until the position is known well enough to arm."""
+_GROUND_STATION: Final = 6
+_LIST_EVERY_TICKS: Final = 2
+_ACTIVE: Final = 4
+_STANDBY: Final = 3
+_ALTITUDE_BREACH: Final = 2
+_CUSTOM_MODE: Final = 1
+
+# MAV_CMD
+LAND: Final = 21
+TAKE_OFF: Final = 22
+SET_MODE: Final = 176
+ARM_DISARM: Final = 400
+GET_HOME: Final = 410
+SET_INTERVAL: Final = 511
+REQUEST_MESSAGE: Final = 512
+REQUEST_CAPABILITIES: Final = 520
+
+
+class Behaviour(Enum):
+    """What a flight mode makes the vehicle do."""
+
+    STAY = "where it is"
+    TAKE_OFF = "to the height of takeoff, once armed"
+    LAND = "down"
+
+
+class Reaction(Enum):
+    """What a failsafe does."""
+
+    NONE = "nothing"
+    WARN = "say so"
+    HOLD = "stay where it is"
+    LAND = "come down"
+
+
+@dataclass(frozen=True, slots=True)
+class FlightMode:
+    """A mode: its number in HEARTBEAT.custom_mode, the bits that go with it, and what it does."""
+
+    name: str
+    custom_mode: int
+    base_mode: int
+    behaviour: Behaviour = Behaviour.STAY
+    may_arm: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manners:
+    """What is data in an autopilot. `modes` holds every mode, the first being that after the start, and those that the
+    services need by name; `refused` is the result of a refusal, `texts` what is said with one."""
+
+    dialect: Dialect
+    autopilot: int
+    version: int
+    parameters: tuple[Parameter, ...]
+    coding: Coding
+    periods_s: Mapping[str, float]
+    modes: tuple[FlightMode, ...]
+    land: str
+    hold: str
+    refused: int
+    no_estimate: str
+    not_armable: str
+    not_landed: str
+    link_lost: str
+    fence_breached: str
+    ground_m: float
+    """Height of the place of takeoff in the local frame."""
+
+
+class Copter(ABC):
+    """One autopilot from switching on; see `Autopilot`."""
+
+    manners: ClassVar[Manners]
+
+    def __init__(self, body: Body, cascade: Cascade, *, system: int) -> None:
+        self.dialect = self.manners.dialect
+        self.system, self.component = system, COMPONENT
+        self.refuses_arming = False
+        self.ignores_parameters = False
+        self.took_off = False
+        self.armed = False
+        self.mode = self.manners.modes[0]
+        self.parameters = Parameters(self.manners.parameters)
+        self.flyer = Flyer(body, cascade)
+        self._body = body
+        self._codec = self.dialect.codec(system=system, component=COMPONENT)
+        self._ticks = 0
+        self._armed_s = 0.0
+        self._ground_heard_s: float | None = None
+        self._is_breached = False
+        self._breaches = 0
+        self._listing: int | None = None
+        self._timetable = Timetable.of(self.manners.periods_s)
+        self._out: list[Letter] = []
+        self.tune()
+
+    # ------------------------------------------------------------ what differs
+
+    @abstractmethod
+    def tune(self) -> None:
+        """Hand the parameters to the controller."""
+
+    @abstractmethod
+    def requested_mode(self, main: int, sub: int) -> FlightMode | None:
+        """The mode that command 176 asks for."""
+
+    @abstractmethod
+    def take_off(self, param7: float) -> int:
+        """Obey command 22; the result."""
+
+    @abstractmethod
+    def landing_speed_m_s(self) -> float: ...
+
+    @abstractmethod
+    def link_loss(self) -> tuple[float, Reaction]:
+        """After how many seconds without a ground station, and what then."""
+
+    @abstractmethod
+    def fence(self) -> tuple[float, Reaction]:
+        """Above which altitude, and what then."""
+
+    @abstractmethod
+    def idle_limit_s(self) -> float:
+        """How long it stays armed on the ground."""
+
+    def heeds(self, _message: Message) -> bool:
+        """Whether this ground station's heartbeat counts."""
+        return True
+
+    # ------------------------------------------------------------ time
+
+    @property
+    def boot_s(self) -> float:
+        return self._ticks * TICK_S
+
+    def receive(self, data: bytes) -> None:
+        for message in self._codec.parse(data):
+            handler = _HANDLERS.get(message.get_type()) if is_known(message) else None
+            if handler is not None and getattr(message, "target_system", 0) in (0, self.system):
+                handler(self, message)
+
+    def tick(self) -> list[Letter]:
+        self._ticks += 1
+        was_flying = self.flyer.flies
+        self.flyer.tick()
+        if was_flying and not self.flyer.flies:
+            self._disarm()
+        self._watch_idling()
+        self._watch_link()
+        self._watch_fence()
+        self._report()
+        out, self._out = self._out, []
+        return out
+
+    # ------------------------------------------------------------ flying
+
+    def climb(self, height_m: float, speed_m_s: float) -> None:
+        """Take off, or climb on."""
+        self.took_off = True
+        self.flyer.take_off(height_m, speed_m_s)
+
+    def enter(self, mode: FlightMode) -> None:
+        self.mode = mode
+        match mode.behaviour:
+            case Behaviour.LAND:
+                self.flyer.land(self.landing_speed_m_s())
+            case Behaviour.STAY:
+                self.flyer.hold()
+            case Behaviour.TAKE_OFF:
+                if self.armed:
+                    self.take_off(float("nan"))
+
+    def find_mode(self, name: str) -> FlightMode:
+        return next(mode for mode in self.manners.modes if mode.name == name)
+
+    def _arm(self, *, force: bool) -> int:
+        reason = None if force and not self.refuses_arming else self._arming_refusal()
+        if reason is not None:
+            self.say(reason)
+            return self.manners.refused
+        if not self.armed:
+            self.armed, self._armed_s = True, self.boot_s
+            if self.mode.behaviour is Behaviour.TAKE_OFF:
+                self.enter(self.mode)
+        return ACCEPTED
+
+    def _arming_refusal(self) -> str | None:
+        if self.refuses_arming or self.boot_s < ESTIMATE_AFTER_S:
+            return self.manners.no_estimate
+        return None if self.mode.may_arm else self.manners.not_armable
+
+    def _disarm(self) -> None:
+        self.armed = False
+        self.flyer.stop()
+
+    def _watch_idling(self) -> None:
+        limit_s = self.idle_limit_s()
+        if self.armed and not self.flyer.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
+            self._disarm()
+
+    def _watch_link(self) -> None:
+        """A ground station that was never heard cannot be lost."""
+        limit_s, reaction = self.link_loss()
+        if reaction is Reaction.NONE or self._ground_heard_s is None or not self.flyer.flies:
+            return
+        if self.boot_s - self._ground_heard_s > limit_s:
+            self._ground_heard_s = None
+            self._react(reaction, self.manners.link_lost)
+
+    def _watch_fence(self) -> None:
+        limit_m, reaction = self.fence()
+        is_outside = reaction is not Reaction.NONE and self.flyer.flies and self._body.altitude_m > limit_m
+        was_outside, self._is_breached = self._is_breached, is_outside
+        if is_outside and not was_outside:
+            self._breaches += 1
+            self.send("FENCE_STATUS")
+            self._react(reaction, self.manners.fence_breached)
+
+    def _react(self, reaction: Reaction, reason: str) -> None:
+        self.say(reason)
+        if reaction is Reaction.LAND:
+            self.enter(self.find_mode(self.manners.land))
+        elif reaction is Reaction.HOLD:
+            self.enter(self.find_mode(self.manners.hold))
+
+    # ------------------------------------------------------------ sending
+
+    def say(self, words: str) -> None:
+        """STATUSTEXT, as critical."""
+        self._out.append(Letter("STATUSTEXT", {"severity": 2, "text": words}))
+
+    def send(self, kind: str) -> None:
+        """One of the reports, now."""
+        self._out.append(Letter(kind, telemetry.REPORTS[kind].fields(self._snapshot())))
+
+    def _report(self) -> None:
+        if self._listing is not None and self._ticks % _LIST_EVERY_TICKS == 0:
+            self._send_parameter(self._listing)
+            self._listing = self._listing + 1 if self._listing + 1 < len(self.parameters) else None
+        due = self._timetable.due(self._ticks)
+        if due:
+            now = self._snapshot()
+            self._out += [Letter(kind, telemetry.REPORTS[kind].fields(now)) for kind in due]
+
+    def _snapshot(self) -> telemetry.Snapshot:
+        body, manners = self._body, self.manners
+        return telemetry.Snapshot(
+            boot_s=self.boot_s,
+            local_m=body.altitude_m + manners.ground_m,
+            altitude_m=body.altitude_m,
+            climb_rate_m_s=body.climb_rate_m_s,
+            thrust=body.thrust,
+            battery_v=body.battery_v,
+            armed=self.armed,
+            autopilot=manners.autopilot,
+            base_mode=self.mode.base_mode,
+            custom_mode=self.mode.custom_mode,
+            status=_ACTIVE if self.flyer.flies else _STANDBY,
+            landed_state=_LANDED_STATES[self.flyer.phase],
+            version=manners.version,
+            breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
+            breaches=self._breaches,
+        )
+
+    def _send_parameter(self, place: int) -> None:
+        parameter, value = self.parameters.at(place)
+        fields: dict[str, FieldValue] = {
+            "param_id": parameter.name,
+            "param_value": self.manners.coding.encode(value, parameter.kind),
+            "param_type": int(parameter.kind),
+            "param_count": len(self.parameters),
+            "param_index": place,
+        }
+        self._out.append(Letter("PARAM_VALUE", fields))
+
+    def _acknowledge(self, message: Message, command: int, result: int) -> None:
+        sender = {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
+        fields = {"command": command, "result": result, "progress": 0, "result_param2": 0, **sender}
+        self._out.append(Letter("COMMAND_ACK", fields))
+
+    # ------------------------------------------------------------ hearing
+
+    def _hear_heartbeat(self, message: Message) -> None:
+        if number(message, "type") == _GROUND_STATION and self.heeds(message):
+            self._ground_heard_s = self.boot_s
+
+    def _hear_param_list(self, _message: Message) -> None:
+        self._listing = 0
+
+    def _hear_param_read(self, message: Message) -> None:
+        """What does not exist is met with silence."""
+        index = int(number(message, "param_index"))
+        place = self.parameters.place(text(message, "param_id")) if index < 0 else index
+        if place is not None and place < len(self.parameters):
+            self._send_parameter(place)
+
+    def _hear_param_set(self, message: Message) -> None:
+        """Answered with what is held then, whatever that is; no range is checked."""
+        place = self.parameters.place(text(message, "param_id"))
+        if place is None or self.ignores_parameters:
+            return
+        parameter, _ = self.parameters.at(place)
+        coding = self.manners.coding
+        fits = not coding.is_strict or number(message, "param_type") == parameter.kind
+        value = coding.decode(number(message, "param_value"), parameter.kind)
+        if fits and value is not None:
+            self.parameters[parameter.name] = value
+            self.tune()
+        self._send_parameter(place)
+
+    def _hear_set_mode(self, message: Message) -> None:
+        """The older way, without an answer."""
+        custom = int(number(message, "custom_mode"))
+        mode = next((mode for mode in self.manners.modes if mode.custom_mode == custom), None)
+        if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
+            self.enter(mode)
+
+    def _hear_command(self, message: Message) -> None:
+        command = int(number(message, "command"))
+        obey = _COMMANDS.get(command)
+        result = UNSUPPORTED if obey is None else obey(self, message)
+        self._acknowledge(message, command, result)
+
+    def _obey_arm(self, message: Message) -> int:
+        force = number(message, "param2") == FORCE
+        if number(message, "param1") > 0.5:
+            return self._arm(force=force)
+        if not (self.flyer.is_landed or force):
+            self.say(self.manners.not_landed)
+            return self.manners.refused
+        self._disarm()
+        return ACCEPTED
+
+    def _obey_mode(self, message: Message) -> int:
+        main, sub = number(message, "param2"), number(message, "param3")
+        mode = self.requested_mode(_whole(main), _whole(sub))
+        if mode is None or not int(number(message, "param1")) & _CUSTOM_MODE:
+            return FAILED
+        self.enter(mode)
+        return ACCEPTED
+
+    def _obey_take_off(self, message: Message) -> int:
+        return self.take_off(number(message, "param7"))
+
+    def _obey_land(self, _message: Message) -> int:
+        self.enter(self.find_mode(self.manners.land))
+        return ACCEPTED
+
+    def _obey_interval(self, message: Message) -> int:
+        """Microseconds; 0 is the default, below that never."""
+        kind = telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        if kind is None:
+            return FAILED
+        interval_us = number(message, "param2")
+        default_s = self.manners.periods_s.get(kind, 0.0)
+        self._timetable.set(kind, default_s if interval_us == 0.0 else interval_us / 1e6)
+        return ACCEPTED
+
+    def _obey_request(self, message: Message) -> int:
+        kind = telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        if kind is None:
+            return UNSUPPORTED
+        self.send(kind)
+        return ACCEPTED
+
+    def _obey_capabilities(self, _message: Message) -> int:
+        self.send("AUTOPILOT_VERSION")
+        return ACCEPTED
+
+    def _obey_home(self, _message: Message) -> int:
+        self.send("HOME_POSITION")
+        return ACCEPTED
+
+
+def _whole(value: float) -> int:
+    """Command parameters are floats; what is no number asks for nothing."""
+    return int(value) if abs(value) < 1e9 else -1
+
+
+def real(name: str, default: float) -> Parameter:
+    return Parameter(name, Kind.REAL32, default)
+
+
+_LANDED_STATES: Final = {
+    Phase.IDLE: telemetry.ON_GROUND,
+    Phase.CLIMBING: telemetry.TAKING_OFF,
+    Phase.HOLDING: telemetry.IN_AIR,
+    Phase.LANDING: telemetry.LANDING,
+}
+
+_HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
+    "HEARTBEAT": Copter._hear_heartbeat,
+    "PARAM_REQUEST_LIST": Copter._hear_param_list,
+    "PARAM_REQUEST_READ": Copter._hear_param_read,
+    "PARAM_SET": Copter._hear_param_set,
+    "SET_MODE": Copter._hear_set_mode,
+    "COMMAND_LONG": Copter._hear_command,
+}
+
+_COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
+    LAND: Copter._obey_land,
+    TAKE_OFF: Copter._obey_take_off,
+    SET_MODE: Copter._obey_mode,
+    ARM_DISARM: Copter._obey_arm,
+    GET_HOME: Copter._obey_home,
+    SET_INTERVAL: Copter._obey_interval,
+    REQUEST_MESSAGE: Copter._obey_request,
+    REQUEST_CAPABILITIES: Copter._obey_capabilities,
+}
