@@ -109,11 +109,6 @@ class UdpTransport:
         self._foreign = 0
 
     @property
-    def local(self) -> Peer:
-        host, port = self._socket.getsockname()
-        return host, port
-
-    @property
     def remote(self) -> Peer | None:
         return self._remote
 

@@ -1,5 +1,6 @@
 """A link and a vehicle that talk over the loopback interface."""
 
+import math
 import os
 import pty
 import socket
@@ -8,10 +9,12 @@ import time
 import tty
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from app.core.errors import InputError
 from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
 from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, DIALECTS, PAPARAZZI, Dialect, FieldValue, number, text
@@ -458,6 +461,24 @@ def test_a_folder_that_is_not_there_leaves_nothing_open(paparazzi: Speaker, tmp_
         Link(paparazzi.address, PAPARAZZI, clock=CLOCK, tlog=tmp_path / "none" / "flight.tlog")
     with Link(paparazzi.address, PAPARAZZI, clock=CLOCK):
         pass  # the port is free again
+
+
+def test_a_stream_that_is_always_cut_within_a_frame_takes_no_more_memory() -> None:
+    sender = COMMON.codec(system=1, component=1)
+    receiver = COMMON.codec(system=255, component=190)
+    frames = [sender.pack(COMMON.message("LOCAL_POSITION_NED", position(step))) for step in range(1000)]
+    heard = []
+    for frame, following in pairwise(frames):
+        heard += receiver.parse(frame[1:] + following[:1] if heard else frame + following[:1])
+    assert [number(message, "time_boot_ms") for message in heard] == list(range(999))
+    assert len(receiver._in.buf) < 10_000 < len(b"".join(frames))
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, math.inf, math.nan])
+def test_a_clock_that_cannot_run_is_refused(speed: float) -> None:
+    with pytest.raises(InputError) as refusal:
+        ScaledClock(speed)
+    assert refusal.value.problems[0].field == "clock_speed"
 
 
 def test_the_dialects_are_found_by_name() -> None:

@@ -95,6 +95,11 @@ def test_a_host_without_an_address_is_refused() -> None:
         open_transport(UdpAddress("drone.invalid", 4245))
 
 
+def test_a_network_that_takes_nothing_is_no_error() -> None:
+    with closing(open_transport(UdpAddress("255.255.255.255", 4245))) as transport:  # broadcasting was not asked for
+        assert not transport.write(b"command")
+
+
 def test_a_burst_is_read_to_its_last_datagram(vehicle: socket.socket) -> None:
     local = free_port()
     with closing(open_transport(UdpAddress(LOOPBACK, vehicle.getsockname()[1], local))) as transport:
@@ -208,6 +213,30 @@ def test_a_radio_that_is_pulled_out_and_put_back_is_heard_again(tmp_path: Path) 
         assert becomes(lambda: transport.read(0.05) == [] and transport.write(b"after"))
         assert os.read(vehicle, 100) == b"after"
     os.close(vehicle)
+
+
+def test_a_radio_that_stays_away_is_tried_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.vehicles.mavlink.transports.REOPEN_EVERY_S", 0.02)
+    vehicle, device = plugged(tmp_path / "ttyRadio")
+    with closing(open_transport(SerialAddress(str(device), 57600))) as transport:
+        os.close(vehicle)
+        device.unlink()
+        assert not transport.write(b"lost")  # before the reader has noticed
+        assert not transport.write(b"lost")
+        for _ in range(5):
+            assert transport.read(0.05) == []
+        vehicle, _ = plugged(device)
+        assert becomes(lambda: transport.read(0.05) == [] and transport.write(b"after"))
+        assert os.read(vehicle, 100) == b"after"
+    os.close(vehicle)
+
+
+def test_a_radio_that_was_pulled_out_can_be_closed(tmp_path: Path) -> None:
+    vehicle, device = plugged(tmp_path / "ttyRadio")
+    transport = open_transport(SerialAddress(str(device), 57600))
+    os.close(vehicle)
+    assert becomes(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
+    transport.close()
 
 
 def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
