@@ -17,7 +17,17 @@ import pytest
 from app.core.errors import InputError
 from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
 from app.vehicles.mavlink.clock import ScaledClock
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, DIALECTS, PAPARAZZI, Dialect, FieldValue, number, text
+from app.vehicles.mavlink.dialects import (
+    ARDUPILOTMEGA,
+    COMMON,
+    DIALECTS,
+    PAPARAZZI,
+    Dialect,
+    FieldValue,
+    Message,
+    number,
+    text,
+)
 from app.vehicles.mavlink.link import INBOX, UNATTENDED_AFTER_S, Link, LinkError, LossCounter
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (
@@ -467,7 +477,7 @@ def test_a_stream_that_is_always_cut_within_a_frame_takes_no_more_memory() -> No
     sender = COMMON.codec(system=1, component=1)
     receiver = COMMON.codec(system=255, component=190)
     frames = [sender.pack(COMMON.message("LOCAL_POSITION_NED", position(step))) for step in range(1000)]
-    heard = []
+    heard: list[Message] = []
     for frame, following in pairwise(frames):
         heard += receiver.parse(frame[1:] + following[:1] if heard else frame + following[:1])
     assert [number(message, "time_boot_ms") for message in heard] == list(range(999))
