@@ -27,7 +27,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     expect(page.get_by_role("heading", name="Tune a takeoff in a handful of flights")).to_be_visible()
     dashboard.button("Create “AR.Drone takeoff to 3 m, simulated”").click()
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
-    campaign_id = dashboard.campaign_id
+    campaign_id = dashboard.when_ready(dashboard.campaign_id)
     dashboard.choose_speed("Max")
     finished = page.get_by_role("heading", name=re.compile("^(Converged|Flight budget used)"))
     for number in range(1, 8):
