@@ -146,34 +146,41 @@ class Ground:
 
 
 @contextlib.contextmanager
-def flying(
+def served(
     autopilot: str,
+    link: str,
     *,
     vehicle: str = "twin",
     options: Mapping[str, OptionValue] = STILL,
     faults: Sequence[str] = (),
     speed: float = SPEED,
     seed: int = 1,
-    module: str | None = None,
-) -> Iterator[Ground]:
-    """A drone served on a free port in a thread of its own, and a ground station that has heard from it."""
+) -> Iterator[Drone]:
+    """A drone on this link, in a thread of its own."""
     kind = get_autopilot(autopilot)
-    radio = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    radio.bind(("127.0.0.1", 0))
-    local = free_port()
-    transport = open_transport(parse(f"udp:127.0.0.1:{radio.getsockname()[1]}@{local}"))
     body = new_body(vehicle, options, seed=seed)
     drone = Drone(body, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults])
+    transport = open_transport(parse(link))
     server = Server(drone, transport, ScaledClock(speed))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
-        yield Ground(import_module(module or MODULES[autopilot.partition("-")[0]]), radio, ("127.0.0.1", local))
+        yield drone
     finally:
         server.stop()
         thread.join()
         transport.close()
-        radio.close()
+
+
+@contextlib.contextmanager
+def flying(autopilot: str, **settings: Any) -> Iterator[Ground]:
+    """A drone served on a free port, with the settings of `served`, and a ground station that it speaks to."""
+    module = import_module(MODULES[autopilot.partition("-")[0]])
+    local = free_port()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
+        radio.bind(("127.0.0.1", 0))
+        with served(autopilot, f"udp:127.0.0.1:{radio.getsockname()[1]}@{local}", **settings):
+            yield Ground(module, radio, ("127.0.0.1", local))
 
 
 def free_port() -> int:

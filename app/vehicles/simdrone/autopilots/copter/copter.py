@@ -357,7 +357,7 @@ class Copter(ABC):
     def _obey_mode(self, message: Message) -> int:
         main, sub = number(message, "param2"), number(message, "param3")
         mode = self.requested_mode(_whole(main), _whole(sub))
-        if mode is None or not int(number(message, "param1")) & _CUSTOM_MODE:
+        if mode is None or not _whole(number(message, "param1")) & _CUSTOM_MODE:
             return FAILED
         self.enter(mode)
         return ACCEPTED

@@ -1,0 +1,129 @@
+"""The loop around a simulated drone: links, clocks, and ground stations that send rubbish."""
+
+import math
+import time
+from collections.abc import Iterator
+from importlib import import_module
+from itertools import pairwise
+from random import Random
+from typing import Any
+
+import pytest
+
+from app.core.control.vertical_loop import RATE_HZ
+from app.core.errors import InputError
+from app.vehicles.mavlink.transports import LinkError
+from app.vehicles.simdrone.autopilots.registry import AUTOPILOTS, get_autopilot
+from app.vehicles.simdrone.body import MOTORS_OFF, TICK_STEPS, new_body, throttle_command
+from app.vehicles.simdrone.drone import Drone
+from tests.vehicles.simdrone.ground import MODULES, STILL, flying, free_port, served
+from tests.vehicles.simdrone.paparazzi import Pilot
+
+EXTREMES = {
+    "float": (math.nan, math.inf, -math.inf, 3.4e38, -1.0, 0.0),
+    "char": (b"", b"gui_v_kp", b"MPC_Z_P", b"\xff" * 16, b"x" * 16),
+    "uint8_t": (0, 1, 31, 255),
+    "int8_t": (-128, 0, 127),
+    "uint16_t": (0, 16, 176, 400, 511, 65535),
+    "int16_t": (-32768, -1, 0, 75, 76, 32767),
+    "uint32_t": (0, 4294967295),
+    "int32_t": (-2147483648, 2147483647),
+    "uint64_t": (0, 2**64 - 1),
+    "int64_t": (-(2**63), 2**63 - 1),
+    "double": (math.nan, 1e300),
+}
+HEEDED = frozenset(
+    (
+        *("HEARTBEAT", "SET_MODE", "PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "COMMAND_LONG"),
+        *("REQUEST_DATA_STREAM", "MISSION_ITEM", "MISSION_ACK"),
+        *("SCRIPT_ITEM", "SCRIPT_REQUEST", "SCRIPT_REQUEST_LIST"),
+    )
+)
+
+
+def extreme_messages(mavlink: Any, system: int, random: Random) -> Iterator[bytes]:
+    """Messages that the autopilot heeds, with whatever their fields can carry."""
+    sender = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    known = [each for each in mavlink.mavlink_map.values() if each.msgname in HEEDED]
+    for _ in range(400):
+        message = random.choice(known)
+        fields = {
+            name: random.choice(EXTREMES[kind])
+            for name, kind in zip(message.fieldnames, message.fieldtypes, strict=True)
+        }
+        if "target_system" in fields:
+            fields["target_system"] = system
+        yield message(**fields).pack(sender)
+
+
+@pytest.mark.parametrize("autopilot", AUTOPILOTS)
+def test_nothing_that_a_ground_station_can_say_ends_it(autopilot: str) -> None:
+    kind = get_autopilot(autopilot)
+    drone = Drone(new_body("twin", STILL, seed=1), lambda body: kind.make(body, kind.system))
+    random = Random(1)
+    answers = 0
+    for data in extreme_messages(import_module(MODULES[autopilot.partition("-")[0]]), kind.system, random):
+        drone.receive(data)
+        drone.receive(random.randbytes(20))
+        for _ in range(10):
+            answers += len(drone.tick())
+    assert answers > 300
+
+
+def test_its_time_runs_as_many_times_faster_as_asked() -> None:
+    """Never faster; on a busy machine slower."""
+    with flying("paparazzi", speed=4.0) as ground:
+        ground.expect("LOCAL_POSITION_NED")
+        start_s, vehicle_s = time.monotonic(), ground.elapsed_s
+        ground.listen(4.0)
+        passed_s = time.monotonic() - start_s
+    assert (ground.elapsed_s - vehicle_s) / passed_s < 4.5
+
+
+def heights_of_two_flights(seed: int) -> list[float]:
+    """After three seconds of the same thrust each, with a fall in between."""
+    body = new_body("twin", {"scatter": 1.0}, seed=seed)
+    heights = []
+    for _ in range(2):
+        body.advance(3 * RATE_HZ, throttle_command(0.7))
+        heights.append(body.altitude_m)
+        while not body.is_resting:
+            body.advance(TICK_STEPS, MOTORS_OFF)
+    return heights
+
+
+def test_each_flight_has_a_seed_of_its_own_and_the_first_one_decides_them_all() -> None:
+    first, second = heights_of_two_flights(3)
+    assert first != second
+    assert heights_of_two_flights(3) == [first, second]
+    assert heights_of_two_flights(4)[0] == second
+
+
+def test_two_drones_do_not_share_a_port() -> None:
+    link = f"udp:127.0.0.1:{free_port()}@{free_port()}"
+    with served("px4", link), pytest.raises(LinkError), served("px4", link):
+        pass
+
+
+def test_a_drone_may_wait_for_its_ground_station_to_speak_first() -> None:
+    port = free_port()
+    with served("paparazzi", f"udpin:127.0.0.1:{port}"), flying("paparazzi") as other:
+        other.drone = ("127.0.0.1", port)
+        Pilot(other).send_setting("gui_v_kp", 411.0)
+        answer = other.expect("PARAM_VALUE", lambda message: message.param_value == 411.0)
+    assert answer.param_id == "gui_v_kp"
+
+
+def test_an_unknown_autopilot_or_body_is_refused_by_its_name() -> None:
+    with pytest.raises(InputError) as refusal:
+        get_autopilot("betaflight")
+    assert refusal.value.problems[0].field == "autopilot"
+    with pytest.raises(InputError) as refusal:
+        new_body("lti", {}, seed=1)
+    assert refusal.value.problems[0].field == "vehicle"
+
+
+def test_packets_of_a_drone_are_numbered_through() -> None:
+    with flying("ardupilot") as ground:
+        numbers = [each.get_seq() for each in ground.listen(5.0)]
+    assert {(b - a) % 256 for a, b in pairwise(numbers)} == {1}
