@@ -213,6 +213,38 @@ def sim_drone(
     )
 
 
+@app.command(name="import")
+@plainly
+def import_log(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            show_default=False,
+            help="MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data (its .log beside it is read too), or CSV.",
+        ),
+    ],
+    campaign: Annotated[str, typer.Option(metavar="ID|NAME", show_default=False, help="The campaign it belongs to.")],
+    trial: Annotated[
+        int | None,
+        typer.Option(min=1, show_default=False, help="The trial's number, where more than one waits for its record."),
+    ] = None,
+    takeoff: Annotated[
+        int | None, typer.Option(min=1, show_default=False, help="Which takeoff of a log with several.")
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Take the log's gains where they are not the planned ones.")
+    ] = False,
+    data_dir: DataDir = None,
+    json_out: JsonOut = None,
+) -> None:
+    """Hand in the log of a flight made elsewhere: takeoff and gains are found in it."""
+    from app.commands.import_log import import_log as run
+
+    settings = _settings(data_dir=data_dir)
+    run(file, settings, campaign=campaign, trial=trial, takeoff=takeoff, yes=yes, json_out=json_out)
+
+
 @controller.command()
 @plainly
 def replay(
@@ -223,6 +255,24 @@ def replay(
     from app.commands.controller import replay_files
 
     if not replay_files(files, json_out):
+        raise typer.Exit(1)
+
+
+@controller.command()
+@plainly
+def check(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE…", help="Paparazzi's .data files with VERT_LOOP; .log beside them.")
+    ],
+    gains: Annotated[
+        str | None, typer.Option(metavar="KP,KI,KD", show_default=False, help="Gains flown, where no log says so.")
+    ] = None,
+    json_out: JsonOut = None,
+) -> None:
+    """Hold the loop's own flight logs against the replica; exit code 1 where they differ or cannot be read."""
+    from app.commands.controller import check_files
+
+    if not check_files(files, gains, json_out):
         raise typer.Exit(1)
 
 

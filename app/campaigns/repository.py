@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
-from sqlalchemy import ColumnElement, func, literal, select, tuple_
+from sqlalchemy import ColumnElement, func, literal, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from app.campaigns.schemas import Sort
@@ -48,6 +48,12 @@ def get_one(session: Session, campaign_id: int) -> CampaignRow:
     if (row := session.get(CampaignRow, campaign_id)) is None:
         raise NotFoundError("campaign", campaign_id)
     return row
+
+
+def ids_of_name(session: Session, name: str) -> list[int]:
+    """The ids of all campaigns of that name, whatever its case, the oldest first."""
+    same = or_(CampaignRow.name == name, func.lower(CampaignRow.name) == name.lower())
+    return list(session.scalars(select(CampaignRow.id).where(same).order_by(CampaignRow.id).limit(20)))
 
 
 def page(

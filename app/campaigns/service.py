@@ -1,6 +1,7 @@
 """What people and scripts do with campaigns. Proposals are in `proposing`, how things look from outside in `views`."""
 
 from collections.abc import Collection
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -26,13 +27,15 @@ from app.core.experiments import get_experiment
 from app.db.models import CampaignRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import BusyError, ConflictError
+from app.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 from app.moves import check_action, check_version
 from app.schemas import Page
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
+
+_DIGITS_OF_AN_ID: Final = 19
 
 
 def list_campaigns(
@@ -57,6 +60,23 @@ def list_campaigns(
 def get_row(session: Session, campaign_id: int) -> CampaignRow:
     """For the other slices. Raises NotFoundError."""
     return repository.get_one(session, campaign_id)
+
+
+def identify(session: Session, wanted: str) -> int:
+    """The campaign with that id or, whatever its case, that name. Raises NotFoundError, and InputError when several
+    have it."""
+    if wanted.isdecimal() and len(wanted) < _DIGITS_OF_AN_ID:
+        return get_row(session, int(wanted)).id
+    found = repository.ids_of_name(session, wanted)
+    if not found:
+        raise NotFoundError("campaign", repr(wanted), hint="Give its whole name, or the number in its address.")
+    if len(found) > 1:
+        raise InputError(
+            f"{len(found)} campaigns are called {wanted!r}.",
+            hint="Say which one is meant, by its number.",
+            problems=(Problem("campaign", f"may be {', '.join(map(str, found))}"),),
+        )
+    return found[0]
 
 
 def get_campaign(session: Session, campaign_id: int) -> Campaign:

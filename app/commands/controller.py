@@ -1,12 +1,31 @@
-"""`gainline controller replay`: recorded runs of the autopilot's vertical loop against the replica."""
+"""`gainline controller`: what the autopilot's vertical loop did against what the replica does."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Final
+
+from rich.console import Console
 
 from app.commands.console import console, show_error, table, write_json
+from app.core.control.loop_log import (
+    GAINS,
+    TIME_TOLERANCE_S,
+    TOLERANCES,
+    CommandCheck,
+    LoopLog,
+    SimulationCheck,
+    check_commands,
+    check_simulation,
+    infer_gains,
+)
 from app.core.control.replay import OUTPUTS, Replay, replay_trace
-from app.errors import InputError
+from app.errors import InputError, Problem
 from app.logs.loop_trace import read_loop_trace
+from app.logs.paparazzi import read_loop_log
+
+_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 
 
 def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
@@ -41,4 +60,117 @@ def _document(file: Path, replay: Replay) -> dict[str, object]:
         "exact": replay.exact,
         "largest_difference": dict(replay.largest_difference),
         "first_different_row": replay.first_different_row,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    """What a log showed: its gains and where they are from, and both parts of the comparison."""
+
+    gains: Mapping[str, float]
+    gains_from: str
+    inferred: Mapping[str, float] | None
+    commands: CommandCheck
+    simulation: SimulationCheck | None
+
+    @property
+    def passed(self) -> bool:
+        return self.commands.passed and (self.simulation is None or self.simulation.passed)
+
+
+def check_files(files: Sequence[Path], given: str | None, json_out: Path | None) -> bool:
+    """Hold Paparazzi logs with VERT_LOOP against the replica; whether all are readable and agree."""
+    gains = None if given is None else _parsed(given)
+    out = console(json_out)
+    checked: dict[Path, _Checked] = {}
+    for file in files:
+        try:
+            checked[file] = _check(file, gains)
+        except InputError as error:
+            show_error(error)
+        else:
+            _print(out, file, checked[file])
+    write_json(json_out, {"files": [_as_json(file, each) for file, each in checked.items()]})
+    return len(checked) == len(files) and all(each.passed for each in checked.values())
+
+
+def _check(file: Path, given: Mapping[str, float] | None) -> _Checked:
+    log, logged = _read(file)
+    inferred = infer_gains(log)
+    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "worked out from the commands")):
+        if gains is not None:
+            return _Checked(gains, source, inferred, check_commands(log, gains), check_simulation(log))
+    raise InputError(
+        f"{file.name} does not say which gains were flown, and its flight is too calm to tell.",
+        problems=(Problem("--gains", "are needed"),),
+        hint="Put the .log file beside it, or give them: --gains KP,KI,KD.",
+    )
+
+
+def _read(file: Path) -> tuple[LoopLog, dict[str, float] | None]:
+    try:
+        with ExitStack() as opened:
+            beside = file.with_suffix(".log")
+            companion = opened.enter_context(beside.open("rb")) if beside != file and beside.is_file() else None
+            return read_loop_log(opened.enter_context(file.open("rb")), companion)
+    except OSError as error:
+        raise InputError(
+            f"{file} could not be read: {error.strerror or error}.", hint="Give a readable .data file of Paparazzi."
+        ) from error
+
+
+def _parsed(given: str) -> dict[str, float]:
+    parts = given.split(",")
+    if len(parts) != len(GAINS) or not all(part.strip().isdecimal() and len(part) < 10 for part in parts):
+        raise InputError(
+            f"{given[:60]!r} is no gain set.",
+            problems=(Problem("--gains", "must be three whole numbers, KP,KI,KD"),),
+            hint="For example --gains 283,13,82.",
+        )
+    return {name: float(part) for name, part in zip(GAINS, parts, strict=True)}
+
+
+def _print(out: Console, file: Path, checked: _Checked) -> None:
+    commands, simulation = checked.commands, checked.simulation
+    spoken = ", ".join(f"{name} {value:g}" for name, value in checked.gains.items())
+    tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
+    rows = [
+        ("commands that follow to the last bit", f"{commands.exact} of {commands.rows}{tilted}"),
+        *((f"only with the {name} a step apart", str(count)) for name, count in commands.stale.items()),
+        ("that do not follow", _different(commands)),
+    ]
+    if simulation is None:
+        rows.append(("reference and integrator", "not simulated: no command in the log, or another one within 2 s"))
+    else:
+        rows.append(
+            ("simulated from the command at", f"{simulation.command_s:.3f} s for {simulation.duration_s:.1f} s")
+        )
+        rows += [
+            (
+                f"{name} beyond ±{1000 * TIME_TOLERANCE_S:g} ms",
+                f"{value:.4f} (allowed {TOLERANCES[name]:g}) {_UNITS[name]}",
+            )
+            for name, value in simulation.largest_difference.items()
+        ]
+    out.print(table(("", ""), rows, title=f"{file.name}, {spoken} ({checked.gains_from})"))
+    if checked.inferred is not None and dict(checked.inferred) != dict(checked.gains):
+        better = ", ".join(f"{name} {value:g}" for name, value in checked.inferred.items())
+        out.print(f"More commands follow from {better}: were other gains flown?")
+    out.print("The replica agrees." if checked.passed else "[bold]The replica differs.[/]")
+
+
+def _different(commands: CommandCheck) -> str:
+    first = commands.first_different_s
+    return str(commands.different) if first is None else f"{commands.different}, the first at {first:.3f} s"
+
+
+def _as_json(file: Path, checked: _Checked) -> dict[str, object]:
+    return {
+        "file": str(file),
+        "passed": checked.passed,
+        "gains": dict(checked.gains),
+        "gains_from": checked.gains_from,
+        "commands": {**asdict(checked.commands), "stale": dict(checked.commands.stale)},
+        "simulation": None if checked.simulation is None else asdict(checked.simulation),
+        "tolerances": {**TOLERANCES, "time_s": TIME_TOLERANCE_S},
     }

@@ -4,10 +4,12 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
+from app.core.control.loop_log import GAINS
+
 PAPARAZZI: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
 """Its parameters over MAVLink, and what the takeoff experiment calls them."""
 
-PAPARAZZI_SETS: Final = (("kp", "ki", "kd"),)
+PAPARAZZI_SETS: Final = (GAINS,)
 
 ARDUPILOT_SETS: Final = (
     ("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D"),

@@ -15,7 +15,7 @@ from xml.parsers import expat
 import numpy as np
 
 from app.core.control.fixed_point import INT32_MAX, INT32_MIN
-from app.core.control.loop_log import FIELDS, LoopLog, infer_gains
+from app.core.control.loop_log import FIELDS, GAINS, LoopLog, infer_gains
 from app.core.control.vertical_loop import FULL_THRUST
 from app.core.trajectory import Samples
 from app.logs.contents import refused
@@ -26,11 +26,11 @@ MAX_COMPANION_BYTES: Final = 16 * 2**20
 _MAX_SAMPLES: Final = 2_000_000
 _MAX_LINE_BYTES: Final = 4096
 _LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
-_NUMBER: Final = re.compile(rb"[+-]?\d{1,10}")
 _GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
 _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
 _PLATEAU_S: Final = 2.0
 
+_WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
 _HINT: Final = "Give the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
 
 
@@ -56,7 +56,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
     if len(lines.loop_time_s):
         log = lines.loop_log()
         starts, ends = _starts(log), _ends(log)
-        if not {"kp", "ki", "kd"} <= {setting.name for setting in settings} and (inferred := infer_gains(log)):
+        if not set(GAINS) <= {setting.name for setting in settings} and (inferred := infer_gains(log)):
             settings = [Setting(-np.inf, name, value) for name, value in inferred.items()]
             notes.append("gains worked out from the loop's commands, which follow from them")
     time_s, channels = _altitude(lines)
@@ -88,7 +88,8 @@ def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[
     if companion is not None:
         configuration.read(companion)
     gains = {setting.name: setting.value for setting in configuration.settings(lines.values)}
-    return lines.loop_log(), gains if {"kp", "ki", "kd"} <= gains.keys() else None
+    complete = set(GAINS) <= gains.keys()
+    return lines.loop_log(), {name: gains[name] for name in GAINS} if complete else None
 
 
 @dataclass(slots=True)
@@ -126,9 +127,6 @@ def _read(stream: BinaryIO) -> _Lines:
     return lines
 
 
-_WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
-
-
 def _take(lines: _Lines, time: bytes, aircraft: str, message: bytes, fields: Sequence[bytes]) -> None:
     time_s = _float(time)
     if not np.isfinite(time_s) or (lines.aircraft and aircraft != lines.aircraft):
@@ -153,9 +151,12 @@ def _take(lines: _Lines, time: bytes, aircraft: str, message: bytes, fields: Seq
 
 def _whole(fields: Sequence[bytes], count: int) -> list[int] | None:
     """The first fields as 32-bit integers; None when there are fewer, or others."""
-    if len(fields) < count or not all(map(_NUMBER.fullmatch, fields[:count])):
+    if len(fields) < count:
         return None
-    numbers = [int(each) for each in fields[:count]]
+    try:
+        numbers = [int(each) for each in fields[:count]]
+    except ValueError:
+        return None
     return numbers if min(numbers) >= INT32_MIN and max(numbers) <= INT32_MAX else None
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.core.errors import Problem, TrajectoryError
 from app.core.policy import Gains
@@ -22,6 +21,7 @@ HIGHEST_HOP_M: Final = 0.5
 LONGEST_S: Final = 600.0
 MIN_SAMPLES: Final = 20
 MAX_SAMPLES: Final = 200_000
+MOST_TAKEOFFS: Final = 200
 
 _RISE_S: Final = (0.5, 1.0, 2.0, 3.0)
 _STOOD_M: Final = 0.05
@@ -106,11 +106,17 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
         begin, is_commanded = _beginning(log, float(time_s[stood]), free_from_s)
         held = _Held(log, begin.time_s)
         kept, end = _kept(log, time_s, begin, held, Moment(float(time_s[down]), ""))
-        if np.count_nonzero(kept) >= MIN_SAMPLES:
+        if kept.stop - kept.start >= MIN_SAMPLES:
             ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
             record = _Record(log, begin, end, is_commanded, ground_m, held)
             found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
         free_from_s = float(time_s[down])
+        if len(found) > MOST_TAKEOFFS:
+            raise TrajectoryError(
+                f"The log holds more than {MOST_TAKEOFFS} takeoffs.",
+                hint="Cut it to the flights of one day, or choose the log of one flight.",
+                problems=(Problem("file", "holds too many flights"),),
+            )
     if not found:
         raise TrajectoryError(
             "The log holds no takeoff.",
@@ -162,12 +168,14 @@ def _flights(time_s: Samples, altitude_m: Samples, landings_s: Sequence[float]) 
     """Every rise by more than a hop within three seconds: the last sample where the vehicle stood, and the first where
     it is down again, or the last of all."""
     landings = np.searchsorted(time_s, np.sort(np.asarray(landings_s, dtype=np.float64)))
-    earlier = np.searchsorted(time_s, time_s[None, :] - np.array(_RISE_S)[:, None])
-    risen = np.flatnonzero(altitude_m - altitude_m[earlier].min(axis=0) > HIGHEST_HOP_M)
+    lowest_m = altitude_m.copy()
+    for lag_s in _RISE_S:
+        np.minimum(lowest_m, altitude_m[np.searchsorted(time_s, time_s - lag_s)], out=lowest_m)
+    risen = np.flatnonzero(altitude_m - lowest_m > HIGHEST_HOP_M)
     free_from = 0
     while (place := int(np.searchsorted(risen, free_from))) < len(risen):
         up = int(risen[place])
-        first = min(max(free_from, int(earlier[-1, up])), up)
+        first = min(max(free_from, int(np.searchsorted(time_s, time_s[up] - _RISE_S[-1]))), up)
         ground_m = float(altitude_m[first : up + 1].min())
         stood = first + int(np.flatnonzero(altitude_m[first : up + 1] <= ground_m + _STOOD_M)[-1])
         announced = landings[landings > up][:1].tolist()
@@ -178,10 +186,14 @@ def _flights(time_s: Samples, altitude_m: Samples, landings_s: Sequence[float]) 
 
 def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int:
     """The sample from which on the altitude stays near the ground for two seconds; past the last one without any."""
-    low = altitude_m[up:] <= ground_m + NEAR_GROUND_M
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], low, [False])).astype(np.int8))) + up
-    stays = ((int(first), int(past)) for first, past in edges.reshape(-1, 2))
-    return next((first for first, past in stays if time_s[past - 1] - time_s[first] >= _LANDED_S), len(time_s))
+    soon = int(np.searchsorted(time_s, time_s[up] + LONGEST_S))
+    for past_all in (soon, len(time_s)):  # most flights are short, most of a long log is behind them
+        low = altitude_m[up:past_all] <= ground_m + NEAR_GROUND_M
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], low, [False])).astype(np.int8))) + up
+        for first, past in edges.reshape(-1, 2).tolist():
+            if time_s[past - 1] - time_s[first] >= _LANDED_S:
+                return int(first)
+    return len(time_s)
 
 
 def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[Moment, bool]:
@@ -195,18 +207,24 @@ def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[Mome
 
 def _kept(
     log: FlightLog, time_s: Samples, begin: Moment, held: "_Held", down: Moment
-) -> tuple[NDArray[np.bool_], Moment]:
+) -> tuple[slice, Moment]:
     """Which samples make the record, and what ends it; nothing in words where that is the landing or the log's end."""
     ends = (moment for moment in (*log.ends, *held.changes) if moment.time_s > begin.time_s)
     too_long = Moment(begin.time_s + LONGEST_S, "the longest record that is kept")
     end = min((*ends, down, too_long), key=lambda moment: moment.time_s)
-    kept = (time_s >= begin.time_s - _BEFORE_S) & (time_s <= end.time_s)
-    return kept & (np.cumsum(kept) <= MAX_SAMPLES), end
+    first, past = _between(time_s, begin.time_s - _BEFORE_S, end.time_s)
+    return slice(first, min(past, first + MAX_SAMPLES)), end
+
+
+def _between(time_s: Samples, first_s: float, last_s: float) -> tuple[int, int]:
+    """The first sample of a stretch of time, and the one past its last."""
+    first = int(np.searchsorted(time_s, first_s))
+    return first, max(first, int(np.searchsorted(time_s, last_s, side="right")))
 
 
 def _ground_m(time_s: Samples, altitude_m: Samples, begin_s: float, stood: int) -> float:
-    before = (time_s >= begin_s - _BEFORE_S) & (time_s <= begin_s)
-    return float(altitude_m[before].mean() if before.any() else altitude_m[stood])
+    first, past = _between(time_s, begin_s - _BEFORE_S, begin_s)
+    return float(altitude_m[first:past].mean() if past > first else altitude_m[stood])
 
 
 class _Held:
@@ -242,9 +260,7 @@ class _Record:
     ground_m: float
     held: _Held
 
-    def takeoff(
-        self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: NDArray[np.bool_]
-    ) -> Takeoff:
+    def takeoff(self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: slice) -> Takeoff:
         ground_m = self.ground_m if self.log.from_ground else 0.0
         cut = {name: values[kept] - (ground_m if name in _ALTITUDES else 0.0) for name, values in channels.items()}
         complete = {name: values for name, values in cut.items() if np.isfinite(values).all()}

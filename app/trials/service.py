@@ -19,7 +19,7 @@ from app.core.policy import Gains
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import BusyError, ConflictError
+from app.errors import BusyError, ConflictError, NotFoundError
 from app.fleet import service as fleet
 from app.logs.readers import read_takeoff
 from app.logs.takeoffs import Takeoff
@@ -212,6 +212,37 @@ def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed:
     capture(session, campaign, row, flown.trajectory)
     campaigns.end_flying(session, campaign)
     return trial_view(session, campaign, row)
+
+
+def import_into_campaign(
+    session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool
+) -> Trial:
+    """The record for the trial of that number, else for the one that waits for it; where none does, one is planned of
+    the proposal first. `campaign` is an id or a name.
+
+    Raises NotFoundError, InputError when several campaigns or trials are meant, and what `import_record` raises.
+    """
+    campaign_id = campaigns.identify(session, campaign)
+    row = campaigns.get_row(session, campaign_id)
+    trials = history.trials_of(session, campaign_id)
+    if number is not None:
+        chosen = [trial for trial in trials if trial.number == number]
+        if not chosen:
+            raise NotFoundError("trial", number, hint=f"Campaign {campaign_id} has {len(trials)} trials.")
+    else:
+        waits = {TrialState.LOST} if fleet.can_fly(row.vehicle) else ACTIONS["upload"]
+        chosen = [trial for trial in trials if trial.state in waits]
+    if len(chosen) > 1:
+        raise InputError(
+            f"{len(chosen)} trials of campaign {campaign_id} wait for a record.",
+            hint="Say which one is meant, by its number: --trial.",
+            problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
+        )
+    if chosen:
+        return import_record(session, chosen[0].id, flown, confirmed=confirmed)
+    proposal = proposing.latest_fresh(session, row)
+    planned = create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
+    return import_record(session, planned.id, flown, confirmed=confirmed)
 
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:

@@ -1,0 +1,90 @@
+"""`gainline import`: the log of a flight made elsewhere, into the trial that waits for it."""
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from app.commands.console import console, write_json
+from app.db.migrate import require_current
+from app.db.session import Database
+from app.errors import InputError, Problem, UnconfirmedError
+from app.logs.takeoffs import Takeoff
+from app.settings import Settings
+from app.trials import service
+from app.trials.schemas import Trial
+
+
+def import_log(
+    file: Path,
+    settings: Settings,
+    *,
+    campaign: str,
+    trial: int | None,
+    takeoff: int | None,
+    yes: bool,
+    json_out: Path | None,
+) -> None:
+    """Store the flight and print what became of it; asks before taking gains that were not planned.
+
+    Raises InputError for a log that cannot be used, UnconfirmedError where nobody can be asked.
+    """
+    flown = _read(file, takeoff)
+    out = console(json_out)
+    out.print(f"{escape(file.name)}: {escape(flown.summary)}.")
+    for note in flown.notes:
+        out.print(f"  {escape(note)}", style="dim")
+    require_current(settings.database_file)
+    database = Database(settings.database_file)
+    try:
+        stored = _store(database, campaign, trial, flown, yes=yes)
+    finally:
+        database.close()
+    _print(out, stored)
+    write_json(json_out, stored.model_dump(mode="json"))
+
+
+def _read(file: Path, takeoff: int | None) -> Takeoff:
+    try:
+        with ExitStack() as files:
+            stream = files.enter_context(file.open("rb"))
+            beside = file.with_suffix(".log")
+            companion = (
+                files.enter_context(beside.open("rb")) if file.suffix.lower() == ".data" and beside.is_file() else None
+            )
+            return service.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
+    except OSError as error:
+        raise InputError(
+            f"{file} could not be read: {error.strerror or error}.",
+            problems=(Problem("FILE", "cannot be read"),),
+            hint="Give a log that this user may read.",
+        ) from error
+
+
+def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
+    def attempt(confirmed: bool) -> Trial:
+        with database.write() as session:
+            return service.import_into_campaign(session, campaign, flown, number=trial, confirmed=confirmed)
+
+    try:
+        return attempt(yes)
+    except UnconfirmedError as needed:
+        if not sys.stdin.isatty():
+            raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
+        Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
+        if not typer.confirm("Take it?"):
+            raise
+        return attempt(True)
+
+
+def _print(out: Console, trial: Trial) -> None:
+    gains = ", ".join(f"{name} {value:g}" for name, value in trial.gains.items())
+    error = "no error" if trial.error is None else f"error {trial.error:.4f}"
+    out.print(f"Trial {trial.number} of campaign {trial.campaign_id}, {gains}: {trial.state}, {error}.")
+    if trial.reason:
+        out.print(escape(trial.reason))
+    for glitch in trial.glitches:
+        out.print(escape(glitch.sentence))

@@ -1,0 +1,68 @@
+"""The recorded logs (tests/data/logs), and telemetry logs put together frame by frame."""
+
+import gzip
+import io
+import struct
+from pathlib import Path
+from typing import Any
+
+LOGS = Path(__file__).parent.parent / "data" / "logs"
+TAKEOFFS = LOGS.parent / "takeoffs"
+
+TLOGS = {
+    "paparazzi_283_13_82": {"kp": 283.0, "ki": 13.0, "kd": 82.0},
+    "paparazzi_1624_1356_195": {"kp": 1624.0, "ki": 1356.0, "kd": 195.0},
+}
+BEGAN_US = 1_795_222_159_000_000
+
+
+def recorded(name: str) -> bytes:
+    """The content of a recorded log, uncompressed."""
+    path = LOGS / name
+    return path.read_bytes() if path.exists() else gzip.decompress((LOGS / f"{name}.gz").read_bytes())
+
+
+class Telemetry:
+    """A telemetry log under construction: messages of a vehicle and of a ground station, in one time."""
+
+    def __init__(self, dialect: Any, *, autopilot: int, system: int = 31) -> None:
+        self._dialect = dialect
+        self._autopilot = autopilot
+        self._vehicle = dialect.MAVLink(None, srcSystem=system, srcComponent=1)
+        self._ground = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+        self._content = io.BytesIO()
+        self.now_s = 100.0
+        self.booted_s = 0.0
+        self._altitude_m = 0.0
+
+    @property
+    def content(self) -> bytes:
+        return self._content.getvalue()
+
+    def vehicle(self, kind: str, *fields: object) -> None:
+        self._add(self._vehicle, kind, fields)
+
+    def ground(self, kind: str, *fields: object) -> None:
+        self._add(self._ground, kind, fields)
+
+    def heartbeat(self, *, armed: bool = True, mode: int = 0) -> None:
+        self.vehicle("heartbeat", 2, self._autopilot, 128 if armed else 0, mode, 4)
+
+    def parameter(self, name: str, value: float) -> None:
+        self.vehicle("param_value", name.encode(), value, 9, 10, 3)
+
+    def fly(self, duration_s: float, *, to_m: float, rate_hz: float = 50.0) -> None:
+        """Position samples in which the altitude approaches `to_m` with a time constant of half a second."""
+        for _ in range(round(duration_s * rate_hz)):
+            self.now_s += 1.0 / rate_hz
+            self._altitude_m += (to_m - self._altitude_m) / (0.5 * rate_hz)
+            self.vehicle("local_position_ned", self.boot_ms, 0.0, 0.0, -self._altitude_m, 0.0, 0.0, 0.0)
+
+    @property
+    def boot_ms(self) -> int:
+        return round(1000 * (self.now_s - self.booted_s))
+
+    def _add(self, sender: Any, kind: str, fields: tuple[object, ...]) -> None:
+        message = getattr(sender, f"{kind}_encode")(*fields)
+        self._content.write(struct.pack(">Q", BEGAN_US + round(self.now_s * 1e6)))
+        self._content.write(message.pack(sender))

@@ -1,0 +1,191 @@
+"""Telemetry logs: the recorded flights score as their CSVs do, and what is built frame by frame is understood."""
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v10 import paparazzi
+from pymavlink.dialects.v20 import ardupilotmega, common
+
+from app.core.errors import TrajectoryError
+from app.logs.readers import read_takeoff, read_takeoffs
+from app.logs.takeoff_csv import read_takeoff_csv
+from tests.logs.recorded import TAKEOFFS, TLOGS, Telemetry, recorded
+from tests.vehicles.flying import TAKEOFF
+
+
+@pytest.mark.parametrize("name", TLOGS)
+def test_a_recorded_flight_scores_as_its_csv_and_has_its_gains(name: str) -> None:
+    flown = read_takeoff(io.BytesIO(recorded(f"{name}.tlog")))
+    from_csv = TAKEOFF.error(read_takeoff_csv((TAKEOFFS / f"{name}.csv").read_bytes()))
+    assert TAKEOFF.error(flown.trajectory) == pytest.approx(from_csv, rel=1e-5)
+    assert flown.gains == TLOGS[name]
+    assert flown.begins_with == "the block Takeoff"
+    assert set(flown.trajectory.channels) == {"altitude_m", "climb_rate_m_s", "battery_v"}
+    assert flown.trajectory.clock == "vehicle"
+
+
+def test_the_record_begins_a_second_before_the_command_and_ends_with_the_landing() -> None:
+    flown = read_takeoff(io.BytesIO(recorded("paparazzi_283_13_82.tlog")))
+    assert flown.trajectory.time_s[[0, -1]].tolist() == pytest.approx([-0.996, 33.042], abs=1e-6)
+    assert 0.0 in flown.trajectory.time_s
+    assert flown.notes == ("ends after 33.0 s with the block land here",)
+
+
+def test_two_flights_in_one_log_are_listed_to_choose_from() -> None:
+    both = recorded("paparazzi_283_13_82.tlog") + recorded("paparazzi_1624_1356_195.tlog")
+    with pytest.raises(TrajectoryError) as refusal:
+        read_takeoff(io.BytesIO(both))
+    assert [problem.field for problem in refusal.value.problems] == ["takeoff", "takeoff"]
+    assert "1: 18.4 s into the log, from the block Takeoff" in refusal.value.problems[0].reason
+    assert "kp 1624, ki 1356, kd 195" in refusal.value.problems[1].reason
+    assert read_takeoff(io.BytesIO(both), number=2).gains["kp"] == 1624.0
+    with pytest.raises(TrajectoryError, match="none with the number 3"):
+        read_takeoff(io.BytesIO(both), number=3)
+
+
+def paparazzi_log() -> Telemetry:
+    log = Telemetry(paparazzi, autopilot=9)
+    log.heartbeat(armed=False)
+    for number, name in enumerate((b"Standby", b"Take off", b"land here")):
+        log.vehicle("script_item", 255, 190, number, name)
+    return log
+
+
+def set_gain(log: Telemetry, name: str, value: float, *, answers: float | None) -> None:
+    log.ground("param_set", 31, 0, name.encode(), value, 9)
+    if answers is not None:
+        log.parameter(name, answers)
+
+
+def test_a_gain_is_what_the_vehicle_answered_not_what_it_was_asked() -> None:
+    log = paparazzi_log()
+    log.fly(1.0, to_m=0.0)
+    set_gain(log, "gui_v_kp", 300.7, answers=300.0)
+    set_gain(log, "gui_v_ki", 40.0, answers=13.0)
+    set_gain(log, "gui_v_kd", 82.0, answers=82.0)
+    log.ground("script_item", 31, 0, 1, b"")
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.gains == {"kp": 300.0, "ki": 13.0, "kd": 82.0}
+    assert "ki was to become 40, which the vehicle never confirmed" in flown.notes
+
+
+def test_another_gain_in_flight_ends_the_record_because_it_is_another_flight() -> None:
+    log = paparazzi_log()
+    for name in ("gui_v_kp", "gui_v_ki", "gui_v_kd"):
+        log.parameter(name, 100.0)
+    log.fly(1.0, to_m=0.0)
+    log.ground("script_item", 31, 0, 1, b"")
+    log.fly(5.0, to_m=3.0)
+    log.parameter("gui_v_kd", 90.0)
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.trajectory.time_s[-1] == pytest.approx(5.0)
+    assert "ends after 5.0 s with kd becoming 90" in flown.notes
+
+
+def test_without_a_command_time_counts_from_lift_off_which_is_said() -> None:
+    log = paparazzi_log()
+    log.fly(3.0, to_m=0.0)
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.begins_with == "lift-off"
+    assert flown.gains == {}
+    assert any("no command to take off in the log" in note for note in flown.notes)
+    assert abs(flown.trajectory["altitude_m"][flown.trajectory.time_s == 0.0][0]) <= 0.05
+
+
+def test_a_vehicle_that_restarts_goes_on_in_the_ground_s_time() -> None:
+    log = paparazzi_log()
+    log.fly(20.0, to_m=0.0)
+    log.now_s += 4.0
+    log.booted_s = log.now_s
+    log.fly(2.0, to_m=0.0)
+    log.ground("script_item", 31, 0, 1, b"")
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.start_s == pytest.approx(26.0, abs=0.05)
+    assert "the vehicle restarted: its clock began anew (1×)" in flown.notes
+
+
+@pytest.mark.parametrize(
+    ("dialect", "autopilot", "command", "parameters", "begins_with"),
+    [
+        (ardupilotmega, 3, 22, (0, 0, 0, 0, 0, 0, 3.0), "the command NAV_TAKEOFF"),
+        (common, 12, 176, (1, 4, 2, 0, 0, 0, 0), "the command DO_SET_MODE"),
+    ],
+    ids=["ArduPilot", "PX4"],
+)
+def test_other_autopilots_begin_with_the_command_that_they_accepted(
+    dialect: Any, autopilot: int, command: int, parameters: tuple[float, ...], begins_with: str
+) -> None:
+    log = Telemetry(dialect, autopilot=autopilot)
+    log.heartbeat(mode=4)
+    log.fly(1.0, to_m=0.5)  # what the ground measures
+    log.fly(3.0, to_m=0.5)
+    for result in (4, 0):
+        log.fly(1.0, to_m=0.5)
+        log.ground("command_long", 31, 1, command, 0, *parameters)
+        log.vehicle("command_ack", command, result)
+    log.fly(4.0, to_m=3.5)
+    log.ground("command_long", 31, 1, 21, 0, 0, 0, 0, 0, 0, 0, 0)
+    log.vehicle("command_ack", 21, 0)
+    log.fly(4.0, to_m=0.5)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.begins_with == begins_with
+    assert flown.start_s == pytest.approx(5.98, abs=0.03)
+    assert flown.trajectory.time_s[-1] == pytest.approx(4.0, abs=0.03)
+    assert flown.trajectory["altitude_m"].max() == pytest.approx(3.0, abs=0.02)
+    assert any("altitude counted from the ground" in note for note in flown.notes)
+
+
+def test_gains_of_an_ardupilot_of_either_age_keep_its_own_names() -> None:
+    for names in (
+        ("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D"),
+        ("PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I", "PSC_D_ACC_D"),
+    ):
+        log = Telemetry(ardupilotmega, autopilot=3)
+        log.heartbeat()
+        log.fly(1.0, to_m=0.0)
+        for number, name in enumerate(names):
+            log.parameter(name, number + 0.5)
+        log.fly(5.0, to_m=3.0)
+        assert read_takeoff(io.BytesIO(log.content)).gains == {name: i + 0.5 for i, name in enumerate(names)}
+
+
+def test_damage_in_the_middle_costs_the_frames_it_hits_and_nothing_else() -> None:
+    whole = recorded("paparazzi_283_13_82.tlog")
+    damaged = bytearray(whole)
+    damaged[120_000:120_090] = bytes(90)
+    flown = read_takeoff(io.BytesIO(bytes(damaged)))
+    reference = read_takeoff(io.BytesIO(whole))
+    assert 0 < len(reference.trajectory) - len(flown.trajectory) <= 6
+    assert np.isin(flown.trajectory.time_s, reference.trajectory.time_s).all()
+
+
+def test_a_flipped_bit_in_a_position_is_noticed_by_its_checksum() -> None:
+    whole = recorded("paparazzi_283_13_82.tlog")
+    place = whole.index(bytes([0xFE, 28]), 120_000)
+    damaged = whole[: place + 20] + bytes([whole[place + 20] ^ 0x40]) + whole[place + 21 :]
+    assert len(read_takeoff(io.BytesIO(damaged)).trajectory) == len(read_takeoff(io.BytesIO(whole)).trajectory) - 1
+
+
+def test_a_log_without_a_vehicle_that_is_known_is_refused() -> None:
+    log = Telemetry(common, autopilot=0)
+    log.heartbeat()
+    with pytest.raises(TrajectoryError, match="no MAVLink heartbeat of Paparazzi, ArduPilot, PX4"):
+        read_takeoffs(io.BytesIO(log.content))
+
+
+def test_a_log_without_positions_is_refused() -> None:
+    with pytest.raises(TrajectoryError, match="holds no LOCAL_POSITION_NED"):
+        read_takeoffs(io.BytesIO(paparazzi_log().content))
+
+
+def test_a_flight_that_never_left_the_ground_is_refused() -> None:
+    log = paparazzi_log()
+    log.fly(30.0, to_m=0.2)
+    with pytest.raises(TrajectoryError, match="The log holds no takeoff"):
+        read_takeoffs(io.BytesIO(log.content))
