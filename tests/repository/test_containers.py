@@ -30,11 +30,17 @@ def test_the_dockerfile_passes_its_linter() -> None:
     run("hadolint", "--no-color", "Dockerfile")
 
 
-def test_one_service_serves_and_one_works() -> None:
+def test_one_service_serves_one_works_and_one_is_a_simulated_drone_for_who_asks() -> None:
     assert {name: service["command"] for name, service in SERVICES.items()} == {
         "web": ["gainline", "serve", "--no-worker"],
         "worker": ["gainline", "worker"],
+        "sim-drone": ["gainline", "sim-drone", "--autopilot", "paparazzi"],
     }
+    assert [name for name, service in SERVICES.items() if "profiles" in service] == ["sim-drone"]
+
+
+def test_the_simulated_drone_is_on_the_workers_own_loopback() -> None:
+    assert SERVICES["sim-drone"]["network_mode"] == "service:worker"
 
 
 @pytest.mark.parametrize("name", SERVICES)
