@@ -47,6 +47,11 @@ def import_log(
     write_json(json_out, stored.model_dump(mode="json"))
 
 
+def can_ask() -> bool:
+    """Whether a person sits at the other end."""
+    return sys.stdin.isatty()
+
+
 def _read(file: Path, takeoff: int | None) -> Takeoff:
     try:
         with ExitStack() as files:
@@ -72,7 +77,7 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
     try:
         return attempt(yes)
     except UnconfirmedError as needed:
-        if not sys.stdin.isatty():
+        if not can_ask():
             raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
         Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
         if not typer.confirm("Take it?"):

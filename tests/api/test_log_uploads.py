@@ -1,0 +1,120 @@
+"""Logs sent in over HTTP: takeoff and gains are found, and gains that were not planned need a person's word."""
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.session import Database
+from tests.builders import Json, create_ready_campaign, create_trial, get, problems_of, run_jobs
+from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
+from tests.logs.recorded import TLOGS, recorded
+
+ANY = {"Content-Type": "application/octet-stream"}
+DEFAULT, TUNED = TLOGS
+
+
+@pytest.fixture
+def campaign(client: TestClient, database: Database) -> Json:
+    return create_ready_campaign(client, database, vehicle="import")
+
+
+@pytest.fixture
+def trial(client: TestClient, campaign: Json) -> Json:
+    """Planned with the default gains."""
+    return create_trial(client, campaign["id"])
+
+
+def path_of(trial: Json) -> str:
+    return f"/api/trials/{trial['id']}/trajectory"
+
+
+def test_a_log_with_the_planned_gains_is_stored_and_scored(client: TestClient, trial: Json) -> None:
+    answer = client.post(path_of(trial), content=recorded(f"{DEFAULT}.tlog"), headers=ANY)
+    flown = answer.json()
+    assert (answer.status_code, flown["state"]) == (201, "valid")
+    assert flown["error"] == pytest.approx(0.3297, abs=0.00005)
+    assert flown["gains"] == flown["read_back"] == TLOGS[DEFAULT]
+    assert flown["record"]["source"].startswith("MAVLink log of Paparazzi; time from the block Takeoff")
+    assert flown["predicted_error"] is not None
+
+
+def test_a_log_of_other_gains_is_refused_naming_both_sets_and_stores_nothing(client: TestClient, trial: Json) -> None:
+    answer = client.post(path_of(trial), content=recorded(f"{TUNED}.tlog"), headers=ANY)
+    assert (answer.status_code, answer.json()["title"]) == (409, "Confirmation needed")
+    assert "kp 1624, ki 1356, kd 195" in answer.json()["detail"]
+    assert "kp 283, ki 13, kd 82" in answer.json()["detail"]
+    assert set(problems_of(answer)) == {"confirm"}
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["record"], after["read_back"]) == ("planned", None, None)
+
+
+def test_gains_beyond_the_bounds_that_flew_all_the_same_count_and_the_next_ones_stay_inside(
+    client: TestClient, database: Database, campaign: Json, trial: Json
+) -> None:
+    flown = client.post(f"{path_of(trial)}?confirm=true", content=recorded(f"{TUNED}.tlog"), headers=ANY).json()
+    assert (flown["state"], flown["gains"], flown["gate"]["passed"]) == ("valid", TLOGS[TUNED], False)
+    run_jobs(database)
+    found = get(client, f"/api/campaigns/{campaign['id']}/proposal")
+    assert found["state"] == "ready", found
+    assert found["proposal"]["gains"]["ki"] <= 1073
+
+
+def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_goes(
+    client: TestClient, trial: Json
+) -> None:
+    flight = data_of(Flight({"kp": 290, "ki": 40, "kd": 80})).encode()
+    answer = client.post(f"{path_of(trial)}?confirm=true", content=flight, headers=ANY)
+    flown = answer.json()
+    assert (answer.status_code, flown["state"], flown["kind"]) == (201, "valid", "manual")
+    assert flown["gains"] == flown["read_back"] == {"kp": 290, "ki": 40, "kd": 80}
+    assert (flown["predicted_error"], flown["predicted_interval"]) == (None, None)
+
+
+def test_gains_under_names_of_another_autopilot_are_kept_beside_the_planned_ones(
+    client: TestClient, trial: Json
+) -> None:
+    log = recorded("px4_takeoff.ulg")
+    refused = client.post(path_of(trial), content=log, headers=ANY)
+    assert refused.status_code == 409
+    assert "MPC_Z_VEL_P_ACC 4.2" in refused.json()["detail"]
+    flown = client.post(f"{path_of(trial)}?confirm=true", content=log, headers=ANY).json()
+    assert flown["gains"] == TLOGS[DEFAULT]
+    assert flown["read_back"]["MPC_Z_VEL_P_ACC"] == pytest.approx(4.2)
+    assert flown["state"] == "invalid"
+    assert "must cover 0 … 32.6 s" in flown["reason"]
+
+
+def test_of_a_log_with_two_takeoffs_the_one_that_is_asked_for_is_stored(client: TestClient, trial: Json) -> None:
+    both = recorded(f"{TUNED}.tlog") + recorded(f"{DEFAULT}.tlog")
+    refused = client.post(path_of(trial), content=both, headers=ANY)
+    assert refused.status_code == 422
+    assert [problem["field"] for problem in refused.json()["problems"]] == ["takeoff", "takeoff"]
+    flown = client.post(f"{path_of(trial)}?takeoff=2", content=both, headers=ANY).json()
+    assert flown["error"] == pytest.approx(0.3297, abs=0.00005)
+
+
+def test_the_same_key_with_another_question_is_another_request(client: TestClient, trial: Json) -> None:
+    headers = {**ANY, "Idempotency-Key": "one"}
+    content = recorded(f"{DEFAULT}.tlog")
+    first = client.post(path_of(trial), content=content, headers=headers)
+    assert client.post(path_of(trial), content=content, headers=headers).json() == first.json()
+    other = client.post(f"{path_of(trial)}?takeoff=1", content=content, headers=headers)
+    assert (other.status_code, other.json()["title"]) == (422, "Key reused")
+
+
+def test_a_paparazzi_log_comes_with_its_companion_in_a_form(client: TestClient, trial: Json) -> None:
+    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False))
+    answer = client.post(path_of(trial), files={"file": ("a.data", data), "companion": ("a.log", COMPANION)})
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["read_back"] == TLOGS[DEFAULT]
+
+
+def test_a_log_without_gains_leaves_them_as_planned(client: TestClient, trial: Json) -> None:
+    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False)).encode()
+    flown = client.post(path_of(trial), content=data, headers=ANY).json()
+    assert (flown["state"], flown["gains"], flown["read_back"]) == ("valid", TLOGS[DEFAULT], None)
+
+
+def test_a_file_of_the_wrong_kind_is_refused_by_its_name(client: TestClient, trial: Json) -> None:
+    answer = client.post(path_of(trial), files={"file": ("flight.ulg", b"\x7fELF" + bytes(100))})
+    assert answer.status_code == 422
+    assert answer.json()["detail"] == "flight.ulg is not what its name says."

@@ -1,0 +1,61 @@
+"""`gainline controller check`: Paparazzi's own loop logs against the replica."""
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner, Result
+
+from app.cli import app
+from tests.logs.paparazzi_flights import Flight, data_of, write
+
+DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def check(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["controller", "check", *map(str, arguments)])
+
+
+def test_a_log_of_the_replica_agrees_with_it(tmp_path: Path) -> None:
+    result = check(write(tmp_path, Flight(DEFAULT, stale=True)), "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    (checked,) = json.loads(result.stdout)["files"]
+    assert checked["passed"] is True
+    assert (checked["gains"], checked["gains_from"]) == (DEFAULT, "of the log")
+    assert checked["commands"]["different"] == 0
+    assert checked["commands"]["stale"]["state"] > 0
+    assert checked["simulation"]["largest_difference"]["z_ref"] == 0.0
+    assert checked["tolerances"]["time_s"] == 0.02
+    assert "The replica agrees." in result.stderr
+
+
+def test_other_gains_are_noticed_and_the_flown_ones_suggested(tmp_path: Path) -> None:
+    result = check(write(tmp_path, Flight(DEFAULT)), "--gains", "300,13,82")
+    assert result.exit_code == 1
+    assert "The replica differs." in result.stdout
+    assert "More commands follow from kp 283, ki 13, kd 82" in result.stdout
+
+
+def test_without_companion_the_gains_are_worked_out(tmp_path: Path) -> None:
+    result = check(write(tmp_path, Flight(DEFAULT), companion=False))
+    assert result.exit_code == 0
+    assert "worked out from the commands" in result.stdout
+
+
+def test_a_calm_flight_without_gains_asks_for_them(tmp_path: Path) -> None:
+    lines = data_of(Flight(DEFAULT)).splitlines()
+    calm = tmp_path / "calm.data"
+    calm.write_text("\n".join(line for line in lines if float(line.split()[0]) > 40.0))
+    result = check(calm)
+    assert result.exit_code == 1
+    assert "--gains KP,KI,KD" in result.stderr
+    assert check(calm, "--gains", "283,13,82").exit_code == 0
+
+
+def test_what_cannot_be_checked_is_said_in_words(tmp_path: Path) -> None:
+    other = tmp_path / "other.data"
+    other.write_text("1.0 31 ALIVE 1\n")
+    result = check(tmp_path / "absent.data", other)
+    assert result.exit_code == 1
+    assert "absent.data could not be read" in result.stderr
+    assert "holds no VERT_LOOP" in result.stderr
+    assert "must be three whole numbers" in check(other, "--gains", "1,2").stderr

@@ -1,0 +1,153 @@
+"""`gainline import`: the same service as the upload, on the same database."""
+
+import json
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner, Result
+
+from app.cli import app
+from app.db.session import Database
+from app.settings import Settings
+from tests.builders import Json, create_ready_campaign, create_trial, get
+from tests.logs.paparazzi_flights import Flight, write
+from tests.logs.recorded import LOGS, recorded
+
+TUNED_LOG, LOG = LOGS / "paparazzi_1624_1356_195.tlog", LOGS / "paparazzi_283_13_82.tlog"
+
+
+@pytest.fixture
+def campaign(client: TestClient, database: Database) -> Json:
+    return create_ready_campaign(client, database, vehicle="import", name="Garage")
+
+
+def run(settings: Settings, *arguments: object) -> Result:
+    return CliRunner().invoke(app, ["import", *map(str, arguments), "--data-dir", str(settings.data_dir)])
+
+
+def test_a_log_finds_its_campaign_by_name_and_plans_the_proposed_trial(
+    client: TestClient, settings: Settings, campaign: Json
+) -> None:
+    result = run(settings, LOG, "--campaign", "garage", "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    stored = json.loads(result.stdout)
+    assert (stored["number"], stored["state"]) == (1, "valid")
+    assert stored["error"] == pytest.approx(0.3297, abs=0.00005)
+    assert get(client, f"/api/trials/{stored['id']}")["gains"] == {"kp": 283, "ki": 13, "kd": 82}
+
+
+def test_the_trial_that_waits_takes_the_log(client: TestClient, settings: Settings, campaign: Json) -> None:
+    trial = create_trial(client, campaign["id"])
+    result = run(settings, LOG, "--campaign", campaign["id"])
+    assert result.exit_code == 0, result.stderr
+    assert "Trial 1 of campaign" in result.stdout
+    assert "from the block Takeoff" in result.stdout
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "valid"
+
+
+def test_other_gains_are_refused_where_nobody_can_be_asked_and_nothing_is_planned(
+    client: TestClient, settings: Settings, campaign: Json
+) -> None:
+    result = run(settings, TUNED_LOG, "--campaign", "Garage")
+    assert result.exit_code == 1
+    assert "kp 1624, ki 1356, kd 195; trial 1 was planned with kp 283, ki 13, kd 82" in result.stderr
+    assert "--yes confirms it" in result.stderr
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["total"] == 0
+
+
+def test_yes_takes_the_gains_of_the_log(client: TestClient, settings: Settings, campaign: Json, tmp_path: Path) -> None:
+    data = write(tmp_path, Flight({"kp": 290, "ki": 40, "kd": 80}, setting=True))
+    result = run(settings, data, "--campaign", "Garage", "--yes", "--json", tmp_path / "trial.json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads((tmp_path / "trial.json").read_text())["gains"] == {"kp": 290, "ki": 40, "kd": 80}
+
+
+def test_a_question_can_be_answered(
+    client: TestClient, settings: Settings, campaign: Json, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = write(tmp_path, Flight({"kp": 290, "ki": 40, "kd": 80}, setting=True))
+    monkeypatch.setattr("app.commands.import_log.can_ask", lambda: True)
+    asked = ["import", str(data), "--campaign", "Garage", "--data-dir", str(settings.data_dir)]
+    declined = CliRunner().invoke(app, asked, input="n\n")
+    assert declined.exit_code == 1
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["total"] == 0
+    accepted = CliRunner().invoke(app, asked, input="y\n")
+    assert accepted.exit_code == 0, accepted.stderr
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"][0]["gains"]["kp"] == 290
+
+
+def test_two_takeoffs_are_listed_and_one_is_taken_by_its_number(
+    client: TestClient, settings: Settings, campaign: Json, tmp_path: Path
+) -> None:
+    both = tmp_path / "both.tlog"
+    both.write_bytes(TUNED_LOG.read_bytes() + LOG.read_bytes())
+    listed = run(settings, both, "--campaign", "Garage")
+    assert listed.exit_code == 1
+    assert "The log holds 2 takeoffs" in listed.stderr
+    assert "2: " in listed.stderr
+    assert run(settings, both, "--campaign", "Garage", "--takeoff", 2).exit_code == 0
+
+
+def test_two_waiting_trials_are_told_apart_by_their_number(
+    client: TestClient, settings: Settings, campaign: Json
+) -> None:
+    gains = {"kp": 283, "ki": 13, "kd": 82}
+    for _ in range(2):
+        create_trial(client, campaign["id"], gains=gains)
+    refused = run(settings, LOG, "--campaign", "Garage")
+    assert refused.exit_code == 1
+    assert "2 trials of campaign" in refused.stderr
+    assert run(settings, LOG, "--campaign", "Garage", "--trial", 2).exit_code == 0
+    assert run(settings, LOG, "--campaign", "Garage", "--trial", 9).exit_code == 1
+
+
+@pytest.mark.parametrize(
+    ("campaign_name", "file", "said"),
+    [
+        ("Nowhere", LOG, "There is no campaign 'Nowhere'"),
+        ("77", LOG, "There is no campaign 77"),
+        ("Garage", Path("absent.tlog"), "could not be read: No such file"),
+    ],
+)
+def test_what_cannot_be_found_is_said_in_words(
+    settings: Settings, campaign: Json, campaign_name: str, file: Path, said: str
+) -> None:
+    result = run(settings, file, "--campaign", campaign_name)
+    assert result.exit_code == 1
+    assert said in result.stderr
+
+
+def test_a_name_that_two_campaigns_have_is_refused_with_their_numbers(
+    client: TestClient, database: Database, settings: Settings, campaign: Json
+) -> None:
+    other = create_ready_campaign(client, database, vehicle="import", name="Garage")
+    result = run(settings, LOG, "--campaign", "Garage")
+    assert result.exit_code == 1
+    assert f"{campaign['id']}, {other['id']}" in result.stderr
+
+
+def test_a_log_for_a_campaign_that_flies_by_itself_is_refused(
+    client: TestClient, database: Database, settings: Settings
+) -> None:
+    create_ready_campaign(client, database, vehicle="twin", name="Twin")
+    result = run(settings, LOG, "--campaign", "Twin")
+    assert result.exit_code == 1
+    assert "is flown from here" in result.stderr
+
+
+def test_without_a_database_the_command_to_make_one_is_told(tmp_path: Path) -> None:
+    arguments = ["import", str(LOG), "--campaign", "1", "--data-dir", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 1
+    assert "gainline serve" in result.stderr
+
+
+def test_an_ardupilot_log_imports_with_its_own_gains(settings: Settings, campaign: Json, tmp_path: Path) -> None:
+    log = tmp_path / "flight.bin"
+    log.write_bytes(recorded("arducopter_takeoff.bin"))
+    result = run(settings, log, "--campaign", "Garage", "--yes", "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    stored = json.loads(result.stdout)
+    assert stored["read_back"]["PSC_VELZ_P"] == 5.0
+    assert "must cover 0 … 32.6 s" in stored["reason"]
