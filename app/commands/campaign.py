@@ -112,7 +112,7 @@ class _Display:
 
     def _landed(self, trial: HeadlessTrial) -> None:
         self._progress.console.print(
-            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} ({trial.outcome})",
+            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} ({_came_to(trial)})",
             highlight=False,
         )
         self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
@@ -158,6 +158,10 @@ def _document(
         "best": None if best is None else best.number,
         "stopped_because": campaign.stopped_because,
     }
+
+
+def _came_to(trial: HeadlessTrial) -> str:
+    return f"{trial.outcome}: {trial.reason}" if trial.reason else trial.outcome
 
 
 def _gains(gains: Mapping[str, float]) -> str:

@@ -124,16 +124,15 @@ def is_fresh(watch: Watch, now_s: float) -> bool:
     return watch.last is not None and now_s - watch.advanced_s < FRESH_S
 
 
+def is_still(watch: Watch, now_s: float) -> bool:
+    """Neither climbing nor sinking, as a fresh sample has it."""
+    return watch.last is not None and is_fresh(watch, now_s) and abs(watch.last.climb_rate_m_s) < RESTING_M_S
+
+
 def is_grounded(watch: Watch, now_s: float, ground_m: float) -> bool:
     """On the ground by height and by speed, as a fresh sample has it."""
-    last = watch.last
-    return (
-        last is not None
-        and is_fresh(watch, now_s)
-        and watch.doubted is None
-        and last.altitude_m - ground_m < GROUND_M
-        and abs(last.climb_rate_m_s) < RESTING_M_S
-    )
+    low = watch.last is not None and watch.last.altitude_m - ground_m < GROUND_M
+    return low and watch.doubted is None and is_still(watch, now_s)
 
 
 def is_airborne(watch: Watch, now_s: float, ground_m: float) -> bool:

@@ -5,13 +5,27 @@ It knows no autopilot and no clock: events carry their time, commands are data t
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Final
 
 from app.vehicles.mavlink import limits as watching
 from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Outcome, Reaction
 from app.vehicles.mavlink.limits import Finding, Limits, Watch
-from app.vehicles.mavlink.measurements import Heartbeat, Measurement, Parameter, Position
+from app.vehicles.mavlink.measurements import Heartbeat, Parameter
+from app.vehicles.mavlink.signals import (
+    AbortWanted,
+    Action,
+    Command,
+    Done,
+    Event,
+    Heard,
+    Keep,
+    Perform,
+    Refused,
+    Restored,
+    RestoreGains,
+    SendGain,
+    Setting,
+)
 from app.vehicles.mavlink.states import COMMANDED, MOVES, OVER, State
 
 BASELINE_S: Final = 1.0
@@ -20,6 +34,8 @@ GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
 REPEAT_S: Final = 1.0
 LANDED_S: Final = 2.0
+DOWN_S: Final = 1.0
+"""On the ground for so long while it should hover: its integrator winds up."""
 LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
@@ -27,23 +43,6 @@ _MODE_KNOWN_S: Final = 1.0
 _DESCENDING_M_S: Final = -0.2
 _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
-
-
-class Action(StrEnum):
-    """What a vehicle is told to do, by whatever messages its autopilot wants."""
-
-    ARM = "arm"
-    TAKE_OFF = "take off"
-    LAND = "land"
-    MOTORS_OFF = "motors off"
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """A parameter by its name on the vehicle, with the value to send."""
-
-    parameter: str
-    value: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,80 +57,6 @@ class Plan:
     datum_m: float = 0.0
     record_s: float = 33.0
     lift_off_s: float = 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class Tick:
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Heard:
-    """A packet from the vehicle; None where it measures nothing."""
-
-    measurement: Measurement | None
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class AbortWanted:
-    reason: str
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Done:
-    """The vehicle has taken what an action sends."""
-
-    action: Action
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Refused:
-    action: Action
-    why: str
-    now_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Restored:
-    """The safe gains were written and read back; `problem` says why not."""
-
-    now_s: float
-    problem: str = ""
-
-
-Event = Tick | Heard | AbortWanted | Done | Refused | Restored
-
-
-@dataclass(frozen=True, slots=True)
-class Perform:
-    action: Action
-
-
-@dataclass(frozen=True, slots=True)
-class SendGain:
-    """Once, without waiting for an answer."""
-
-    setting: Setting
-
-
-@dataclass(frozen=True, slots=True)
-class RestoreGains:
-    """Write the safe gains and read them back, with repetitions."""
-
-
-@dataclass(frozen=True, slots=True)
-class Keep:
-    """A sample that belongs to the record, with what it was to be."""
-
-    position: Position
-    set_point_m: float
-    battery_v: float | None
-
-
-Command = Perform | SendGain | RestoreGains | Keep
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,6 +174,9 @@ def _record(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if finding := _finding(trial, now_s):
         return _fail(trial, finding, now_s)
+    trial = _resting(trial, now_s)
+    if _rests_for(trial, DOWN_S, now_s):
+        return _fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
     last, start_s = trial.watch.last, trial.commanded_boot_s
     if last is None or start_s is None or last.time_boot_s - start_s < trial.plan.record_s:
         return trial, ()
@@ -264,23 +192,36 @@ def _landing(trial: Trial, event: Event) -> Step:
         return _send_gains(trial, event)
     if finding := _taken_over(trial) or (_envelope(trial) if trial.gains_since_s is None else None):
         return _fail(trial, finding, now_s)
-    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
-    since_s = (trial.resting_since_s if trial.resting_since_s is not None else now_s) if grounded else None
-    trial = replace(trial, resting_since_s=since_s)
+    trial = _resting(trial, now_s)
     if _has_landed(trial, now_s):
         return _disarm(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
         return _quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
-    if now_s - trial.repeated_s >= REPEAT_S and not grounded and not _descends(trial, now_s):
+    is_down = trial.resting_since_s is not None or _descends(trial, now_s)
+    if now_s - trial.repeated_s >= REPEAT_S and not is_down:
         return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
     return trial, ()
 
 
+def _resting(trial: Trial, now_s: float) -> Trial:
+    """Note since when it has been at rest: on the ground by height and speed, or by speed alone once its motors are
+    off, for some autopilots' altitude drifts."""
+    if trial.watch.armed:
+        rests = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    else:
+        rests = watching.is_still(trial.watch, now_s)
+    since_s = trial.resting_since_s if trial.resting_since_s is not None else now_s
+    return replace(trial, resting_since_s=since_s if rests else None)
+
+
+def _rests_for(trial: Trial, seconds: float, now_s: float) -> bool:
+    return trial.resting_since_s is not None and now_s - trial.resting_since_s >= seconds
+
+
 def _has_landed(trial: Trial, now_s: float) -> bool:
-    """At rest near the ground for 2 s; or it has disarmed itself there, as some autopilots do."""
-    if not trial.watch.armed:
-        return not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-    return trial.resting_since_s is not None and now_s - trial.resting_since_s >= LANDED_S
+    """At rest for 2 s; or it has disarmed itself near the ground, as some autopilots do."""
+    near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    return _rests_for(trial, LANDED_S, now_s) or (near and not trial.watch.armed)
 
 
 def _link_lost(trial: Trial, event: Event) -> Step:
@@ -298,7 +239,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat) and not event.measurement.armed:
         return _enter(trial, State.RESTORE, now_s), (RestoreGains(),)
-    if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
+    if trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
         why = "It was found in the air while its motors were to be stopped."
         return _abort(_note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:

@@ -4,10 +4,10 @@ from app.core.errors import GainsError, Problem
 from app.core.policy import Gains
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.machine import Setting
 from app.vehicles.mavlink.measurements import Measurement, Parameter
 from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing
 from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, Radio
+from app.vehicles.mavlink.signals import Setting
 
 
 def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:

@@ -7,9 +7,9 @@ from typing import Final
 
 from app.vehicles.mavlink.clock import Clock
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.machine import Action, Done, Heard, Refused
 from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Parameter, Position, Reply, Spoken
 from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile, Step
+from app.vehicles.mavlink.signals import Action, Done, Heard, Refused
 
 PATIENCE_S: Final = 0.5
 ATTEMPTS: Final = 5

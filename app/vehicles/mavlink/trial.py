@@ -7,29 +7,27 @@ from typing import Final
 from app.vehicles.base import Sample
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.limits import Watch
-from app.vehicles.mavlink.machine import (
+from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.radio import Conversation, Radio
+from app.vehicles.mavlink.signals import (
     AbortWanted,
     Action,
     Command,
     Event,
-    Heard,
     Keep,
     Perform,
-    Plan,
     Restored,
     RestoreGains,
     SendGain,
     Tick,
-    Trial,
-    advance,
-    begin,
 )
-from app.vehicles.mavlink.radio import Conversation, Radio
 from app.vehicles.mavlink.states import State
 from app.vehicles.mavlink.transports import LinkError
 
 LISTEN_S: Final = 0.01
 """How long the loop is deaf to an abort, at the most."""
+STALLED_S: Final = 0.2
+"""When this program itself stood still for so long, what came meanwhile is heard before silence is judged."""
 _SAMPLE_EVERY_S: Final = 0.015
 """Of telemetry; records keep every sample."""
 
@@ -65,6 +63,7 @@ class Flight:
         self._conversation: Conversation | None = None
         self._error: BaseException | None = None
         self._shown_s = float("-inf")
+        self._listened_s = radio.clock.now_s()
         self._trial, commands = begin(plan, watch, radio.clock.now_s())
         self._begin_with = commands
 
@@ -72,7 +71,8 @@ class Flight:
         """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
         self._guarded(lambda: self._carry_out(self._begin_with))
         while not self._trial.is_over:
-            self._guarded(self._proceed)
+            self._guarded(self._listen)
+            self._guarded(self._judge)
         return Flown(self._trial, tuple(self._samples), self._error)
 
     def _guarded(self, work: Callable[[], None]) -> None:
@@ -80,30 +80,30 @@ class Flight:
             work()
         except LinkError:  # silence: the machine notices
             self._radio.clock.wait_s(LISTEN_S)
-            self._advance(Tick(self._radio.clock.now_s()))
         except BaseException as error:  # noqa: BLE001 - kept for the caller; the vehicle comes first
             self._error = self._error or error
-            self._advance(AbortWanted(_spoken(error), self._radio.clock.now_s()))
 
-    def _proceed(self) -> None:
-        if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
-            self._advance(Restored(self._radio.clock.now_s(), self._restored()))
-            return
+    def _listen(self) -> None:
         heard = self._radio.listen(LISTEN_S)
+        now_s = self._radio.clock.now_s()
+        if now_s - self._listened_s > STALLED_S:
+            heard += self._radio.listen(LISTEN_S)
+        self._listened_s = now_s
         for each in heard:
             self._advance(each)
-        self._converse(heard)
+        if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
+            self._conversation = None
+            self._advance(ended)
+
+    def _judge(self) -> None:
+        if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
+            self._advance(Restored(self._radio.clock.now_s(), self._restored()))
         if (reason := self._wanted()) is not None:
             self._advance(AbortWanted(reason, self._radio.clock.now_s()))
         self._advance(Tick(self._radio.clock.now_s()))
 
     def _wanted(self) -> str | None:
         return self._should_abort() if self._error is None else _spoken(self._error)
-
-    def _converse(self, heard: list[Heard]) -> None:
-        if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
-            self._conversation = None
-            self._advance(ended)
 
     def _advance(self, event: Event) -> None:
         before = self._trial.state

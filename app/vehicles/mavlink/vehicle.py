@@ -17,11 +17,12 @@ from app.vehicles.mavlink import addresses, limits, parameters, preflight
 from app.vehicles.mavlink.clock import Clock, ScaledClock
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.machine import Keep, Plan, Trial
+from app.vehicles.mavlink.machine import Plan, Trial
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Aim
 from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.signals import Keep
 from app.vehicles.mavlink.states import MOVES, State
 from app.vehicles.mavlink.trial import Flight, Flown, channels_of
 

@@ -1,8 +1,10 @@
 """A simulated drone at the other end of real sockets, in a thread, whose own time is the time of both sides.
 
-However busy the machine is, neither side can be late for the other by more than a pause of the drone's.
+After everything it says the drone waits, briefly, until the ground's threads have looked at the clock: however busy the
+machine is, the ground is not late by much.
 """
 
+import struct
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -11,9 +13,10 @@ from typing import Final, Self
 
 from app.core.policy import Gains
 from app.vehicles.base import OptionValue
-from app.vehicles.mavlink.addresses import UdpAddress
+from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import Message, text
 from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -21,7 +24,7 @@ from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import TICK_S, new_body
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
-from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
+from tests.vehicles.mavlink.speaking import LOOPBACK, becomes, free_port
 
 SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 283, "ki": 13, "kd": 82},
@@ -29,6 +32,14 @@ SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 2.0},
 }
 _TICKS_AT_ONCE: Final = 4
+_PATIENCE_S: Final = 0.05
+"""On the wall: for a thread that has ended its work, or a machine that is very busy."""
+_BYTEWISE: Final = 6
+_FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
+    "ardupilot": (("FS_GCS_ENABLE", 2, 5), ("FENCE_ENABLE", 2, 1)),
+    "px4": (("NAV_DLL_ACT", _BYTEWISE, 3), ("GF_ACTION", _BYTEWISE, 3), ("GF_MAX_VER_DIST", 9, 10)),
+}
+"""Name, MAVLink's type, value."""
 
 
 class Hangar:
@@ -52,6 +63,7 @@ class Hangar:
         self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
         self.heard: list[tuple[float, Message]] = []
         self.problem: BaseException | None = None
+        self._lookers: dict[threading.Thread, bool] = {}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -71,6 +83,7 @@ class Hangar:
     # ---- the clock of both sides
 
     def now_s(self) -> float:
+        self._lookers[threading.current_thread()] = True
         if self.problem is not None:
             raise RuntimeError("the simulated drone broke down") from self.problem
         return self.drone.time_s
@@ -87,6 +100,16 @@ class Hangar:
         address = str(UdpAddress(LOOPBACK, self._ports[1], self._ports[0]))
         chosen = {"autopilot": self.autopilot, "address": address, "simulated": True, **options}
         return MAVLINK.check(chosen, field="options")
+
+    def switch_on_failsafes(self) -> None:
+        """As a person does with another ground station before the first flight."""
+        with Link(parse(str(self.options()["address"])), PROFILES[self.autopilot].dialect, clock=self) as link:
+            assert becomes(lambda: link.vehicle_system is not None or not link.receive(0.1))
+            for name, kind, value in _FAILSAFES[self.autopilot]:
+                whole = struct.unpack("<f", struct.pack("<i", value))[0] if kind == _BYTEWISE else float(value)
+                whom = {"target_system": 1, "target_component": 0}
+                link.send("PARAM_SET", **whom, param_id=name, param_type=kind, param_value=whole)
+            assert becomes(lambda: len(self.writes) == len(_FAILSAFES[self.autopilot]))
 
     def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
         safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
@@ -108,9 +131,20 @@ class Hangar:
                 for data, _ in self._transport.read(0.0):
                     self.heard += [(self.drone.time_s, message) for message in self._codec.parse(data)]
                     self.drone.receive(data)
-                for _ in range(_TICKS_AT_ONCE):
-                    for frame in self.drone.tick():
-                        self._transport.write(frame)
+                frames = [frame for _ in range(_TICKS_AT_ONCE) for frame in self.drone.tick()]
+                for looker in tuple(self._lookers):
+                    self._lookers[looker] = False
+                for frame in frames:
+                    self._transport.write(frame)
                 time.sleep(_TICKS_AT_ONCE * TICK_S / self.speed)
+                if frames:
+                    self._wait_for_lookers()
         except BaseException as error:  # noqa: BLE001 - told by the other thread
             self.problem = error
+
+    def _wait_for_lookers(self) -> None:
+        until_s = time.monotonic() + _PATIENCE_S
+        while time.monotonic() < until_s and not all(
+            looked or not thread.is_alive() for thread, looked in tuple(self._lookers.items())
+        ):
+            time.sleep(0.0002)

@@ -7,8 +7,8 @@ from itertools import pairwise
 import pytest
 
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.machine import AbortWanted, Action, Perform, Refused, RestoreGains, SendGain
 from app.vehicles.mavlink.measurements import Breach, Parameter, Position
+from app.vehicles.mavlink.signals import AbortWanted, Action, Perform, Refused, RestoreGains, SendGain
 from app.vehicles.mavlink.states import MOVES, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, Walk
 
@@ -403,3 +403,22 @@ def test_the_first_failure_is_the_one_that_counts() -> None:
     press_abort(walk)
     drain(walk)
     assert (walk.trial.failure, walk.trial.why) == (Failure.OPERATOR, ABORT)
+
+
+def test_a_vehicle_that_comes_down_by_itself_is_not_left_to_wind_up_its_integrator() -> None:
+    walk = recording()
+    walk.climb_rate_m_s = -2.0
+    while walk.altitude_m > GROUND_M + 0.05:
+        walk.pass_s(STEP_S)
+    walk.climb_rate_m_s = 0.0
+    assert walk.pass_s(0.9).state is State.RECORD
+    assert walk.pass_s(0.2).state is State.ABORT_LAND
+    assert (walk.trial.failure, walk.trial.why) == (Failure.ENVELOPE, "It came down by itself.")
+
+
+def test_an_altitude_that_drifts_up_does_not_hide_that_the_vehicle_has_landed_and_disarmed() -> None:
+    walk = landing()
+    walk.altitude_m, walk.climb_rate_m_s, walk.armed = GROUND_M + 0.3, 0.0, False
+    walk.boot_s += 1.0
+    walk.pass_s(4.0)
+    assert (walk.state, walk.trial.failure) == (State.RESTORE, None)

@@ -8,7 +8,6 @@ import pytest
 from app.core.errors import GainsError
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import FieldValue, Message, number, text
-from app.vehicles.mavlink.machine import Action
 from app.vehicles.mavlink.measurements import (
     Battery,
     Block,
@@ -23,6 +22,7 @@ from app.vehicles.mavlink.measurements import (
 from app.vehicles.mavlink.parameters import check_gains, settings
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile
+from app.vehicles.mavlink.signals import Action
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 
 PAPARAZZI, ARDUPILOT, PX4 = (PROFILES[name] for name in ("paparazzi", "ardupilot", "px4"))

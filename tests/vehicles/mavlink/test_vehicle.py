@@ -14,6 +14,7 @@ from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.open import open_vehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
+from tests.vehicles.mavlink.hangar import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.hangar import Hangar
 from tests.vehicles.mavlink.speaking import becomes
 
@@ -252,3 +253,64 @@ def test_impossible_options_are_refused_by_name(options: dict[str, OptionValue],
     [problem] = refusal.value.problems
     assert problem.field == f"vehicle.options.{field}"
     assert reason in problem.reason
+
+
+MILDER = {
+    "ardupilot": {"PSC_POSZ_P": 1.5, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.37, "PSC_ACCZ_D": 0.0, "PSC_ACCZ_I": 1.1},
+    "px4": {"MPC_Z_P": 1.2, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 1.7},
+}
+COPTERS = [("ardupilot", ""), ("ardupilot", "ardupilot-4.7"), ("px4", "")]
+
+
+@pytest.mark.parametrize(("autopilot", "release"), COPTERS, ids=[release or name for name, release in COPTERS])
+def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str, release: str) -> None:
+    safe, gains = OWN_SAFE[autopilot], MILDER[autopilot]
+    with Hangar(autopilot, release=release) as hangar:
+        hangar.switch_on_failsafes()
+        vehicle = hangar.vehicle()
+        assert vehicle.stage(gains) == gains
+        assert vehicle.read_gains() == gains
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_abort=never)
+        assert vehicle.read_gains() == safe
+        vehicle.close()
+    flight = record.trajectory
+    assert (record.ending, record.reason) == ("completed", "")
+    assert TAKEOFF.error(flight) < 0.2
+    before, settled = flight.time_s < 0.0, flight.time_s > 20.0
+    np.testing.assert_allclose(flight["altitude_m"][before], 0.0, atol=0.1)
+    np.testing.assert_allclose(flight["altitude_m"][settled], 3.0, atol=0.2)
+
+
+@pytest.mark.parametrize(("autopilot", "named"), [("ardupilot", "FS_GCS_ENABLE"), ("px4", "NAV_DLL_ACT")])
+def test_a_vehicle_whose_failsafes_are_off_is_not_flown(autopilot: str, named: str) -> None:
+    with Hangar(autopilot) as hangar, pytest.raises(VehicleError, match=f"failsafes are off.*{named}"):
+        hangar.vehicle()
+
+
+@pytest.mark.parametrize("autopilot", MILDER)
+def test_an_abort_lands_the_other_autopilots_too(autopilot: str) -> None:
+    watcher = Watcher(abort_at_s=7.0)
+    with Hangar(autopilot) as hangar:
+        hangar.switch_on_failsafes()
+        vehicle = hangar.vehicle()
+        vehicle.stage(MILDER[autopilot])
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_abort=watcher.decide)
+        assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
+        assert vehicle.read_gains() == OWN_SAFE[autopilot]
+        assert hangar.drone.body.stands
+        vehicle.close()
+
+
+def test_a_link_that_breaks_here_leaves_the_vehicle_to_its_own_failsafe_and_in_quarantine() -> None:
+    with Hangar() as hangar:
+        vehicle = hangar.vehicle()
+        vehicle.stage(TUNED)
+
+        def cut(sample: Sample) -> None:
+            if sample.time_s > 1.0:
+                vehicle.close()
+
+        record = vehicle.fly(ORDER, on_sample=cut, should_abort=never)
+        assert (record.ending, hangar.drone.body.stands) == ("invalid", True)
+        with pytest.raises(SafeGainsError, match="quarantined"):
+            vehicle.stage(SAFE)

@@ -4,7 +4,9 @@ from dataclasses import dataclass, field
 
 from app.vehicles.mavlink import limits
 from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.machine import (
+from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Position
+from app.vehicles.mavlink.signals import (
     Action,
     Command,
     Done,
@@ -12,16 +14,11 @@ from app.vehicles.mavlink.machine import (
     Heard,
     Keep,
     Perform,
-    Plan,
     Restored,
     SendGain,
     Setting,
     Tick,
-    Trial,
-    advance,
-    begin,
 )
-from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Position
 from app.vehicles.mavlink.states import State
 
 GROUND_M = 0.1

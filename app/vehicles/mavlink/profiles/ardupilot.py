@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import Final
 
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
-from app.vehicles.mavlink.machine import Action
 from app.vehicles.mavlink.measurements import Measurement
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+from app.vehicles.mavlink.signals import Action
 
 GUIDED: Final = 4
 LAND: Final = 9

@@ -9,7 +9,6 @@ from typing import Final, Protocol
 
 from app.core.policy import shortened
 from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message, number, text
-from app.vehicles.mavlink.machine import Action
 from app.vehicles.mavlink.measurements import (
     Battery,
     Breach,
@@ -20,6 +19,7 @@ from app.vehicles.mavlink.measurements import (
     Reply,
     Spoken,
 )
+from app.vehicles.mavlink.signals import Action
 
 ARMED_BIT: Final = 128
 REAL32: Final = 9
@@ -48,10 +48,11 @@ class GainParameter:
         return _single(value * self.factor)
 
     def read(self, wire: float, asked: float | None = None) -> float:
-        """What the vehicle holds; the very number that was asked where it is that, to the precision of the wire."""
+        """What the vehicle holds, to the seven digits of single precision; the very number that was asked where it is
+        that one."""
         if self.whole:
             return int(wire)
-        return asked if asked is not None and wire == self.sent(asked) else wire / self.factor
+        return asked if asked is not None and wire == self.sent(asked) else float(f"{wire / self.factor:.7g}")
 
     def refusal(self, value: float) -> str | None:
         """Why this value may not be written, or None when it may."""

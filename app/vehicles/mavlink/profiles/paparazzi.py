@@ -6,10 +6,10 @@ from typing import Final
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import PAPARAZZI as DIALECT
 from app.vehicles.mavlink.dialects import Message, number, text
-from app.vehicles.mavlink.machine import Action
 from app.vehicles.mavlink.measurements import Block, BlockCount, Measurement, Reply
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+from app.vehicles.mavlink.signals import Action
 
 HOLDING: Final = "Holding point"
 START_ENGINE: Final = "Start Engine"

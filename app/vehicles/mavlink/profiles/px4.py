@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Final
 
 from app.vehicles.mavlink.dialects import COMMON, Message, number
-from app.vehicles.mavlink.machine import Action
 from app.vehicles.mavlink.measurements import Measurement, Parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.ardupilot import request_positions
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+from app.vehicles.mavlink.signals import Action
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
@@ -45,6 +45,7 @@ class Px4:
     requirements: Final = (
         Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)"),
         Requirement("GF_ACTION", "act when it leaves its fence"),
+        Requirement("GF_MAX_VER_DIST", "have a fence, in metres above home"),
     )
 
     def measure(self, message: Message) -> Measurement | None:

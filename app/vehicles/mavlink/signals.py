@@ -1,0 +1,97 @@
+"""What goes into the machine of a trial and what comes out of it: events, which carry their time, and commands."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from app.vehicles.mavlink.measurements import Measurement, Position
+
+
+class Action(StrEnum):
+    """What a vehicle is told to do, by whatever messages its autopilot wants."""
+
+    ARM = "arm"
+    TAKE_OFF = "take off"
+    LAND = "land"
+    MOTORS_OFF = "motors off"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter by its name on the vehicle, with the value to send."""
+
+    parameter: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A packet from the vehicle; None where it measures nothing."""
+
+    measurement: Measurement | None
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AbortWanted:
+    reason: str
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The vehicle has taken what an action sends."""
+
+    action: Action
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    action: Action
+    why: str
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """The safe gains were written and read back; `problem` says why not."""
+
+    now_s: float
+    problem: str = ""
+
+
+Event = Tick | Heard | AbortWanted | Done | Refused | Restored
+
+
+@dataclass(frozen=True, slots=True)
+class Perform:
+    action: Action
+
+
+@dataclass(frozen=True, slots=True)
+class SendGain:
+    """Once, without waiting for an answer."""
+
+    setting: Setting
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreGains:
+    """Write the safe gains and read them back, with repetitions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """A sample that belongs to the record, with what it was to be."""
+
+    position: Position
+    set_point_m: float
+    battery_v: float | None
+
+
+Command = Perform | SendGain | RestoreGains | Keep

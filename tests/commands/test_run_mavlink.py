@@ -1,0 +1,54 @@
+"""`gainline run` on a simulated drone at the other end of a real link."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from app.cli import app
+from tests.vehicles.mavlink.hangar import SAFE, Hangar
+
+RUN = ("run", "ardrone-takeoff", "--strategy", "gradient", "--max-flights", "3")
+
+
+def gainline(*arguments: str) -> Result:
+    return CliRunner().invoke(app, list(arguments))
+
+
+def test_a_whole_campaign_is_flown_over_the_link(tmp_path: Path) -> None:
+    """The ground's clock runs slower than the drone's, so that a busy machine does not make time-outs pass."""
+    out, logs = tmp_path / "campaign.json", tmp_path / "logs"
+    logs.mkdir()
+    with Hangar(speed=20.0) as hangar:
+        vehicle = f"mavlink:{hangar.options()['address']}"
+        settings = ("simulated=true", "clock_speed=4", f"log_folder={logs}")
+        named = [part for setting in settings for part in ("--set", setting)]
+        result = gainline(*RUN, "--vehicle", vehicle, *named, "--json", str(out))
+        assert result.exit_code == 0, result.output
+        written = [name for name in hangar.writes if name.startswith("gui_v_")]
+    trials = json.loads(out.read_text())["trials"]
+    assert [trial["outcome"] for trial in trials] == ["valid"] * 3
+    assert trials[0]["gains"] == dict(SAFE["paparazzi"])
+    assert min(trial["error"] for trial in trials[1:]) < 0.6 * trials[0]["error"]
+    assert written[-3:] == ["gui_v_kp", "gui_v_ki", "gui_v_kd"]
+    assert len(list(logs.glob("*.tlog"))) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--vehicle", "mavlink:udp:127.0.0.1:4245"), "vehicle.kind: mavlink is not a simulation"),
+        (("--vehicle", "mavlink:udp:10.0.0.2:4245"), "vehicle.kind: mavlink is not a simulation"),
+        (
+            ("--vehicle", "mavlink:udp:10.0.0.2:4245", "--set", "simulated=true"),
+            "vehicle.options.simulated: is not believed of udp:10.0.0.2:4245",
+        ),
+        (("--vehicle", "mavlink:here"), "vehicle.options.address: must be udp:HOST:PORT"),
+        (("--vehicle", "twin:udp:127.0.0.1:4245"), "vehicle.options.address: is not an option of twin"),
+    ],
+)
+def test_a_real_vehicle_is_refused_before_anything_is_opened(arguments: tuple[str, ...], said: str) -> None:
+    result = gainline(*RUN, *arguments)
+    assert result.exit_code == 1
+    assert said in " ".join(result.output.split())

@@ -1,0 +1,148 @@
+"""Recorded trials of the real Paparazzi, heard by the machine through the profile, give the flights that they hold."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.core.experiments.takeoff import Takeoff
+from app.core.trajectory import Trajectory
+from app.vehicles.mavlink import limits
+from app.vehicles.mavlink.limits import Limits
+from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.measurements import Position
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.signals import (
+    Action,
+    Command,
+    Done,
+    Event,
+    Heard,
+    Keep,
+    Perform,
+    Restored,
+    RestoreGains,
+    Setting,
+    Tick,
+)
+from app.vehicles.mavlink.states import State
+from tests.vehicles.mavlink.replaying import FLOWN, Recorded, messages, recorded
+
+PAPARAZZI = PROFILES["paparazzi"]
+TAKEOFFS = Path(__file__).parents[2] / "data" / "takeoffs"
+TAKEOFF = Takeoff()
+LIMITS = Limits(
+    set_point_m=3.0,
+    heartbeat_s=PAPARAZZI.heartbeat_s,
+    min_battery_v=10.5,
+    flying_modes=PAPARAZZI.flying_modes,
+    landing_modes=PAPARAZZI.landing_modes,
+)
+SAFE_GAINS = tuple(Setting(name, 0.0) for name in ("gui_v_kp", "gui_v_kd", "gui_v_ki"))
+
+
+class Replay:
+    """The vehicle's side of a recorded trial, from the block that starts its engine on."""
+
+    def __init__(self, gains: tuple[int, int, int]) -> None:
+        arming, _, landing = (each.time_s for each in messages(gains, "SCRIPT_ITEM", from_vehicle=False)[1:])
+        [kill] = (each.time_s for each in messages(gains, "PARAM_SET", from_vehicle=False)[3:])
+        self.recorded = [each for each in recorded(gains) if each.is_from_vehicle and each.time_s >= arming]
+        self.landing_s, self.kill_s = landing, kill
+        before = [each for each in messages(gains, "LOCAL_POSITION_NED", from_vehicle=True) if each.time_s < arming]
+        positions = [heard for each in before if isinstance(heard := PAPARAZZI.measure(each.message), Position)]
+        ground_m = float(np.median([position.altitude_m for position in positions]))
+        plan = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=ground_m, lift_off_s=PAPARAZZI.lift_off_s)
+        self.told: list[tuple[float, Command]] = []
+        self.states = [State.ARM]
+        self.trial: Trial
+        self.trial, _ = begin(plan, limits.begin(arming, last=positions[-1], battery_v=12.4), arming)
+        self.give(Done(Action.ARM, arming))
+
+    def run(self) -> None:
+        """To the end. The recorded ground station waited longer before it stopped the motors: that wait is left out."""
+        ahead_s = 0.0
+        for each in self.recorded:
+            if self.trial.state is State.DISARM and ahead_s == 0.0 and each.time_s < self.kill_s:
+                continue
+            if self.trial.state is State.DISARM and ahead_s == 0.0:
+                ahead_s = each.time_s - self.trial.since_s
+            self.hear(replace(each, time_s=each.time_s - ahead_s))
+            if self.trial.state is State.RESTORE:
+                self.give(Restored(each.time_s - ahead_s))
+                return
+
+    def hear(self, each: Recorded) -> None:
+        self.give(Heard(PAPARAZZI.measure(each.message), each.time_s))
+        self.give(Tick(each.time_s))
+
+    def give(self, event: Event) -> None:
+        self.trial, commands = advance(self.trial, event)
+        self.told += [(event.now_s, command) for command in commands]
+        if self.states[-1] is not self.trial.state:
+            self.states.append(self.trial.state)
+
+    def when(self, action: Action) -> float:
+        return next(at_s for at_s, command in self.told if command == Perform(action))
+
+    @property
+    def trajectory(self) -> Trajectory:
+        start_s = self.trial.commanded_boot_s
+        assert start_s is not None
+        kept = [command.position for _, command in self.told if isinstance(command, Keep)]
+        time_s = np.array([position.time_boot_s - start_s for position in kept])
+        return Trajectory(time_s, {"altitude_m": np.array([each.altitude_m for each in kept])}, "mavlink", "vehicle")
+
+
+@pytest.fixture(scope="module", params=FLOWN, ids=str)
+def replay(request: pytest.FixtureRequest) -> tuple[tuple[int, int, int], Replay]:
+    flight = Replay(request.param)
+    flight.run()
+    return request.param, flight
+
+
+def stored_takeoff(gains: tuple[int, int, int]) -> Trajectory:
+    path = TAKEOFFS / f"paparazzi_{'_'.join(map(str, gains))}.csv"
+    time_s, altitude_m, _ = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
+    return Trajectory(time_s, {"altitude_m": altitude_m}, "csv", "vehicle")
+
+
+def test_a_recorded_trial_goes_through_its_states_without_any_failure(
+    replay: tuple[tuple[int, int, int], Replay],
+) -> None:
+    _, flight = replay
+    assert flight.states == [
+        State.ARM,
+        State.TAKEOFF,
+        State.RECORD,
+        State.LAND,
+        State.DISARM,
+        State.RESTORE,
+        State.IDLE,
+    ]
+    assert (flight.trial.failure, flight.trial.watch.glitches) == (None, 0)
+    assert RestoreGains() in [command for _, command in flight.told]
+
+
+def test_a_recorded_trial_scores_as_its_takeoff_does(replay: tuple[tuple[int, int, int], Replay]) -> None:
+    gains, flight = replay
+    assert TAKEOFF.error(flight.trajectory) == pytest.approx(TAKEOFF.error(stored_takeoff(gains)), rel=0.005)
+
+
+def test_the_errors_are_those_that_were_published_of_the_recordings(
+    replay: tuple[tuple[int, int, int], Replay],
+) -> None:
+    gains, flight = replay
+    published = {(283, 13, 82): 0.3297, (1624, 1356, 195): 0.0987}
+    assert TAKEOFF.error(flight.trajectory) == pytest.approx(published[gains], rel=0.005)
+
+
+def test_land_is_told_when_it_was_and_the_ground_is_recognised_soon(
+    replay: tuple[tuple[int, int, int], Replay],
+) -> None:
+    _, flight = replay
+    assert flight.when(Action.LAND) == pytest.approx(flight.landing_s, abs=0.1)
+    touched_s = flight.when(Action.MOTORS_OFF) - 2.0
+    assert 3.0 < touched_s - flight.landing_s < 8.0
+    assert flight.when(Action.MOTORS_OFF) < flight.kill_s - 10.0
