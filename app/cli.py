@@ -116,7 +116,10 @@ def worker(data_dir: DataDir = None) -> None:
 @plainly
 def run(
     campaign: CampaignSource,
-    vehicle: Annotated[str | None, typer.Option(help="jsbsim or twin.", show_default=False)] = None,
+    vehicle: Annotated[
+        str | None,
+        typer.Option(help="jsbsim, twin, lti, or mavlink:ADDRESS with --set simulated=true.", show_default=False),
+    ] = None,
     strategy: Annotated[str | None, typer.Option(help="How the next gains are found.", show_default=False)] = None,
     start: StartGains = None,
     settings: GivenSettings = None,
