@@ -24,8 +24,6 @@ REQUEST_BODY: Final = {
     "requestBody": {
         "required": True,
         "content": {
-            _CSV: _BINARY,
-            _ANY: _BINARY,
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
@@ -40,6 +38,8 @@ REQUEST_BODY: Final = {
                     },
                 }
             },
+            _CSV: _BINARY,
+            _ANY: _BINARY,
         },
     }
 }

@@ -1,6 +1,7 @@
 /** Everything that pages do. The event stream makes the answers doubtful; what comes back is put in at once. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
+import type { RecordFiles } from "../lib/records";
 import { answer } from "./client";
 import {
   archiveCampaign,
@@ -91,16 +92,31 @@ export function useClassify() {
   });
 }
 
+export interface RecordOrder extends RecordFiles {
+  trialId?: number;
+  proposalId?: number;
+  /** Which one of a log with several takeoffs. */
+  takeoff?: number;
+  /** Take the log's gains although they are not the planned ones. */
+  confirm?: boolean;
+}
+
 /** Hand in the record of a flight made elsewhere; the proposal becomes a trial first when none is planned. */
 export function useUploadRecord(campaignId: number) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: async ({ file, trialId, proposalId }: { file: File; trialId?: number; proposalId?: number }) => {
+    mutationFn: async ({ file, companion, trialId, proposalId, takeoff, confirm }: RecordOrder) => {
       const planned =
         trialId ??
         (await answer(createTrial({ path: { campaign_id: campaignId }, body: { proposal_id: proposalId ?? null } })))
           .id;
-      return answer(uploadTrajectory({ path: { trial_id: planned }, body: file }));
+      return answer(
+        uploadTrajectory({
+          path: { trial_id: planned },
+          query: { ...(takeoff === undefined ? {} : { takeoff }), ...(confirm === undefined ? {} : { confirm }) },
+          body: { file, ...(companion === undefined ? {} : { companion }) },
+        }),
+      );
     },
     onSuccess: settled.trial,
     onError: () => settled.ofCampaign(campaignId),

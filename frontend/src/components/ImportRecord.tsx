@@ -1,6 +1,8 @@
 import { Button, FileButton } from "@mantine/core";
 import { IconFileUpload } from "@tabler/icons-react";
-import type { RecordUpload } from "../api/mutations";
+import type { RecordOrder, RecordUpload } from "../api/mutations";
+import { problemOf } from "../lib/problems";
+import { RECORD_FILES, recordOf, takeoffsIn, wantsConfirmation } from "../lib/records";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
 
@@ -12,22 +14,27 @@ interface Props {
 
 /** Hand in the record of a flight made elsewhere with these gains. */
 export function ImportRecord({ upload, trialId, proposalId }: Props) {
+  const target = {
+    ...(trialId === undefined ? {} : { trialId }),
+    ...(proposalId === undefined ? {} : { proposalId }),
+  };
+  const problem = problemOf(upload.error);
+  const again = (answer: Partial<RecordOrder>) =>
+    upload.variables !== undefined && upload.mutate({ ...upload.variables, ...target, ...answer });
   return (
     <div className={classes["stack"]}>
       <p className={classes["quiet"]}>
-        Set these gains on your vehicle, fly, and hand in the record: a CSV file with the columns <code>time_s</code>{" "}
-        (seconds since the command) and <code>altitude_m</code>.
+        Set these gains on your vehicle, fly, and hand in the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
+        .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the command) and{" "}
+        <code>altitude_m</code>.
       </p>
       <FileButton
-        accept="text/csv,.csv"
-        onChange={(file) =>
-          file !== null &&
-          upload.mutate({
-            file,
-            ...(trialId === undefined ? {} : { trialId }),
-            ...(proposalId === undefined ? {} : { proposalId }),
-          })
-        }
+        multiple
+        accept={RECORD_FILES}
+        onChange={(files) => {
+          const record = recordOf(files);
+          if (record !== null) upload.mutate({ ...record, ...target });
+        }}
       >
         {(props) => (
           <Button
@@ -41,7 +48,19 @@ export function ImportRecord({ upload, trialId, proposalId }: Props) {
           </Button>
         )}
       </FileButton>
-      <Trouble error={upload.error} />
+      <Trouble error={upload.error} shown={["takeoff"]} />
+      {takeoffsIn(problem).map(({ number, summary }) => (
+        <Button key={number} variant="default" h="auto" py="xs" onClick={() => again({ takeoff: number })}>
+          <span style={{ whiteSpace: "normal" }}>
+            Takeoff {number}: {summary}
+          </span>
+        </Button>
+      ))}
+      {wantsConfirmation(problem) && (
+        <Button variant="default" onClick={() => again({ confirm: true })}>
+          Take it with the gains it was flown with
+        </Button>
+      )}
     </div>
   );
 }

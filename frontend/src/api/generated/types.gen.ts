@@ -3390,7 +3390,13 @@ export type GetTrajectoryResponses = {
 export type GetTrajectoryResponse = GetTrajectoryResponses[keyof GetTrajectoryResponses];
 
 export type UploadTrajectoryData = {
-    body: Blob | File;
+    body: {
+        file: Blob | File;
+        /**
+         * the .log file that Paparazzi writes beside a .data file
+         */
+        companion?: Blob | File;
+    };
     headers?: {
         /**
          * Idempotency-Key
@@ -3405,7 +3411,20 @@ export type UploadTrajectoryData = {
          */
         trial_id: number;
     };
-    query?: never;
+    query?: {
+        /**
+         * Takeoff
+         *
+         * which one of a log with several
+         */
+        takeoff?: number | null;
+        /**
+         * Confirm
+         *
+         * take a log that was flown with other gains; the trial then has those
+         */
+        confirm?: boolean;
+    };
     url: '/api/trials/{trial_id}/trajectory';
 };
 
