@@ -2,6 +2,7 @@
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -87,6 +88,7 @@ class Pilot:
         return self.ground.expect("LOCAL_POSITION_NED")
 
 
+@cache
 def recorded(name: str) -> list[Heard]:
     """Every message of a recorded trial, from both sides."""
     data = (LOGS / name).read_bytes()

@@ -24,6 +24,13 @@ RECORDINGS = ("paparazzi_283_13_82.tlog", "paparazzi_1624_1356_195.tlog")
 SETTINGS = 76
 
 
+@pytest.fixture(scope="module", autouse=True)
+def recordings() -> None:
+    """Read before a drone speaks: reading takes a second, in which packets would be lost."""
+    for name in RECORDINGS:
+        recorded(name)
+
+
 @pytest.fixture
 def ground() -> Iterator[Ground]:
     with flying("paparazzi") as opened:

@@ -12,15 +12,9 @@ from typing import ClassVar, Final
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message
 from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED
 from app.vehicles.simdrone.autopilots.copter.cascade import ThreeStage
-from app.vehicles.simdrone.autopilots.copter.copter import (
-    Behaviour,
-    Copter,
-    FlightMode,
-    Manners,
-    Reaction,
-    real,
-)
-from app.vehicles.simdrone.autopilots.copter.parameters import BY_VALUE, Kind, Parameter
+from app.vehicles.simdrone.autopilots.copter.copter import Copter
+from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FlightMode, Manners, Reaction
+from app.vehicles.simdrone.autopilots.copter.parameters import BY_VALUE, Kind, Parameter, real
 from app.vehicles.simdrone.body import Body
 
 _MANUAL: Final = 1 | 16 | 64

@@ -10,16 +10,10 @@ from typing import ClassVar, Final
 from app.vehicles.mavlink.dialects import COMMON
 from app.vehicles.simdrone.autopilots.base import ACCEPTED, TEMPORARILY_REJECTED, Letter
 from app.vehicles.simdrone.autopilots.copter.cascade import TwoStage
-from app.vehicles.simdrone.autopilots.copter.copter import (
-    Behaviour,
-    Copter,
-    FlightMode,
-    Manners,
-    Reaction,
-    real,
-)
+from app.vehicles.simdrone.autopilots.copter.copter import Copter
 from app.vehicles.simdrone.autopilots.copter.flyer import Phase
-from app.vehicles.simdrone.autopilots.copter.parameters import BYTEWISE, Kind, Parameter
+from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FlightMode, Manners, Reaction
+from app.vehicles.simdrone.autopilots.copter.parameters import BYTEWISE, Kind, Parameter, real
 from app.vehicles.simdrone.autopilots.copter.telemetry import HOME_AMSL_M
 from app.vehicles.simdrone.body import Body
 

@@ -2,16 +2,15 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import Enum
 from typing import ClassVar, Final
 
-from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message, is_known, number, text
+from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
 from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, Letter, Timetable
 from app.vehicles.simdrone.autopilots.copter import telemetry
 from app.vehicles.simdrone.autopilots.copter.cascade import Cascade
 from app.vehicles.simdrone.autopilots.copter.flyer import Flyer, Phase
-from app.vehicles.simdrone.autopilots.copter.parameters import Coding, Kind, Parameter, Parameters
+from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FlightMode, Manners, Reaction
+from app.vehicles.simdrone.autopilots.copter.parameters import Parameters
 from app.vehicles.simdrone.body import TICK_S, Body
 
 COMPONENT: Final = 1
@@ -36,58 +35,6 @@ GET_HOME: Final = 410
 SET_INTERVAL: Final = 511
 REQUEST_MESSAGE: Final = 512
 REQUEST_CAPABILITIES: Final = 520
-
-
-class Behaviour(Enum):
-    """What a flight mode makes the vehicle do."""
-
-    STAY = "where it is"
-    TAKE_OFF = "to the height of takeoff, once armed"
-    LAND = "down"
-
-
-class Reaction(Enum):
-    """What a failsafe does."""
-
-    NONE = "nothing"
-    WARN = "say so"
-    HOLD = "stay where it is"
-    LAND = "come down"
-
-
-@dataclass(frozen=True, slots=True)
-class FlightMode:
-    """A mode: its number in HEARTBEAT.custom_mode, the bits that go with it, and what it does."""
-
-    name: str
-    custom_mode: int
-    base_mode: int
-    behaviour: Behaviour = Behaviour.STAY
-    may_arm: bool = True
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Manners:
-    """What is data in an autopilot. `modes` holds every mode, the first being that after the start, and those that the
-    services need by name; `refused` is the result of a refusal, `texts` what is said with one."""
-
-    dialect: Dialect
-    autopilot: int
-    version: int
-    parameters: tuple[Parameter, ...]
-    coding: Coding
-    periods_s: Mapping[str, float]
-    modes: tuple[FlightMode, ...]
-    land: str
-    hold: str
-    refused: int
-    no_estimate: str
-    not_armable: str
-    not_landed: str
-    link_lost: str
-    fence_breached: str
-    ground_m: float
-    """Height of the place of takeoff in the local frame."""
 
 
 class Copter(ABC):
@@ -398,10 +345,6 @@ class Copter(ABC):
 def _whole(value: float) -> int:
     """Command parameters are floats; what is no number asks for nothing."""
     return int(value) if abs(value) < 1e9 else -1
-
-
-def real(name: str, default: float) -> Parameter:
-    return Parameter(name, Kind.REAL32, default)
 
 
 _LANDED_STATES: Final = {

@@ -79,7 +79,7 @@ class Flyer:
         thrust = self._cascade.thrust(self._target_m, speed_m_s, body.altitude_m, body.climb_rate_m_s)
         body.advance(TICK_STEPS, throttle_command(thrust))
         if self.phase is Phase.LANDING:
-            self._standing_s = self._standing_s + TICK_S if body.stands else 0.0
+            self._standing_s = max(self._standing_s + (TICK_S if body.stands else -TICK_S), 0.0)
             if self._standing_s >= _LANDED_AFTER_S:
                 self.stop()
 

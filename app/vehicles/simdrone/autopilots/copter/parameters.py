@@ -25,6 +25,10 @@ class Parameter:
     default: float
 
 
+def real(name: str, default: float) -> Parameter:
+    return Parameter(name, Kind.REAL32, default)
+
+
 class Parameters:
     """The values held, by name and by place."""
 
