@@ -37,7 +37,7 @@ from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTria
 from app.trials.states import FlightState, TrialState
 
 Record = Path | bytes | Mapping[str, Iterable[float]]
-"""A flight's record: a CSV file, its content, or columns by name, `time_s` and `altitude_m` among them."""
+"""A flight's record: a log or CSV file, its content, or columns by name, `time_s` and `altitude_m` among them."""
 
 _ATTEMPTS: Final = 3
 _PAUSE_S: Final = 0.2
@@ -166,14 +166,20 @@ class Client:
         trial = self._plan(campaign_id, flown, note=note, fly=None)
         return self.upload(trial.id, record)
 
-    def upload(self, trial_id: int, record: Record) -> Trial:
-        """Hand in the record of a planned trial, or the recovered one of a lost flight."""
+    def upload(self, trial_id: int, record: Record, *, takeoff: int | None = None, confirm: bool = False) -> Trial:
+        """Hand in the record of a planned trial, or the recovered one of a lost flight.
+
+        Of a log with several takeoffs, that of the number `takeoff`; `confirm` takes one that was flown with other
+        gains, which the trial then has. Raises InvalidError listing the takeoffs, ConflictError naming both gain sets.
+        """
+        query = ({} if takeoff is None else {"takeoff": str(takeoff)}) | ({"confirm": "true"} if confirm else {})
         return self._request(
             "POST",
             f"/api/trials/{trial_id}/trajectory",
             Trial.model_validate_json,
-            content=_csv(record),
-            kind="text/csv",
+            content=_content(record),
+            kind="application/octet-stream",
+            query=query,
         )
 
     def fly(
@@ -295,7 +301,7 @@ def _refusal(answer: httpx2.Response) -> RefusedError:
     return kind(said.detail, hint=said.hint, problems=problems, status=said.status, title=said.title)
 
 
-def _csv(record: Record) -> bytes:
+def _content(record: Record) -> bytes:
     if isinstance(record, Path):
         return record.read_bytes()
     if isinstance(record, bytes):

@@ -12,6 +12,7 @@ from app.db.session import Database
 from app.trials import flights
 from app.trials.schemas import Classification
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
+from tests.logs.recorded import TLOGS, recorded
 
 
 @pytest.fixture
@@ -43,6 +44,22 @@ def test_ask_and_tell(gainline: Client, database: Database, tmp_path: Path) -> N
     run_jobs(database)
     classed = gainline.classify(trial, Classification(version=trial.version, outcome="invalid", reason="rain"))
     assert classed.state == "invalid"
+
+
+def test_a_log_is_handed_in_by_its_takeoff_and_with_the_gains_it_was_flown_with(
+    gainline: Client, database: Database, tmp_path: Path
+) -> None:
+    campaign = gainline.create_campaign("Logged", vehicle="import")
+    run_jobs(database)
+    both = tmp_path / "both.tlog"
+    both.write_bytes(b"".join(recorded(f"{name}.tlog") for name in TLOGS))
+    with pytest.raises(InvalidError, match="2 takeoffs"):
+        gainline.tell(campaign.id, gainline.ask(campaign.id), both)
+    [trial] = gainline.trials(campaign.id)
+    with pytest.raises(ConflictError, match="kp 1624, ki 1356, kd 195"):
+        gainline.upload(trial.id, both, takeoff=2)
+    flown = gainline.upload(trial.id, both, takeoff=2, confirm=True)
+    assert (flown.state, flown.gains["ki"]) == ("valid", 1356)
 
 
 def test_fly_and_wait(gainline: Client, database: Database) -> None:

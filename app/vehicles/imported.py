@@ -10,15 +10,15 @@ from app.vehicles.kinds import Options, VehicleKind
 def _open(_options: Options, _safe_gains: Gains) -> NoReturn:
     raise VehicleError(
         "This vehicle flies elsewhere, so this program cannot fly it.",
-        hint="Fly the proposed gains yourself, then upload the flight's log as CSV with the columns "
-        "time_s and altitude_m.",
+        hint="Fly the proposed gains yourself, then upload the flight's log, or a CSV with the columns time_s and "
+        "altitude_m.",
     )
 
 
 IMPORT: Final = VehicleKind(
     name="import",
     title="Flown elsewhere",
-    line="You fly the proposed gains on your own vehicle and upload the recorded altitude as CSV.",
+    line="You fly the proposed gains on your own vehicle and upload its log, or the altitude as CSV.",
     is_real=True,
     can_fly=False,
     experiments=("takeoff",),

@@ -2,7 +2,7 @@
 
 import re
 
-from playwright.sync_api import expect
+from playwright.sync_api import FilePayload, expect
 
 from tests.e2e.dashboard import Dashboard
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
@@ -15,7 +15,7 @@ def hand_in(dashboard: Dashboard, *files: tuple[str, bytes]) -> None:
     with dashboard.page.expect_file_chooser() as chooser:
         dashboard.button("Upload flight record").click()
     chooser.value.set_files(
-        [{"name": name, "mimeType": "application/octet-stream", "buffer": content} for name, content in files]
+        [FilePayload(name=name, mimeType="application/octet-stream", buffer=content) for name, content in files]
     )
 
 
