@@ -14,6 +14,7 @@ from app.logs.tlog import is_tlog, read_tlog
 from app.logs.ulog import is_ulog, read_ulog
 
 _HEAD_BYTES: Final = 256
+_COMPANION: Final = ".log"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,12 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     if reader is not None:
         return find_takeoffs(reader.read(stream, companion))
     suffix = PurePath(name).suffix.lower()
+    if suffix == _COMPANION:
+        raise TrajectoryError(
+            f"{PurePath(name).name[:80]} holds no flight.",
+            hint="A .log file goes with Paparazzi's .data file of the same name: choose both.",
+            problems=(Problem("file", "is a companion, not a record"),),
+        )
     expected = next((reader for reader in READERS if reader.suffix == suffix), None)
     if expected is not None:
         raise TrajectoryError(

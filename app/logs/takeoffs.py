@@ -105,7 +105,7 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
     for stood, down in _flights(time_s, altitude_m, [landing.time_s for landing in log.landings]):
         begin, is_commanded = _beginning(log, float(time_s[stood]), free_from_s)
         held = _Held(log, begin.time_s)
-        kept, end = _kept(log, time_s, begin, held, Moment(float(time_s[down]), ""))
+        kept, end = _kept(log, time_s, begin, held, stood, down)
         if kept.stop - kept.start >= MIN_SAMPLES:
             ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
             record = _Record(log, begin, end, is_commanded, ground_m, held)
@@ -205,13 +205,17 @@ def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[Mome
     return min(commands, key=lambda start: start.time_s), True
 
 
-def _kept(
-    log: FlightLog, time_s: Samples, begin: Moment, held: "_Held", down: Moment
-) -> tuple[slice, Moment]:
-    """Which samples make the record, and what ends it; nothing in words where that is the landing or the log's end."""
-    ends = (moment for moment in (*log.ends, *held.changes) if moment.time_s > begin.time_s)
+def _kept(log: FlightLog, time_s: Samples, begin: Moment, held: "_Held", stood: int, down: int) -> tuple[slice, Moment]:
+    """Which samples make the record, and what ends it; nothing in words where that is the landing or the log's end.
+
+    Commands that end a flight can do so only in the air: what a heartbeat tells of a mode may be a second old.
+    """
+    off_s = max(begin.time_s, float(time_s[stood]))
+    ends = [moment for moment in log.ends if moment.time_s > off_s]
+    changes = [moment for moment in held.changes if moment.time_s > begin.time_s]
     too_long = Moment(begin.time_s + LONGEST_S, "the longest record that is kept")
-    end = min((*ends, down, too_long), key=lambda moment: moment.time_s)
+    landing = Moment(float(time_s[down]), "")
+    end = min((*ends, *changes, landing, too_long), key=lambda moment: moment.time_s)
     first, past = _between(time_s, begin.time_s - _BEFORE_S, end.time_s)
     return slice(first, min(past, first + MAX_SAMPLES)), end
 

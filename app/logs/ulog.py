@@ -94,7 +94,7 @@ class _Sieve:
 
     def sift(self, data: Contents) -> None:
         """Go through all messages; after damage, on from the next mark that the logger sets for that."""
-        self.kept += data[:_HEADER_BYTES]
+        self.kept += _MAGIC + b"\x01" + data[len(_MAGIC) + 1 : _HEADER_BYTES]
         position, size = _HEADER_BYTES, len(data)
         while position + 3 <= size:
             length, kind = data[position] | data[position + 1] << 8, data[position + 2]

@@ -104,6 +104,11 @@ def test_a_file_that_is_not_what_its_name_says_is_refused_by_its_name(suffix: st
             read_takeoffs(io.BytesIO(content), name=f"flight{suffix}")
 
 
+def test_a_companion_without_its_record_is_refused_as_such() -> None:
+    with pytest.raises(TrajectoryError, match=r"flight\.log holds no flight\. .*choose both"):
+        read_takeoffs(io.BytesIO(COMPANION.encode()), name="flight.log")
+
+
 def test_the_content_decides_whatever_the_name_is() -> None:
     assert read_takeoffs(io.BytesIO(recorded("arducopter_takeoff.bin")), name="flight.csv")[0].gains
 

@@ -141,6 +141,23 @@ def test_other_autopilots_begin_with_the_command_that_they_accepted(
     assert any("altitude counted from the ground" in note for note in flown.notes)
 
 
+def test_a_mode_that_a_heartbeat_tells_after_the_command_does_not_end_the_flight() -> None:
+    log = Telemetry(ardupilotmega, autopilot=3)
+    log.heartbeat(mode=0)
+    log.fly(1.0, to_m=0.0)
+    log.ground("command_long", 31, 1, 176, 0, 1, 4, 0, 0, 0, 0, 0)
+    log.ground("command_long", 31, 1, 22, 0, 0, 0, 0, 0, 0, 0, 3.0)
+    log.fly(0.5, to_m=0.0)
+    log.heartbeat(mode=4)
+    log.fly(2.0, to_m=0.0)
+    log.fly(5.0, to_m=3.0)
+    log.heartbeat(mode=9)
+    log.fly(5.0, to_m=0.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.trajectory.time_s[-1] == pytest.approx(7.5, abs=0.03)
+    assert "ends after 7.5 s with mode 9" in flown.notes
+
+
 def test_gains_of_an_ardupilot_of_either_age_keep_its_own_names() -> None:
     for names in (
         ("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D"),
