@@ -4,6 +4,7 @@ They are not replicas: the loops have the shape of the real ones (altitude, clim
 act in the same places and units, but filters, limits and the shaping of set points are simplified.
 """
 
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from app.core.plants.vertical import GRAVITY_M_S2
@@ -18,6 +19,15 @@ _LARGEST_INTEGRAL: Final = 0.3
 _ACCELERATION_FILTER_S: Final = 0.02
 
 
+@dataclass(frozen=True, slots=True)
+class SetPoint:
+    """Where the vehicle should be, and how that moves; up."""
+
+    altitude_m: float
+    climb_m_s: float = 0.0
+    acceleration_m_s2: float = 0.0
+
+
 class Cascade(Protocol):
     """An altitude controller, asked once a tick."""
 
@@ -25,8 +35,8 @@ class Cascade(Protocol):
         """Forget the past: the vehicle stands on the ground."""
         ...
 
-    def thrust(self, target_m: float, target_m_s: float, altitude_m: float, climb_m_s: float) -> float:
-        """The thrust, a share of full, that leads to a set point moving at `target_m_s`."""
+    def thrust(self, target: SetPoint, altitude_m: float, climb_m_s: float) -> float:
+        """The thrust, a share of full, that leads to the set point."""
         ...
 
 
@@ -41,10 +51,10 @@ class ThreeStage:
         self._integral = self._acceleration = self._error = 0.0
         self._climb: float | None = None
 
-    def thrust(self, target_m: float, target_m_s: float, altitude_m: float, climb_m_s: float) -> float:
+    def thrust(self, target: SetPoint, altitude_m: float, climb_m_s: float) -> float:
         self._sense(climb_m_s)
-        speed = _limit(target_m_s + self.altitude_p * (target_m - altitude_m), _FASTEST_M_S)
-        wanted = _limit(self.climb_p * (speed - climb_m_s), _STRONGEST_M_S2)
+        speed = _limit(target.climb_m_s + self.altitude_p * (target.altitude_m - altitude_m), _FASTEST_M_S)
+        wanted = _limit(target.acceleration_m_s2 + self.climb_p * (speed - climb_m_s), _STRONGEST_M_S2)
         error = wanted - self._acceleration
         self._integral = _limit(self._integral + 0.1 * self.acceleration_i * error * TICK_S, _LARGEST_INTEGRAL)
         change = (error - self._error) / TICK_S
@@ -70,14 +80,15 @@ class TwoStage:
         self._integral = self._slope = 0.0
         self._climb: float | None = None
 
-    def thrust(self, target_m: float, target_m_s: float, altitude_m: float, climb_m_s: float) -> float:
+    def thrust(self, target: SetPoint, altitude_m: float, climb_m_s: float) -> float:
         before = climb_m_s if self._climb is None else self._climb
         self._slope += TICK_S / (TICK_S + _ACCELERATION_FILTER_S) * ((climb_m_s - before) / TICK_S - self._slope)
         self._climb = climb_m_s
-        error = _limit(target_m_s + self.altitude_p * (target_m - altitude_m), _FASTEST_M_S) - climb_m_s
+        speed = _limit(target.climb_m_s + self.altitude_p * (target.altitude_m - altitude_m), _FASTEST_M_S)
+        error = speed - climb_m_s
         most = _LARGEST_INTEGRAL * GRAVITY_M_S2 / HOVER_THRUST
         self._integral = _limit(self._integral + self.climb_i * error * TICK_S, most)
-        acceleration = self.climb_p * error + self._integral - self.climb_d * self._slope
+        acceleration = target.acceleration_m_s2 + self.climb_p * error + self._integral - self.climb_d * self._slope
         return HOVER_THRUST * (1.0 + _limit(acceleration, _STRONGEST_M_S2) / GRAVITY_M_S2)
 
 

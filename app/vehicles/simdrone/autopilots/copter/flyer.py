@@ -4,7 +4,7 @@ import math
 from enum import Enum
 from typing import Final
 
-from app.vehicles.simdrone.autopilots.copter.cascade import Cascade
+from app.vehicles.simdrone.autopilots.copter.cascade import Cascade, SetPoint
 from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, throttle_command
 
 _LANDED_AFTER_S: Final = 1.0
@@ -74,34 +74,34 @@ class Flyer:
         if self.phase is Phase.IDLE:
             self._body.advance(TICK_STEPS, MOTORS_OFF)
             return
-        speed_m_s = self._move_set_point()
-        body = self._body
-        thrust = self._cascade.thrust(self._target_m, speed_m_s, body.altitude_m, body.climb_rate_m_s)
+        target, body = self._set_point(), self._body
+        thrust = self._cascade.thrust(target, body.altitude_m, body.climb_rate_m_s)
         body.advance(TICK_STEPS, throttle_command(thrust))
         if self.phase is Phase.LANDING:
             self._standing_s = max(self._standing_s + (TICK_S if body.stands else -TICK_S), 0.0)
             if self._standing_s >= _LANDED_AFTER_S:
                 self.stop()
 
-    def _climb_on(self, left_m: float) -> float:
-        """Gather speed, and shed it in time for the goal."""
-        if left_m <= _THERE_M:
-            self._target_m = self._goal_m
-            self.phase = Phase.HOLDING
-            return 0.0
-        in_time_m_s = math.sqrt(2.0 * _GENTLE_M_S2 * left_m)
-        self._speed_m_s = min(self._speed_m_s + _GENTLE_M_S2 * TICK_S, self._most_m_s, in_time_m_s)
-        self._target_m += self._speed_m_s * TICK_S
-        return self._speed_m_s
-
-    def _move_set_point(self) -> float:
-        """Its speed."""
+    def _set_point(self) -> SetPoint:
+        """The one of this tick."""
         match self.phase:
             case Phase.CLIMBING:
                 return self._climb_on(self._goal_m - self._target_m)
             case Phase.LANDING:
                 deepest_m = self._body.altitude_m - _DEEPEST_SET_POINT_M
                 self._target_m = max(self._target_m - self._speed_m_s * TICK_S, deepest_m)
-                return -self._speed_m_s
+                return SetPoint(self._target_m, -self._speed_m_s)
             case _:
-                return 0.0
+                return SetPoint(self._target_m)
+
+    def _climb_on(self, left_m: float) -> SetPoint:
+        """Gather speed, and shed it in time for the goal."""
+        if left_m <= _THERE_M:
+            self._target_m = self._goal_m
+            self.phase = Phase.HOLDING
+            return SetPoint(self._target_m)
+        before_m_s = self._speed_m_s
+        in_time_m_s = math.sqrt(2.0 * _GENTLE_M_S2 * left_m)
+        self._speed_m_s = min(before_m_s + _GENTLE_M_S2 * TICK_S, self._most_m_s, in_time_m_s)
+        self._target_m += self._speed_m_s * TICK_S
+        return SetPoint(self._target_m, self._speed_m_s, (self._speed_m_s - before_m_s) / TICK_S)
