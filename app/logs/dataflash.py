@@ -210,7 +210,8 @@ def _numbers(column: NDArray[np.generic]) -> Samples:
     """As floats; NaN where a damaged description made texts of them."""
     if column.ndim != 1 or column.dtype.kind not in "iuf":
         return np.full(len(column), np.nan)
-    return column.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a damaged number may be a signalling NaN
+        return column.astype(np.float64)
 
 
 def _seconds(table: Table) -> Samples:

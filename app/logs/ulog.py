@@ -242,7 +242,8 @@ def _rows(topics: Mapping[str, Topic], topic: str, *names: str) -> Iterator[tupl
 
 
 def _numbers(column: NDArray[np.generic]) -> Samples:
-    return column.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a damaged number may be a signalling NaN
+        return column.astype(np.float64)
 
 
 def _seconds(table: Topic) -> Samples:
