@@ -12,9 +12,9 @@ RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
 """A sample older than this says nothing about where the vehicle is now."""
 
-_SILENT_S: Final = 1.0
 _HEARTBEATS_MISSED: Final = 3.5
-_STUCK_S: Final = 0.25
+_ATTENDED_S: Final = 0.1
+"""The most that one packet tells of the time before it: what a stall delayed may come in any order."""
 _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
@@ -28,11 +28,13 @@ _REBOOT_S: Final = 1.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it;
-    modes are as `Heartbeat` names them, empty where any will do."""
+    modes are as `Heartbeat` names them, empty where any will do; heartbeats come every `heartbeat_s`."""
 
     set_point_m: float
     heartbeat_s: float
     min_battery_v: float
+    silent_s: float = 1.0
+    stuck_s: float = 0.25
     ceiling_m: float = 4.5
     radius_m: float = 5.0
     climb_rate_m_s: float = 4.0
@@ -40,6 +42,15 @@ class Limits:
     crossings: int = 4
     flying_modes: frozenset[str] = frozenset()
     landing_modes: frozenset[str] = frozenset()
+
+    def stretched(self, patience: float) -> "Limits":
+        """The same with so many times the patience for packets that do not come."""
+        return replace(
+            self,
+            heartbeat_s=self.heartbeat_s * patience,
+            silent_s=self.silent_s * patience,
+            stuck_s=self.stuck_s * patience,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +72,7 @@ class Watch:
     battery_s: float
     battery_v: float | None = None
     low_since_s: float | None = None
-    stuck_since_s: float | None = None
+    stuck_s: float = 0.0
     last: Position | None = None
     origin: Position | None = None
     doubted: Position | None = None
@@ -92,7 +103,8 @@ def hear(
     watch: Watch, measurement: Measurement | None, now_s: float, limits: Limits
 ) -> tuple[Watch, tuple[Position, ...]]:
     """The memory after one packet (None: one that measures nothing), and the positions that it makes certain."""
-    watch = replace(watch, heard_s=now_s)
+    stuck_s = watch.stuck_s + min(now_s - watch.heard_s, _ATTENDED_S)
+    watch = replace(watch, heard_s=now_s, stuck_s=stuck_s)
     match measurement:
         case Position():
             return _hear_position(watch, measurement, now_s, limits)
@@ -106,14 +118,14 @@ def hear(
             watch = replace(watch, breached=True)
         case _:
             pass
-    return _stuck(watch, now_s), ()
+    return watch, ()
 
 
 def find_on_ground(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
     """The gravest limit that a vehicle does not keep that has not been told to take off."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
-    return find_link(watch, limits, now_s) or find_frozen(watch) or find_battery(watch, now_s)
+    return find_link(watch, limits, now_s) or find_frozen(watch, limits) or find_battery(watch, now_s)
 
 
 def too_many_glitches(watch: Watch) -> bool:
@@ -146,8 +158,8 @@ def _hear_position(
     newest = watch.doubted or watch.last
     if newest is not None and position.time_boot_s <= newest.time_boot_s:
         rebooted = position.time_boot_s < newest.time_boot_s - _REBOOT_S
-        return _stuck(replace(watch, rebooted=watch.rebooted or rebooted), now_s), ()
-    watch = replace(watch, advanced_s=now_s, stuck_since_s=None)
+        return replace(watch, rebooted=watch.rebooted or rebooted), ()
+    watch = replace(watch, advanced_s=now_s, stuck_s=0.0)
     if watch.last is None or _follows(watch.last, position):
         lone = watch.doubted is not None
         watch = replace(watch, doubted=None, glitches=watch.glitches + lone)
@@ -175,10 +187,6 @@ def _accept(watch: Watch, position: Position, limits: Limits) -> Watch:
     return replace(watch, last=position, origin=watch.origin or position, side=side, crossings=crossed)
 
 
-def _stuck(watch: Watch, now_s: float) -> Watch:
-    return watch if watch.stuck_since_s is not None else replace(watch, stuck_since_s=now_s)
-
-
 def find_unexpected(watch: Watch, modes: frozenset[str]) -> Finding | None:
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
@@ -190,8 +198,8 @@ def find_unexpected(watch: Watch, modes: frozenset[str]) -> Finding | None:
 
 
 def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
-    if now_s - watch.heard_s > _SILENT_S:
-        return Finding(failure=Failure.LINK, why=f"Nothing was heard for {_SILENT_S:g} s.")
+    if now_s - watch.heard_s > limits.silent_s:
+        return Finding(failure=Failure.LINK, why=f"Nothing was heard for {limits.silent_s:g} s.")
     if now_s - watch.heartbeat_s > _HEARTBEATS_MISSED * limits.heartbeat_s:
         return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
     return None
@@ -215,10 +223,10 @@ def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bo
     return Finding(failure=Failure.ENVELOPE, why=why) if why else None
 
 
-def find_frozen(watch: Watch) -> Finding | None:
-    if watch.stuck_since_s is None or watch.heard_s - watch.stuck_since_s <= _STUCK_S:
+def find_frozen(watch: Watch, limits: Limits) -> Finding | None:
+    if watch.stuck_s <= limits.stuck_s:
         return None
-    return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {_STUCK_S:g} s.")
+    return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
 
 
 def find_battery(watch: Watch, now_s: float) -> Finding | None:

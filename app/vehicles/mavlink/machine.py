@@ -197,8 +197,7 @@ def _landing(trial: Trial, event: Event) -> Step:
         return _disarm(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
         return _quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
-    is_down = trial.resting_since_s is not None or _descends(trial, now_s)
-    if now_s - trial.repeated_s >= REPEAT_S and not is_down:
+    if now_s - trial.repeated_s >= REPEAT_S and not _obeys(trial, now_s):
         return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
     return trial, ()
 
@@ -279,7 +278,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
         watching.find_unexpected(watch, _modes(trial))
         or watching.find_link(watch, plan.limits, now_s)
         or watching.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
-        or watching.find_frozen(watch)
+        or watching.find_frozen(watch, plan.limits)
         or watching.find_battery(watch, now_s)
     )
 
@@ -392,10 +391,13 @@ def _quarantine(trial: Trial, why: str, now_s: float) -> Step:
     return replace(_enter(trial, State.QUARANTINE, now_s), why=whole), ()
 
 
-def _descends(trial: Trial, now_s: float) -> bool:
-    """Whether the vehicle's telemetry agrees that it is landing."""
+def _obeys(trial: Trial, now_s: float) -> bool:
+    """Whether the vehicle's telemetry agrees that it is landing: it descends, or is near the ground."""
     last = trial.watch.last
-    return last is not None and watching.is_fresh(trial.watch, now_s) and last.climb_rate_m_s < _DESCENDING_M_S
+    if last is None or not watching.is_fresh(trial.watch, now_s):
+        return False
+    near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    return near or last.climb_rate_m_s < _DESCENDING_M_S
 
 
 _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {

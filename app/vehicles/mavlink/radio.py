@@ -41,13 +41,14 @@ class Seen:
 
 
 class Radio:
-    """A link with a profile. For one thread."""
+    """A link with a profile; an answer is waited for `patience_s`. For one thread."""
 
-    def __init__(self, link: Link, profile: Profile, clock: Clock, aim: Aim) -> None:
+    def __init__(self, link: Link, profile: Profile, clock: Clock, aim: Aim, *, patience_s: float = PATIENCE_S) -> None:
         self.link: Final = link
         self.profile: Final = profile
         self.clock: Final = clock
         self.aim = aim
+        self.patience_s: Final = patience_s
         self.seen: Final = Seen()
 
     def send(self, *messages: Outgoing) -> None:
@@ -72,7 +73,7 @@ class Radio:
         self.listen(0.0)
         for _ in range(attempts):
             self.send(request)
-            until_s = self.clock.now_s() + PATIENCE_S
+            until_s = self.clock.now_s() + self.patience_s
             while (left_s := until_s - self.clock.now_s()) > 0.0:
                 for heard in self.listen(left_s):
                     if heard.measurement is not None and fits(heard.measurement):
@@ -83,7 +84,7 @@ class Radio:
         """Carry out steps on the ground, waiting for them; why they were refused, or nothing. Raises LinkError."""
         conversation = Conversation(Action.ARM, steps, self)
         while True:
-            ended = conversation.proceed(self.listen(PATIENCE_S / 10.0))
+            ended = conversation.proceed(self.listen(self.patience_s / 10.0))
             if ended is not None:
                 return ended.why if isinstance(ended, Refused) else ""
 
@@ -110,7 +111,7 @@ class Conversation:
             self._next()
         if not self._steps:
             return Done(self._action, now_s)
-        if self._steps[0].awaits and now_s - self._sent_s >= PATIENCE_S:
+        if self._steps[0].awaits and now_s - self._sent_s >= self._radio.patience_s:
             if self._attempts >= self._steps[0].attempts:
                 return None if self._steps[0].attempts == 1 else self._unanswered()
             self._send()

@@ -16,12 +16,13 @@ from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, limits, parameters, preflight
 from app.vehicles.mavlink.clock import Clock, ScaledClock
 from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.machine import Plan, Trial
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Aim
-from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.radio import PATIENCE_S, Radio
 from app.vehicles.mavlink.signals import Keep
 from app.vehicles.mavlink.states import MOVES, State
 from app.vehicles.mavlink.trial import Flight, Flown, channels_of
@@ -29,6 +30,10 @@ from app.vehicles.mavlink.trial import Flight, Flown, channels_of
 TAKEOFF_ALTITUDE_M: Final = 3.0
 STAND_S: Final = 1.0
 """Watched once more before arming, for between staging and flying a person may have taken his time."""
+
+HASTE: Final = 4.0
+"""Up to this speed of its clock a simulated vehicle is waited for as a real one is. Beyond, waiting for packets takes
+longer by its time, because a busy computer's pauses are on the wall."""
 
 ShouldAbort = Callable[[], str | None]
 
@@ -66,7 +71,8 @@ class MavlinkVehicle:
             waypoint=int(options["climb_waypoint"]),
             altitude_m=TAKEOFF_ALTITUDE_M,
         )
-        self._radio = Radio(self._link, profile, clock, aim)
+        self._patience = max(1.0, float(options["clock_speed"]) / HASTE)
+        self._radio = Radio(self._link, profile, clock, aim, patience_s=PATIENCE_S * self._patience)
         try:
             self._meet(safe_gains)
         except BaseException:
@@ -161,14 +167,14 @@ class MavlinkVehicle:
             ground_m=ground.altitude_m,
             datum_m=datum_m,
             lift_off_s=profile.lift_off_s,
-            limits=limits.Limits(
+            limits=Limits(
                 set_point_m=datum_m + TAKEOFF_ALTITUDE_M,
                 heartbeat_s=profile.heartbeat_s,
                 min_battery_v=float(self._options["min_battery_v"]),
                 radius_m=float(self._options["radius_m"]),
                 flying_modes=profile.flying_modes,
                 landing_modes=profile.landing_modes,
-            ),
+            ).stretched(self._patience),
         )
 
     def _restore(self) -> str:
