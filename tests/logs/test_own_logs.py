@@ -1,0 +1,37 @@
+"""A telemetry log that our own vehicle wrote gives the flight back that it recorded."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.logs.readers import read_takeoff
+from app.vehicles.base import FlightOrder
+from tests.vehicles.flying import TAKEOFF, never, unwatched
+from tests.vehicles.mavlink.hangar import SAFE, Hangar
+
+ONE_SAMPLE_M = 0.002
+"""What 20 ms more or less under a set point of 3 m make of the error over 32.6 s: the sample that is in the log before
+the command may not have been looked at by the ground yet when it sent that."""
+
+
+@pytest.mark.parametrize("autopilot", ["paparazzi", "ardupilot", "px4"])
+def test_the_log_of_a_flight_is_the_flight(autopilot: str, tmp_path: Path) -> None:
+    gains = dict(SAFE[autopilot])
+    first = next(iter(gains))
+    gains[first] *= 1.25 if autopilot != "paparazzi" else 2
+    with Hangar(autopilot) as hangar:
+        if autopilot != "paparazzi":
+            hangar.switch_on_failsafes()
+        vehicle = hangar.vehicle(log_folder=str(tmp_path))
+        vehicle.stage(gains)
+        record = vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_abort=never)
+        vehicle.close()
+    [log] = tmp_path.glob("*.tlog")
+    flown = read_takeoff(io.BytesIO(log.read_bytes()))
+    assert flown.gains == pytest.approx(gains)
+    assert TAKEOFF.error(flown.trajectory) == pytest.approx(TAKEOFF.error(record.trajectory), abs=ONE_SAMPLE_M)
+    assert len(flown.trajectory) == pytest.approx(len(record.trajectory), abs=100)
+    altitude_m = np.interp(record.trajectory.time_s, flown.trajectory.time_s, flown.trajectory["altitude_m"])
+    assert np.abs(altitude_m - record.trajectory["altitude_m"]).max() < 0.1
