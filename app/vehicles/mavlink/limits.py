@@ -65,7 +65,6 @@ class Finding:
 class Watch:
     """What was heard so far. Times in s by the ground's clock, apart from those inside a Position."""
 
-    begun_s: float
     heard_s: float
     heartbeat_s: float
     advanced_s: float
@@ -88,7 +87,6 @@ class Watch:
 def begin(now_s: float, *, last: Position | None = None, battery_v: float | None = None) -> Watch:
     """Nothing is late yet. `last` is where the vehicle stands."""
     return Watch(
-        begun_s=now_s,
         heard_s=now_s,
         heartbeat_s=now_s,
         advanced_s=now_s,

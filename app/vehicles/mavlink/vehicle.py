@@ -232,9 +232,14 @@ def _ending(trial: Trial) -> Ending:
 
 
 def _reason(trial: Trial) -> str:
+    """Why the flight ended early or does not count, and what else is to be known of its record."""
     if trial.failure is None or trial.failure is Failure.OPERATOR:
-        return trial.why
-    return f"{RESPONSES[trial.failure].text} {trial.why}"
+        said = trial.why
+    else:
+        said = f"{RESPONSES[trial.failure].text} {trial.why}"
+    dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
+    flag = f"{dropped} of its samples jumped and were dropped." if dropped else ""
+    return " ".join(part for part in (said, flag) if part)
 
 
 def _log_path(folder: str) -> Path | None:

@@ -56,6 +56,7 @@ FAULTS = [
     ("low-battery@3", "invalid", "The battery was at 9.0 V"),
     ("no-lift-off@0", "aborted", "It was still on the ground 1.5 s after the command"),
     ("jumping-position:3@3", "invalid", "samples were dropped"),
+    ("jumping-position:1.2@3", "completed", "of its samples jumped and were dropped."),
     ("duplicated-packets@connect", "completed", ""),
     ("reordered-packets@connect", "completed", ""),
 ]
