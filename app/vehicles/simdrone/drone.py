@@ -48,8 +48,10 @@ class Drone:
         return self._faults.frames([self._packed(letter) for letter in letters])
 
     def reboot(self) -> None:
-        """Start the autopilot anew, in whatever state the body is."""
-        self.autopilot = self._switch_on(self.body)
+        """Start the autopilot anew, in whatever state the body is; what is wrong with it stays wrong."""
+        before, self.autopilot = self.autopilot, self._switch_on(self.body)
+        self.autopilot.refuses_arming = before.refuses_arming
+        self.autopilot.ignores_parameters = before.ignores_parameters
         self._codecs.clear()
         self._silent_until_s = self.time_s + BOOT_S
 

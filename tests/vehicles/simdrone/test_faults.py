@@ -156,6 +156,17 @@ def test_a_reboot_in_the_air_stops_the_motors_forgets_the_gains_and_starts_the_c
     assert held.param_value == 283.0
 
 
+def test_a_reboot_does_not_mend_what_else_is_wrong() -> None:
+    with flying("paparazzi", faults=["param-unconfirmed@connect", "reboot@1"]) as ground:
+        pilot = Pilot(ground)
+        pilot.take_off()
+        ground.listen(max(1.2 - ground.elapsed_s, 0.1))
+        ground.expect("LOCAL_POSITION_NED", lambda message: message.time_boot_ms < 1000, within_s=10.0)
+        ground.listen(1.0)
+        pilot.send_setting("gui_v_kp", 400.0)
+        assert ground.wait_for("PARAM_VALUE", within_s=1.0) is None
+
+
 def test_some_packets_arrive_twice() -> None:
     with flying("paparazzi", faults=["duplicated-packets@connect"]) as ground:
         heard = ground.listen(5.0)
