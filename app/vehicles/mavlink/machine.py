@@ -306,7 +306,9 @@ def _fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     if trial.state is State.ARM:
         return _disarm(trial, now_s)
     reaction = RESPONSES[finding.failure].reaction
-    if trial.state is State.ABORT_LAND and reaction != "cease":
+    if reaction == "cease":
+        return _quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
+    if trial.state is State.ABORT_LAND:
         return _save(trial, now_s) if finding.failure in SUSPECT and trial.gains_since_s is None else (trial, ())
     return _REACTIONS[reaction](trial, now_s)
 
@@ -319,10 +321,6 @@ def _give_up_take_off(trial: Trial, now_s: float) -> Step:
     """Motors off where it is on the ground by height and speed. In the air its integrator is wound up."""
     grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
     return _disarm(trial, now_s) if grounded else _abort(trial, now_s)
-
-
-def _cease(trial: Trial, now_s: float) -> Step:
-    return _quarantine(trial, "", now_s)
 
 
 def _abort_landing(trial: Trial, now_s: float) -> Step:
@@ -405,6 +403,5 @@ _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
     "land": _abort_landing,
     "repeat land": _lose_link,
     "disarm": _give_up_take_off,
-    "cease": _cease,
 }
-"""By what the failure's row in the table says, for a vehicle that has been told to take off."""
+"""By what the failure's row in the table says, for a vehicle that has been told to take off and obeys."""

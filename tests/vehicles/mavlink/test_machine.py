@@ -366,6 +366,15 @@ def test_safe_gains_that_cannot_be_verified_quarantine_the_vehicle() -> None:
     assert "Its safe gains could not be verified: it holds" in walk.trial.why
 
 
+def test_a_quarantine_tells_what_came_later_too() -> None:
+    walk = aborting()
+    reboot(walk)
+    assert walk.trial.why == "The battery was at 10.0 V. The vehicle rebooted."
+    walk = recording()
+    reboot(walk)
+    assert walk.trial.why == "The vehicle rebooted."
+
+
 def test_after_something_unexpected_nothing_more_is_sent() -> None:
     walk = recording()
     told = len(walk.told)
