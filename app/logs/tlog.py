@@ -43,20 +43,22 @@ _HINT: Final = (
 class _Message(Protocol):
     """What pymavlink decodes: fields are attributes of the names in the dialect's definition."""
 
-    def get_type(self) -> str: ...
     def get_srcSystem(self) -> int: ...  # noqa: N802 - pymavlink's name
     def __getattr__(self, name: str) -> float | int | str: ...
 
 
 @dataclass(frozen=True, slots=True)
 class _Autopilot:
-    """What differs between autopilots. `parameters` maps their names to those of the gains."""
+    """What differs between autopilots. `parameters` maps their names to those of the gains, which some keep as whole
+    numbers only; some have a mode that takes off."""
 
     title: str
     dialect: ModuleType
     gain_sets: Sequence[Sequence[str]]
     parameters: Mapping[str, str]
     from_ground: bool
+    keeps_whole_numbers: bool = False
+    has_takeoff_mode: bool = False
 
 
 def _own_names(sets: Sequence[Sequence[str]]) -> Mapping[str, str]:
@@ -65,9 +67,9 @@ def _own_names(sets: Sequence[Sequence[str]]) -> Mapping[str, str]:
 
 _AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
     {
-        9: _Autopilot("Paparazzi", paparazzi, PAPARAZZI_SETS, PAPARAZZI, from_ground=False),
+        9: _Autopilot("Paparazzi", paparazzi, PAPARAZZI_SETS, PAPARAZZI, from_ground=False, keeps_whole_numbers=True),
         3: _Autopilot("ArduPilot", ardupilotmega, ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
-        12: _Autopilot("PX4", common, PX4_SETS, _own_names(PX4_SETS), from_ground=True),
+        12: _Autopilot("PX4", common, PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
     }
 )
 """By the number in their heartbeat. Paparazzi flies to altitudes above its local origin, others above the ground."""
@@ -285,7 +287,7 @@ class _Conversation:
 
     def _mode_changed(self, mode: int) -> None:
         main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
-        if self.autopilot.title == "PX4" and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
+        if self.autopilot.has_takeoff_mode and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
             if sub == _PX4_TAKEOFF_MODE:
                 self._starts.append(Moment(self._now_s, "takeoff mode"))
             return
@@ -315,15 +317,15 @@ class _Conversation:
     def _parameter_asked(self, message: _Message) -> None:
         name, value = str(message.param_id), float(message.param_value)
         if name in self.autopilot.parameters and not self._is_vehicle(message) and np.isfinite(value):
-            whole = self.autopilot.dialect is paparazzi  # it keeps the integer part
-            self._asked[self.autopilot.parameters[name]] = float(int(value)) if whole else value
+            kept = float(int(value)) if self.autopilot.keeps_whole_numbers else value
+            self._asked[self.autopilot.parameters[name]] = kept
 
     def _command(self, message: _Message) -> None:
         if self._is_vehicle(message):
             return
         number = int(message.command)
         takeoff = number == _TAKEOFF or (
-            number == _SET_MODE and self.autopilot.title == "PX4" and message.param3 == _PX4_TAKEOFF_MODE
+            number == _SET_MODE and self.autopilot.has_takeoff_mode and message.param3 == _PX4_TAKEOFF_MODE
         )
         lands = number == _LAND or (number == _MOTORS and not message.param1)
         if takeoff:
