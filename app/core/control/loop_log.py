@@ -156,12 +156,12 @@ def infer_gains(log: LoopLog) -> dict[str, float] | None:
     Least squares on the three errors come close. None where the flight cannot tell neighbouring gains apart.
     """
     active = np.flatnonzero(~log.idle)
+    if len(active) < _FEWEST_TO_INFER:
+        return None
     active = active[:: max(1, len(active) // _MOST_TO_INFER)]
     sample = LoopLog(log.time_s[active], log.values[active])
     ez, ev = _errors(sample)
     parts = np.column_stack([-ez / 2**7, -sample["z_sum_err"] / 2**16, -ev / 2**16, np.ones(len(sample))])
-    if len(sample) < _FEWEST_TO_INFER:
-        return None
     fitted = np.linalg.lstsq(parts, sample["fb_cmd"].astype(np.float64), rcond=None)[0][:3]
     if not (np.abs(fitted) < 2**20).all():
         return None
@@ -292,22 +292,23 @@ def _outside(logged: Counts, simulated: Counts, steps: NDArray[np.int64]) -> Cou
 
 
 def _integrator_difference(part: LoopLog, z_ref: Counts, steps: NDArray[np.int64]) -> float:
-    """The largest difference of the summed error as a share of its range, from the first sample on where it works; the
-    position between the samples follows from their positions and speeds."""
-    working = np.flatnonzero(part["z_sum_err"][1:] != 0)
-    if len(working) < 2:
+    """The largest difference of the summed error as a share of its range, from the first sample on where it works, 0
+    where it never does; the position between the samples follows from their positions and speeds. Of samples in the
+    same step the first one counts."""
+    working = np.flatnonzero(part["z_sum_err"][1:])
+    begin = int(working[0]) if working.size else len(steps)
+    since, first = np.unique(steps[begin:], return_index=True)
+    if len(since) < 2:
         return 0.0
-    since, at = steps[working[0] :], working[0] + 1
-    if (np.diff(since) <= 0).any():
-        return 0.0
-    position = CubicHermiteSpline(since, part["z"][at:], part["zd"][at:] / 2**20)
+    rows = begin + 1 + first
+    position = CubicHermiteSpline(since, part["z"][rows], part["zd"][rows] / 2**20)
     each = np.arange(since[0], since[-1] + 1)
     error = np.clip(z_ref[each] - position(each), -loop.POSITION_ERROR_MAX, loop.POSITION_ERROR_MAX)
-    total, start = np.empty(len(each)), float(part["z_sum_err"][at])
+    logged = part["z_sum_err"][rows]
+    total, start = np.empty(len(each)), float(logged[0])
     for step, value in enumerate(error.tolist()):
         if step:
             start = min(max(start + value, -loop.ERROR_SUM_MAX), loop.ERROR_SUM_MAX)
         total[step] = start
-    logged = part["z_sum_err"][at:]
     largest = max(float(np.abs(logged).max()), 1.0)
     return float(np.abs(logged - total[since - since[0]]).max()) / largest

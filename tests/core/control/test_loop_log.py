@@ -97,7 +97,39 @@ def test_a_log_that_begins_in_the_air_is_not_simulated() -> None:
     assert check_simulation(LoopLog(log.time_s[flying], log.values[flying])) is None
 
 
+def test_the_integrator_is_held_against_a_log_that_says_a_step_twice_too() -> None:
+    log = log_of(Flight(DEFAULT))
+    rows = np.sort(np.append(np.arange(len(log)), 300))
+    time_s = log.time_s[rows]
+    time_s[301] += 1e-5
+    twice = LoopLog(time_s, log.values[rows])
+    checked, other = (check_simulation(each) for each in (twice, changed(twice, "z_sum_err", slice(400, 500), 40_000)))
+    assert checked is not None
+    assert checked.largest_difference["z_sum_err"] < 0.001
+    assert other is not None
+    assert not other.passed
+
+
+def test_an_integrator_that_never_works_has_nothing_to_be_compared() -> None:
+    """A vehicle that does not notice that it flies."""
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    values = log.values.copy()
+    values[:, FIELDS.index("z_sum_err")] = 0
+    checked = check_simulation(LoopLog(log.time_s, values))
+    assert checked is not None
+    assert checked.largest_difference["z_sum_err"] == 0.0
+
+
 def test_a_flight_too_calm_to_tell_gains_apart_tells_none() -> None:
     log = log_of(Flight(DEFAULT))
     hover = log.time_s > 40.0
     assert infer_gains(LoopLog(log.time_s[hover], log.values[hover])) is None
+
+
+def test_neither_do_a_handful_of_samples_or_commands_beyond_any_gains() -> None:
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    first = int(np.flatnonzero(~log.idle)[0])
+    assert infer_gains(LoopLog(log.time_s[: first + 19], log.values[: first + 19])) is None
+    values = log.values.copy()
+    values[:, FIELDS.index("fb_cmd")] *= 2**16
+    assert infer_gains(LoopLog(log.time_s, values)) is None
