@@ -40,8 +40,6 @@ class _Choice:
     kind: Kind
     gains: Vector
     optimum: Vector
-    now: float
-    then: float
     notes: tuple[str, ...] = ()
 
 
@@ -97,7 +95,7 @@ def _choose(
     optimum = best_in(takeoff, box, models, here[np.newaxis])
     now, then = merit(takeoff, np.stack((here, optimum)), models).tolist()
     if then > (1.0 - WORTH) * now and was_flown(space.mapping(here), flights):
-        return _Choice("none", here, optimum, now, then)
+        return _Choice("none", here, optimum)
     for halvings in range(_HALVINGS):
         gains = box.nearest(here + (optimum - here) / 2**halvings)
         if was_flown(space.mapping(gains), [flight for flight in flights if flight.outcome == "valid"]):
@@ -106,12 +104,11 @@ def _choose(
             continue
         if may_fly(definition, takeoff, gains, calibration.spread()):
             if halvings == 0:
-                return _Choice("step", gains, optimum, now, then)
+                return _Choice("step", gains, optimum)
             note = f"The whole step, to {describe(space.mapping(optimum))}, was aborted before or the gate refuses it."
-            promised = float(merit(takeoff, gains[np.newaxis], models)[0])
-            return _Choice("shorter step", gains, optimum, now, promised, (note,))
+            return _Choice("shorter step", gains, optimum, (note,))
     note = f"Every step towards {describe(space.mapping(optimum))} was flown before or is refused by the gate."
-    return _Choice("none", here, optimum, now, then, (note,))
+    return _Choice("none", here, optimum, (note,))
 
 
 def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
