@@ -90,7 +90,7 @@ def fly_campaign(
         overruled = _require_flyable(definition, experiment, proposal, history, overrule, is_real)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
-        battery_v = landing_battery_v(record.trajectory)
+        battery_v = landing_battery_v(record.trajectory.as_stored())
         trial = _assess(experiment, number, proposal, record, overruled)
         trials.append(trial)
         watcher.landed(trial)

@@ -174,18 +174,10 @@ def _set_up(gains: Counts, models: Samples, runs: Samples, whole: Counts) -> Non
 
 
 @kernel
-def _take_step(
-    runs: Samples,
-    lanes: int,
-    heights: Samples,
-    climbs: Samples,
-    now: int,
-    seconds: float,
-    position: float,
-    speed: float,
-    feed_forward: float,
-) -> None:
-    """One step of the loop and of the model for each run: `vertical_loop.step` in doubles, then `advance`."""
+def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, guide: Samples, i: int) -> None:
+    """Step i of the loop and of the model for each run: `vertical_loop.step` in doubles, then `advance`."""
+    now, seconds = (i & (PAST - 1)) * LANES, i * STEP_S
+    position, speed, feed_forward = guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i]
     for lane in range(lanes):
         part, late, late_climb = runs[_PART + lane], heights[now + lane], climbs[now + lane]
         sensed = (1.0 - part) * late + part * runs[_HEIGHT_BEFORE + lane]
@@ -237,9 +229,7 @@ def _fly_lanes(gains: Counts, models: Samples, guide: Samples, altitude: Samples
             for lane in range(lanes):
                 states[lane, CHECK_PHASE] = RATE_HZ
                 runs[_IN_FLIGHT + lane] = 1.0 if detect_flight(states[lane], int(runs[_COMMAND + lane])) else 0.0
-        now = (i & (PAST - 1)) * LANES
-        position, speed, feed_forward = guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i]
-        _take_step(runs, lanes, heights, climbs, now, i * STEP_S, position, speed, feed_forward)
+        _take_step(runs, lanes, heights, climbs, guide, i)
         for lane in range(wanted):
             altitude[lane, i] = runs[_SENSED + lane]
     for lane in range(wanted):
