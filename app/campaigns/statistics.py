@@ -17,7 +17,7 @@ from app.campaigns.schemas import (
     TrackRecord,
     Trend,
 )
-from app.core.confirming import Standing, standing, verdict_sentence
+from app.core.confirming import Standing, contest, standing, verdict_sentence
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.predictions import TrackRecord as Record
@@ -62,6 +62,11 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
 def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> Standing | None:
     """Groups, scatter and winner of a campaign; None before its first valid flight."""
     return standing(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
+
+
+def contest_of(row: CampaignRow, trials: Sequence[TrialRow]) -> Standing | None:
+    """The standing among the gains that may be flown again; None before the first valid flight of any."""
+    return contest(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
 
 
 def best_trial(trials: Sequence[TrialRow], now: Standing | None) -> BestTrial | None:

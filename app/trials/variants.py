@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import proposing
 from app.campaigns.definitions import definition_of
-from app.campaigns.statistics import standing_of
+from app.campaigns.statistics import contest_of
 from app.db.models import CampaignRow
 from app.errors import ConflictError
 from app.trials import history
@@ -19,12 +19,14 @@ KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repea
 
 def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[str, float]:
     """`repeat`: the best gains by all their flights; `baseline`: the first flight's; `smaller step`: half way from the
-    best to the present proposal. Raises ConflictError before the first valid flight, and where half a step is none.
+    best to the present proposal. As the advice has it, flights outside the campaign's bounds take no part.
+
+    Raises ConflictError before the first valid flight inside them, and where half a step is none.
     """
-    now = standing_of(campaign, history.trials_of(session, campaign.id))
+    now = contest_of(campaign, history.trials_of(session, campaign.id))
     if now is None:
         raise ConflictError(
-            f"Campaign {campaign.id} has no valid flight yet, which a {variant} could be measured from.",
+            f"Campaign {campaign.id} has no valid flight inside its bounds yet for a {variant} to be measured from.",
             hint="Fly the first proposal.",
         )
     if variant == "baseline":

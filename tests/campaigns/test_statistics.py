@@ -123,7 +123,7 @@ def test_a_variant_is_computed_from_the_flights(client: TestClient, database: Da
     path = f"/api/campaigns/{campaign['id']}/trials"
     for variant in ("repeat", "baseline", "smaller step"):
         answer = client.post(path, json={"variant": variant})
-        assert (answer.status_code, "no valid flight" in answer.json()["detail"]) == (409, True)
+        assert (answer.status_code, "no valid flight inside its bounds" in answer.json()["detail"]) == (409, True)
     create_trial(client, campaign["id"], fly={"speed": None})
     land(database, lift_off(database), modelled(DEFAULT))
     run_jobs(database)
@@ -141,6 +141,23 @@ def test_a_variant_is_computed_from_the_flights(client: TestClient, database: Da
     assert (again["kind"], again["gains"]) == ("repeat", half["gains"])
     first = client.post(path, json={"variant": "baseline"}).json()
     assert (first["kind"], first["gains"]) == ("baseline", DEFAULT)
+
+
+def test_a_variant_is_what_the_advice_means_where_the_best_gains_are_outside_the_bounds(
+    client: TestClient, database: Database
+) -> None:
+    """They were flown over the gate's refusal, and would be refused again."""
+    stop = {"kind": "budget", "max_flights": 50}
+    definition = {"strategy": "manual", "stop": stop, "bounds": {"ki": [0, 50]}}
+    campaign = create_ready_campaign(client, database, definition=definition)
+    fly(client, database, campaign["id"], 2.0)
+    fly(client, database, campaign["id"], 0.5, gains=OTHER, overrule="To see what lies outside.")
+    best = {"kp": 320, "ki": 20, "kd": 80}
+    fly(client, database, campaign["id"], 1.0, gains=best)
+    assert get(client, f"/api/campaigns/{campaign['id']}")["best"]["gains"] == OTHER
+    for variant, gains in (("repeat", best), ("baseline", DEFAULT)):
+        answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"variant": variant})
+        assert (answer.status_code, answer.json()["gains"]) == (201, gains), answer.text
 
 
 def test_exactly_one_of_proposal_gains_and_variant_is_taken(client: TestClient, database: Database) -> None:
