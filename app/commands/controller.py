@@ -9,7 +9,7 @@ from typing import Final
 from rich.console import Console
 
 from app.commands.console import console, show_error, table, write_json
-from app.core.control.loop_log import (
+from app.core.loop_log import (
     GAINS,
     TIME_TOLERANCE_S,
     TOLERANCES,

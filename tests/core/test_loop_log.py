@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from app.core.control.loop_log import FIELDS, LoopLog, check_commands, check_simulation, infer_gains
+from app.core.loop_log import FIELDS, LoopLog, check_commands, check_simulation, infer_gains
 from app.logs.paparazzi import read_loop_log
 from tests.logs.paparazzi_flights import Flight, data_of
 
