@@ -9,6 +9,7 @@ from typing import Final
 from rich.console import Console
 
 from app.commands.console import console, show_error, table, write_json
+from app.core.control.replay import OUTPUTS, Replay, replay_trace
 from app.core.loop_log import (
     GAINS,
     TIME_TOLERANCE_S,
@@ -20,7 +21,6 @@ from app.core.loop_log import (
     check_simulation,
     infer_gains,
 )
-from app.core.control.replay import OUTPUTS, Replay, replay_trace
 from app.errors import InputError, Problem
 from app.logs.loop_trace import read_loop_trace
 from app.logs.paparazzi import read_loop_log
