@@ -32,7 +32,7 @@ def test_the_live_curve_grows_while_it_flies_and_becomes_the_record(dashboard: D
     wait_for_live(dashboard, 1)
     while not any(trial["state"] == "valid" for trial in dashboard.trials(campaign_id)):
         lengths.append(dashboard.live_points())
-        dashboard.page.wait_for_timeout(200)
+        dashboard.page.wait_for_timeout(50)
     growing = [length for length in lengths if length > 0]
     assert len(set(growing)) >= 4, lengths
     assert growing == sorted(growing)

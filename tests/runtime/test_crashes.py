@@ -80,7 +80,7 @@ def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> Non
     first = Serving(tmp_path / "data")
     campaign_id = first.campaign()
     worker = first.worker_pid()
-    trial_id = in_the_air(first, campaign_id, speed=10.0)
+    trial_id = in_the_air(first, campaign_id, speed=3.0)
     os.kill(first.process.pid, signal.SIGKILL)
     assert first.stop() == -signal.SIGKILL
     with Serving(tmp_path / "data") as second:
