@@ -5,7 +5,7 @@ from app.core.definition import Definition
 from app.core.strategies.bias import corrected_inside_by
 from app.core.strategies.gradient import propose
 from app.core.trajectory import Trajectory
-from tests.core.flying import TAKEOFF, TWIN, fly
+from tests.core.flying import TAKEOFF, TWIN, compiled_only, fly
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
 LATE = (*TWIN[:1], 0.25, *TWIN[2:])
@@ -30,6 +30,7 @@ def test_until_the_flights_first_thrust_nothing_moves() -> None:
     assert outputs[512] > 0.0
 
 
+@compiled_only
 def test_the_gradient_corrects_inside_where_it_is_asked_to_and_can() -> None:
     flight = fly(1, DEFAULT)
     proposal = propose(Definition(options={"bias": "inside"}), TAKEOFF, TAKEOFF.space, [flight])
@@ -37,6 +38,7 @@ def test_the_gradient_corrects_inside_where_it_is_asked_to_and_can() -> None:
     assert any("inside the control loop" in note for note in proposal.explanation.notes)
 
 
+@compiled_only
 def test_without_the_thrust_command_the_correction_stays_outside_and_says_so() -> None:
     flight = fly(1, DEFAULT)
     bare = Trajectory(flight.trajectory.time_s, {"altitude_m": flight.trajectory["altitude_m"]}, "csv", "vehicle")
