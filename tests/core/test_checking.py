@@ -20,6 +20,14 @@ def test_the_default_definition_has_no_problems() -> None:
 @pytest.mark.parametrize(
     ("definition", "field", "reason"),
     [
+        (
+            replace(GOOD, start=Start(kind="given", gains={"kp": 1, "ki": 2, "kd": 3}, donor=4)),
+            "start.donor",
+            "is needed with start.kind 'campaign', and goes with no other",
+        ),
+        (replace(GOOD, ceiling_m=101.0), "ceiling_m", "must lie in 3.2 … 100 m, got 101"),
+        (replace(GOOD, stop=StopRule(confidence=1.0)), "stop.confidence", "must be at least 0.5 and below 1, got 1"),
+        (replace(GOOD, stop=StopRule(min_battery_v=-1.0)), "stop.min_battery_v", "must be above 0 V, got -1"),
         (replace(GOOD, experiment="landing"), "experiment", "must be one of takeoff, pitch-tracking, got 'landing'"),
         (
             replace(GOOD, strategy="luck"),

@@ -200,3 +200,8 @@ def test_experiments_are_found_by_name_and_unknown_ones_are_refused_with_the_cho
     assert get_experiment("takeoff") is EXPERIMENTS["takeoff"]
     with pytest.raises(InputError, match=r"no such experiment.*experiment: unknown name 'landing'.*takeoff"):
         get_experiment("landing")
+
+
+def test_a_takeoff_has_no_settings_and_is_itself_whatever_is_chosen() -> None:
+    experiment = Takeoff()
+    assert experiment.configured({}) is experiment
