@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from app.core.checking import check_definition, problems_of
-from app.core.definition import Definition, Start, StopRule
+from app.core.definition import Definition, Donor, Start, StopRule
 from app.core.errors import InputError
 
 GOOD = Definition()
@@ -21,7 +21,14 @@ def test_the_default_definition_has_no_problems() -> None:
     ("definition", "field", "reason"),
     [
         (
-            replace(GOOD, start=Start(kind="given", gains={"kp": 1, "ki": 2, "kd": 3}, donor=4)),
+            replace(
+                GOOD,
+                start=Start(
+                    kind="given",
+                    gains={"kp": 1, "ki": 2, "kd": 3},
+                    donor=Donor(campaign_id=4, trial_number=1, checksum=""),
+                ),
+            ),
             "start.donor",
             "is needed with start.kind 'campaign', and goes with no other",
         ),
