@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -37,11 +38,15 @@ class Optimum:
 
 def model_optimum(experiment: Experiment, space: PolicySpace, start: Vector) -> Optimum:
     """Nelder–Mead within the bounds, with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's own),
-    first steps and budget the experiment's own; gains are rounded before each run of the model."""
+    first steps and budget the experiment's own; gains are rounded before each run of the model, and run once."""
     model, search = nominal(experiment), experiment.search
 
+    @cache
+    def rounded_error(gains: tuple[float, ...]) -> float:
+        return float(model.errors(np.array(gains)[np.newaxis])[0])
+
     def error(gains: Vector) -> float:
-        return float(model.errors(space.nearest(gains)[np.newaxis])[0])
+        return rounded_error(tuple(space.nearest(gains).tolist()))
 
     course: list[float] = []
 
