@@ -84,7 +84,7 @@ async def _raw(request: Request) -> AsyncIterator[_Arrived]:
         async for chunk in request.stream():
             digest.update(chunk)
             await run_in_threadpool(spool.write, chunk)
-        yield _Arrived(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]
+        yield _Arrived(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]  # it reads and seeks as BinaryIO does
 
 
 @asynccontextmanager
