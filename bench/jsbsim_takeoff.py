@@ -34,7 +34,7 @@ def bare() -> float:
 def takeoff(vehicle: Vehicle) -> float:
     vehicle.stage(GAINS)
     start = time.perf_counter()
-    vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_abort=lambda: None)
+    vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_stop=lambda: None)
     return time.perf_counter() - start
 
 

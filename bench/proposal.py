@@ -62,7 +62,7 @@ def fly(database: Database, campaign_id: int) -> bool:
     assert task is not None
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
         read_back = vehicle.stage(task.gains)
-        record = vehicle.fly(Order(seed=task.seed), on_sample=lambda _: None, should_abort=lambda: None)
+        record = vehicle.fly(Order(seed=task.seed), on_sample=lambda _: None, should_stop=lambda: None)
     with database.write() as session:
         flights.record_staged(session, task.flight_id, read_back)
         flights.record_lift_off(session, task.flight_id)

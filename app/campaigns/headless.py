@@ -170,7 +170,7 @@ def _fly(
                 hint="Read its gains back by hand before flying it again.",
             )
         order = FlightOrder(seed=flight_seed(definition.seed, number))
-        return controlled.fly(order, on_sample=watcher.sampled, should_abort=lambda: None)
+        return controlled.fly(order, on_sample=watcher.sampled, should_stop=lambda: None)
 
 
 def _assess(

@@ -187,7 +187,7 @@ def _flown(table: Table, kind: str) -> Iterator[Takeoff]:
             wanted = dict(zip(experiment.space.names, map(float, published.gains), strict=True))
             overruled = overruled_for(wanted, kind)
             gains = vehicle.stage(wanted)
-            flight = vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_abort=lambda: None).trajectory
+            flight = vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_stop=lambda: None).trajectory
             yield Takeoff(
                 published=published,
                 gains=gains,

@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -22,7 +22,7 @@ from app.core.experiments import get_experiment
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import LockedError, exclusive
 from app.trials.flying import Monitor
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Vehicle
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, ShouldStop, Stop, Vehicle
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import open_vehicle
 
@@ -211,28 +211,28 @@ def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle, standing_down:
     monitor = Monitor(orders.campaign_id, orders.trial_id, get_experiment(orders.experiment), pipe.send)
     monitor.phase("flying")
     listener = _listener(pipe, orders.trial_id, standing_down)
-    record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_abort=listener)
+    record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=listener)
     monitor.flush()
     monitor.phase("landed")
     return record
 
 
-def _listener(pipe: Connection, trial_id: int, standing_down: str | None) -> Callable[[], str | None]:
+def _listener(pipe: Connection, trial_id: int, standing_down: str | None) -> ShouldStop:
     """Looks into the pipe, which takes microseconds, unless the flight is standing down already."""
 
-    def should_abort() -> str | None:
+    def should_stop() -> Stop | None:
         if standing_down is not None:
-            return standing_down
+            return Stop(standing_down)
         try:
             while pipe.poll():
                 message = pipe.recv()
                 if isinstance(message, StandDown) and message.trial_id == trial_id:
-                    return message.reason
+                    return Stop(message.reason)
         except (EOFError, OSError):
-            return "the worker is gone"
+            return Stop("the worker is gone")
         return None
 
-    return should_abort
+    return should_stop
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal, Protocol
 
 from app.core.policy import Gains
@@ -49,6 +50,17 @@ class FlightOrder:
     speed: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """What ends a flight early. `motors_off` stops the motors at once, at any height; without it the vehicle lands."""
+
+    reason: str
+    motors_off: bool = False
+
+
+ShouldStop = Callable[[], Stop | None]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecord:
     """What a flight left: its full-rate trajectory, how it ended, and why when it was cut short."""
@@ -80,14 +92,110 @@ class Vehicle(Protocol):
         """What the vehicle holds now."""
         ...
 
-    def fly(
-        self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: Callable[[], str | None]
-    ) -> FlightRecord:
+    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> FlightRecord:
         """Take off with the staged gains and record until the manoeuvre is over.
 
-        `on_sample` gets telemetry at 50 Hz of vehicle time while it happens; `should_abort` is asked at least as often
-        and returns the reason once an abort is wanted. Raises VehicleError when the flight could not be carried out.
+        `on_sample` gets telemetry at 50 Hz of vehicle time while it happens; `should_stop` is asked at least as often
+        and says so once the flight is to end early. Raises VehicleError when the flight could not be carried out.
         """
         ...
 
     def close(self) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """Who a vehicle is: its MAVLink system id, the make of its autopilot, and what that tells of its version (empty
+    where it does not tell)."""
+
+    system_id: int
+    autopilot: str
+    version: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """How a connected vehicle is now; None and empty where it is not known.
+
+    `step` is where it is in a trial ("idle", "arm", "take-off", "record", "land", "abort-land", "link lost", "disarm",
+    "restore", "quarantined"), or "observing" for one that is only watched. Ages are seconds since the last packet and
+    heartbeat; `held` are the gains as last read back, `said` is its last line of text, `trouble` what does not
+    work on our side.
+    """
+
+    step: str
+    packet_age_s: float | None = None
+    heartbeat_age_s: float | None = None
+    armed: bool | None = None
+    mode: str = ""
+    altitude_m: float | None = None
+    climb_rate_m_s: float | None = None
+    battery_v: float | None = None
+    position_hz: float | None = None
+    lost_share: float | None = None
+    held: Mapping[str, float] = field(default_factory=dict)
+    said: str = ""
+    trouble: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckItem:
+    """One thing that has to be so before a flight: what was found, what is needed, and what to do where they differ."""
+
+    name: str
+    title: str
+    passed: bool
+    found: str
+    needed: str
+    hint: str = ""
+
+
+class ConnectedVehicle(Vehicle, Protocol):
+    """A vehicle whose link stays open between flights. For one thread.
+
+    Met armed, or in doubt, it is only observed: `concern` says why, nothing but `land` and `motors_off` reaches it, and
+    `stage`, `fly`, `check` and `parameters` raise SafeGainsError until `release`.
+    """
+
+    @property
+    def identity(self) -> Identity: ...
+    @property
+    def concern(self) -> str:
+        """Why it may only be observed; empty when it may fly."""
+        ...
+
+    def condition(self) -> Condition:
+        """How it is, as last heard: nothing is waited for."""
+        ...
+
+    def attend(self, timeout_s: float) -> None:
+        """Listen for so long, and tell the vehicle that its ground station is there. After `land`, Land is repeated
+        every second until telemetry agrees. Raises VehicleError when the link is closed."""
+        ...
+
+    def check(self) -> tuple[CheckItem, ...]:
+        """Look at everything that has to be so before a flight; what is not so is an item, not an error."""
+        ...
+
+    def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
+        """Every parameter of the vehicle; `on_progress` is told how many came, of how many. Raises VehicleError when
+        they do not come."""
+        ...
+
+    def land(self, reason: str) -> None:
+        """Tell it to land, at once, whatever state it is in."""
+        ...
+
+    def motors_off(self, reason: str) -> None:
+        """Stop its motors, at once and at any height."""
+        ...
+
+    def log_to(self, path: Path | None) -> None:
+        """Write what passes from now on, in both directions, to this telemetry log; None ends the log. Raises
+        VehicleError when the file cannot be opened: the log before goes on then."""
+        ...
+
+    def release(self) -> None:
+        """A person has looked at it: out of observation, once it is disarmed and holds its safe gains, read back.
+        Raises VehicleError when it is not or does not; it stays as it was then."""
+        ...

@@ -2,19 +2,24 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains, is_finite, shortened
-from app.vehicles.base import OptionValue, Vehicle, VehicleOption
+from app.vehicles.base import ConnectedVehicle, Identity, OptionValue, Vehicle, VehicleOption
 
 Options = Mapping[str, OptionValue]
+Hosts = frozenset[str]
+"""Beyond this computer, hosts on which the administrator says that simulations run."""
+
+HERE: Final[Hosts] = frozenset()
 
 
-def _nothing(_options: Options) -> tuple[Problem, ...]:
+def _nothing(_options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
     return ()
 
 
-def _never(_options: Options) -> bool:
+def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
     return False
 
 
@@ -23,9 +28,12 @@ class VehicleKind:
     """A registered kind of vehicle.
 
     `experiments` names those that it can fly. `open(options, safe_gains)` gets complete, checked options and returns a
-    vehicle that holds its safe gains; `conflicts(options)` names options that are possible one by one but not together;
-    `simulates(options)` says whether a vehicle of a real kind is a simulation all the same. The dashboard offers and
-    flies those that are `served`.
+    vehicle that holds its safe gains. `connect(options, safe_gains, identity)` opens a link that stays open between
+    flights; None: the kind has none, and is opened for each flight. It raises VehicleError when nobody answers, or
+    another than `identity` (None: whoever answers); an armed vehicle is returned, with nothing written to it and its
+    `concern` set. `conflicts(options, hosts)` names options that are possible one by one but not together;
+    `simulates(options, hosts)` says whether a vehicle of a real kind is a simulation all the same. The dashboard offers
+    and flies those that are `served`.
     """
 
     name: str
@@ -36,15 +44,18 @@ class VehicleKind:
     experiments: tuple[str, ...]
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains], Vehicle]
-    conflicts: Callable[[Options], tuple[Problem, ...]] = _nothing
-    simulates: Callable[[Options], bool] = _never
+    connect: Callable[[Options, Gains, Identity | None], ConnectedVehicle] | None = None
+    conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
+    simulates: Callable[[Options, Hosts], bool] = _never
     served: bool = True
 
-    def is_real_with(self, options: Options) -> bool:
+    def is_real_with(self, options: Options, simulation_hosts: Hosts = HERE) -> bool:
         """Whether a vehicle with these options, complete and checked, is REAL."""
-        return self.is_real and not self.simulates(options)
+        return self.is_real and not self.simulates(options, simulation_hosts)
 
-    def check(self, options: Mapping[str, object], *, field: str) -> dict[str, OptionValue]:
+    def check(
+        self, options: Mapping[str, object], *, field: str, simulation_hosts: Hosts = HERE
+    ) -> dict[str, OptionValue]:
         """The options completed with the defaults. Raises InputError naming every unknown or impossible one."""
         known = {option.name: option for option in self.options}
         names = ", ".join(known) or "none"
@@ -60,7 +71,7 @@ class VehicleKind:
             if reason:
                 problems.append(Problem(f"{field}.{name}", reason))
         if not problems:
-            problems = [Problem(f"{field}.{p.field}", p.reason) for p in self.conflicts(complete)]
+            problems = [Problem(f"{field}.{p.field}", p.reason) for p in self.conflicts(complete, simulation_hosts)]
         if problems:
             raise InputError(
                 f"These options do not suit the vehicle {self.name}.",

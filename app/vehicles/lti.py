@@ -23,7 +23,7 @@ from app.core.plants.pitch import (
 )
 from app.core.policy import Gains, is_finite, shortened
 from app.core.trajectory import Samples, Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Vehicle, VehicleOption
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, ShouldStop, Stop, Vehicle, VehicleOption
 from app.vehicles.errors import VehicleError
 from app.vehicles.holding import held
 from app.vehicles.kinds import Options, VehicleKind
@@ -39,8 +39,6 @@ _RECOVERY_STEPS: Final = 10 * RATE_HZ
 
 _NO_BIAS: Final = np.empty((0, STATES))
 _LARGEST_GAIN: Final = float(np.finfo(np.float32).max)
-
-ShouldAbort = Callable[[], str | None]
 
 
 class LinearAircraft:
@@ -67,12 +65,10 @@ class LinearAircraft:
         """What the aircraft holds now."""
         return dict(self._held)
 
-    def fly(
-        self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: ShouldAbort
-    ) -> FlightRecord:
+    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> FlightRecord:
         """Track the reference for a minute with the staged gains, holding simulated time back to the order's speed.
 
-        `should_abort` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. An abort sets the
+        `should_stop` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. A stop sets the
         safe gains and lets the pitch return to trim for ten seconds, which the record keeps. Once the pitch error has
         reached 10 rad the state stands still. Raises VehicleError when nothing was staged.
         """
@@ -84,16 +80,16 @@ class LinearAircraft:
         tracking, noise = _Leg(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
         try:
             detail = _flown(noise, tracking)
-            told, reason = _tell(detail, Pacer(order.speed), on_sample, should_abort)
+            told, stop = _tell(detail, Pacer(order.speed), on_sample, should_stop)
         finally:
             self._restore()
-        if reason is not None:
+        if stop is not None:
             returning = _Leg(self.safe_gains, 0.0, _RECOVERY_STEPS if told else 1)
             detail = _flown(noise, replace(tracking, steps=told), returning)
         return FlightRecord(
             trajectory=_trajectory(detail),
-            ending="completed" if reason is None else "aborted",
-            reason=reason or "",
+            ending="completed" if stop is None else "aborted",
+            reason="" if stop is None else stop.reason,
             settings=self._settings,
         )
 
@@ -137,12 +133,12 @@ def _flown(noise: Samples, *legs: _Leg) -> Samples:
 
 
 def _tell(
-    detail: Samples, pacer: Pacer, on_sample: Callable[[Sample], None], should_abort: ShouldAbort
-) -> tuple[int, str | None]:
-    """Tell a flight step by step as its time comes; how many steps were told, and the reason of an abort or None."""
+    detail: Samples, pacer: Pacer, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+) -> tuple[int, Stop | None]:
+    """Tell a flight step by step as its time comes; how many steps were told, and what ended it early or None."""
     for i, row in enumerate(detail):
-        if (reason := pacer.wait_until(i * STEP_S, should_abort)) is not None:
-            return i, reason
+        if (stop := pacer.wait_until(i * STEP_S, should_stop)) is not None:
+            return i, stop
         on_sample(_sample(i, row))
     return len(detail), None
 

@@ -2,10 +2,10 @@
 
 import math
 import time
-from collections.abc import Callable
 from typing import Final
 
 from app.core.errors import InputError, Problem
+from app.vehicles.base import ShouldStop, Stop
 
 LISTEN_EVERY_S: Final = 0.02
 """The longest that a flight held back is deaf to an abort."""
@@ -28,17 +28,17 @@ class Pacer:
         self._speed = speed
         self._start_s = time.monotonic()
 
-    def wait_until(self, vehicle_time_s: float, should_abort: Callable[[], str | None]) -> str | None:
-        """Return None once `vehicle_time_s` seconds of the flight may have passed, or the reason of an abort at once.
+    def wait_until(self, vehicle_time_s: float, should_stop: ShouldStop) -> Stop | None:
+        """Return None once `vehicle_time_s` seconds of the flight may have passed, or at once what ends it early.
 
-        `should_abort` is asked at least once, every 20 ms of wall time, and last when the time has come.
+        `should_stop` is asked at least once, every 20 ms of wall time, and last when the time has come.
         """
         while True:
             early_s = self._early_s(vehicle_time_s)
             if early_s > 0.0:
                 time.sleep(min(early_s, LISTEN_EVERY_S))
-            if (reason := should_abort()) is not None:
-                return reason
+            if (stop := should_stop()) is not None:
+                return stop
             if early_s <= LISTEN_EVERY_S:
                 return None
 

@@ -9,7 +9,7 @@ from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
 from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S, THROTTLE
 from app.core.policy import Gains, shortened
 from app.core.trajectory import Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, ShouldStop, Stop
 from app.vehicles.errors import VehicleError
 from app.vehicles.holding import held
 from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, SET_POINT, TARGET, Integers, Rows
@@ -30,8 +30,6 @@ _LANDING_SLICE: Final = RATE_HZ // 4
 STEPS: Final = round(FLIGHT_S * RATE_HZ) + 1
 MOST_STEPS: Final = STEPS + round(_LANDING_S * RATE_HZ)
 """Steps of the longest flight: aborted at the last instant, then landed."""
-
-ShouldAbort = Callable[[], str | None]
 
 
 class Simulation(Protocol):
@@ -76,12 +74,10 @@ class SimulatedVehicle:
         """What the vehicle holds now."""
         return dict(self._held)
 
-    def fly(
-        self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_abort: ShouldAbort
-    ) -> FlightRecord:
+    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> FlightRecord:
         """Take off to 3 m with the staged gains, holding simulated time back to the order's speed.
 
-        `should_abort` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. An abort ends the
+        `should_stop` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
         flight there: the safe gains are set and the vehicle descends at 0.5 m/s; the record keeps both, the set point
         of the descent being the ground. Afterwards the vehicle holds its safe gains. Raises VehicleError when nothing
         was staged or the simulation broke down.
@@ -94,16 +90,16 @@ class SimulatedVehicle:
         try:
             simulation = self._launch(order)
             rows: list[Rows] = []
-            reason = self._take_off(simulation, rows, Pacer(order.speed), on_sample, should_abort)
+            stop = self._take_off(simulation, rows, Pacer(order.speed), on_sample, should_stop)
             self._restore()
-            if reason is not None:
+            if stop is not None:
                 rows.extend(self._land(simulation, rows[-1]) if rows else [self._stay(simulation)])
         finally:
             self._restore()
         return FlightRecord(
             trajectory=self._trajectory(rows),
-            ending="completed" if reason is None else "aborted",
-            reason=reason or "",
+            ending="completed" if stop is None else "aborted",
+            reason="" if stop is None else stop.reason,
             settings=self._settings,
         )
 
@@ -120,13 +116,13 @@ class SimulatedVehicle:
         rows: list[Rows],
         pacer: Pacer,
         on_sample: Callable[[Sample], None],
-        should_abort: ShouldAbort,
-    ) -> str | None:
-        """Fill `rows` until the manoeuvre is over; the reason of an abort, or None."""
+        should_stop: ShouldStop,
+    ) -> Stop | None:
+        """Fill `rows` until the manoeuvre is over; what ended it early, or None."""
         command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
         for first, last in _slices():
-            if (reason := pacer.wait_until(first * STEP_S, should_abort)) is not None:
-                return reason
+            if (stop := pacer.wait_until(first * STEP_S, should_stop)) is not None:
+                return stop
             rows.append(_flown(simulation, last - first, command, TAKEOFF_ALTITUDE_M))
             on_sample(_sample(first, rows[-1][0]))
         return None

@@ -32,7 +32,7 @@ from app.vehicles.kernels import (
     Rows,
     fly_simple_model,
 )
-from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.kinds import Hosts, Options, VehicleKind
 from app.vehicles.simulated import FLIGHT_S, MOST_STEPS, SimulatedVehicle
 
 _THRUST_SD: Final = 0.003
@@ -110,7 +110,7 @@ def _open(options: Options, safe_gains: Gains) -> Vehicle:
     return SimulatedVehicle("twin", safe_gains, options, lambda order: TwinFlight(numbers, order.seed))
 
 
-def _cannot_lift(options: Options) -> tuple[Problem, ...]:
+def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
     share = _hover_share(options) / (1.0 - float(options["battery_sag"]))
     if share <= _HIGHEST_HOVER:
         return ()

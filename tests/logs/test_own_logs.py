@@ -26,7 +26,7 @@ def test_the_log_of_a_flight_is_the_flight(autopilot: str, tmp_path: Path) -> No
             hangar.switch_on_failsafes()
         vehicle = hangar.vehicle(log_folder=str(tmp_path))
         vehicle.stage(gains)
-        record = vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_abort=never)
+        record = vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_stop=never)
         vehicle.close()
     [log] = tmp_path.glob("*.tlog")
     flown = read_takeoff(io.BytesIO(log.read_bytes()))

@@ -59,7 +59,7 @@ def test_a_flight_in_the_process_is_the_flight_in_this_one(cockpit: Cockpit, tmp
     heard = fly(cockpit, orders(tmp_path))
     with open_vehicle("twin", {}, safe_gains=GAINS) as vehicle:
         vehicle.stage(GAINS)
-        here = vehicle.fly(FlightOrder(seed=3), on_sample=lambda _: None, should_abort=lambda: None)
+        here = vehicle.fly(FlightOrder(seed=3), on_sample=lambda _: None, should_stop=lambda: None)
     (landed,) = only(heard, Landed)
     assert isinstance(landed, Landed)
     assert heard[0] == Staged(GAINS)

@@ -10,7 +10,7 @@ from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Vehicle
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, ShouldStop, Stop, Vehicle
 from app.vehicles.open import VEHICLE_KINDS, open_vehicle
 
 TAKEOFF: Final = Takeoff()
@@ -52,7 +52,7 @@ PROFILES: Final[Mapping[str, Profile]] = {
 }
 
 
-def never() -> str | None:
+def never() -> Stop | None:
     return None
 
 
@@ -67,11 +67,11 @@ def fly(
     seed: int = 1,
     speed: float | None = None,
     on_sample: Callable[[Sample], None] = unwatched,
-    should_abort: Callable[[], str | None] = never,
+    should_stop: ShouldStop = never,
 ) -> FlightRecord:
     """With the kind's tuned gains where none are given."""
     vehicle.stage(PROFILES[vehicle.kind].tuned if gains is None else gains)
-    return vehicle.fly(FlightOrder(seed=seed, speed=speed), on_sample=on_sample, should_abort=should_abort)
+    return vehicle.fly(FlightOrder(seed=seed, speed=speed), on_sample=on_sample, should_stop=should_stop)
 
 
 def flown(
@@ -92,6 +92,6 @@ class Watcher:
     def see(self, sample: Sample) -> None:
         self.samples.append(sample)
 
-    def decide(self) -> str | None:
+    def decide(self) -> Stop | None:
         late = bool(self.samples) and self.samples[-1].time_s >= self._abort_at_s
-        return "the operator pressed Abort" if late else None
+        return Stop("the operator pressed Abort") if late else None

@@ -54,7 +54,7 @@ def test_a_flight_that_runs_away_stands_still_at_10_rad_and_can_be_scored() -> N
 def test_after_an_abort_the_pitch_returns_to_trim_for_ten_seconds() -> None:
     with open_vehicle("lti", {}, safe_gains=HAND) as vehicle:
         watcher = Watcher(abort_at_s=5.0)
-        flight = fly(vehicle, on_sample=watcher.see, should_abort=watcher.decide).trajectory
+        flight = fly(vehicle, on_sample=watcher.see, should_stop=watcher.decide).trajectory
     after = flight.time_s > watcher.samples[-1].time_s
     assert flight.time_s[-1] == pytest.approx(15.0, abs=0.03)
     assert not flight["pitch_reference_rad"][after].any()

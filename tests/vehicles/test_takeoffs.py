@@ -94,7 +94,7 @@ def test_an_abort_ends_the_flight_within_20_ms_of_vehicle_time(
     kind: str, vehicle: Vehicle, speed: float | None
 ) -> None:
     watcher = Watcher(abort_at_s=2.0)
-    record = fly(vehicle, speed=speed, on_sample=watcher.see, should_abort=watcher.decide)
+    record = fly(vehicle, speed=speed, on_sample=watcher.see, should_stop=watcher.decide)
     flight = record.trajectory
     asked = int(np.searchsorted(flight.time_s, watcher.samples[-1].time_s))
     given_up = int(np.argmax(flight["set_point_m"] == 0.0))
@@ -105,7 +105,7 @@ def test_an_abort_ends_the_flight_within_20_ms_of_vehicle_time(
 
 def test_an_aborted_flight_lands_on_its_safe_gains_and_keeps_its_record(kind: str, vehicle: Vehicle) -> None:
     watcher = Watcher(abort_at_s=8.0)
-    flight = fly(vehicle, on_sample=watcher.see, should_abort=watcher.decide).trajectory
+    flight = fly(vehicle, on_sample=watcher.see, should_stop=watcher.decide).trajectory
     whole = fly(vehicle).trajectory
     until = int(np.argmax(flight["set_point_m"] == 0.0))
     np.testing.assert_array_equal(flight["altitude_m"][:until], whole["altitude_m"][:until])

@@ -107,6 +107,6 @@ def test_a_battery_that_could_not_carry_the_vehicle_to_the_end_is_refused() -> N
 def test_an_abort_with_everything_on_lands() -> None:
     with open_vehicle("twin", FURTHER, safe_gains=SAFE) as vehicle:
         watcher = Watcher(abort_at_s=20.0)
-        record = fly(vehicle, on_sample=watcher.see, should_abort=watcher.decide)
+        record = fly(vehicle, on_sample=watcher.see, should_stop=watcher.decide)
     assert record.ending == "aborted"
     assert record.trajectory["altitude_m"][-1] < 0.1

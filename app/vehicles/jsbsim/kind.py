@@ -6,7 +6,7 @@ from app.core.errors import Problem
 from app.core.policy import Gains
 from app.vehicles.base import Vehicle, VehicleOption
 from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, MASS_KG, JsbsimFlight
-from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.kinds import Hosts, Options, VehicleKind
 from app.vehicles.simulated import SimulatedVehicle
 
 _HIGHEST_HOVER: Final = 0.95
@@ -17,7 +17,7 @@ def _open(options: Options, safe_gains: Gains) -> Vehicle:
     return SimulatedVehicle("jsbsim", safe_gains, options, lambda order: JsbsimFlight(numbers, order.seed))
 
 
-def _cannot_lift(options: Options) -> tuple[Problem, ...]:
+def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
     """A sagging battery at hover throttle h leaves (1 − sag·h)² of the thrust; at full command (1 − sag)²."""
     strength = float(options["thrust_scale"]) * (1.0 - float(options["battery_sag"])) ** 2
     share = float(options["mass_kg"]) * GRAVITY_M_S2 / (FULL_THRUST_N * strength)

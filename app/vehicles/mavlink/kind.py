@@ -5,22 +5,28 @@ from typing import Final
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
 from app.vehicles.base import Vehicle, VehicleOption
-from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 
 
-def is_simulated(options: Options) -> bool:
-    """Said to be simulated, and nothing beyond this computer can be reached by its address."""
-    return bool(options["simulated"]) and addresses.is_loopback(addresses.parse(str(options["address"])))
+def is_simulated(options: Options, simulation_hosts: Hosts = HERE) -> bool:
+    """Said to be simulated, and its address reaches nothing beyond this computer and the `simulation_hosts`."""
+    return bool(options["simulated"]) and _may_simulate(addresses.parse(str(options["address"])), simulation_hosts)
+
+
+def _may_simulate(address: addresses.Address, simulation_hosts: Hosts) -> bool:
+    return addresses.is_loopback(address) or (
+        not isinstance(address, addresses.SerialAddress) and address.host in simulation_hosts
+    )
 
 
 def _open(options: Options, safe_gains: Gains) -> Vehicle:
     return MavlinkVehicle(options, safe_gains, is_real=not is_simulated(options))
 
 
-def _conflicts(options: Options) -> tuple[Problem, ...]:
+def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]:
     problems = []
     if options["autopilot"] not in PROFILES:
         problems.append(Problem("autopilot", f"must be {', '.join(PROFILES)}, got {options['autopilot']}"))
@@ -28,8 +34,9 @@ def _conflicts(options: Options) -> tuple[Problem, ...]:
         address = addresses.parse(str(options["address"]))
     except InputError as error:
         return (*problems, *error.problems)
-    if options["simulated"] and not addresses.is_loopback(address):
-        problems.append(Problem("simulated", f"is not believed of {address}: only a loopback address can be simulated"))
+    if options["simulated"] and not _may_simulate(address, simulation_hosts):
+        believed = ", ".join(("a loopback address", *sorted(simulation_hosts)))
+        problems.append(Problem("simulated", f"is not believed of {address}: only {believed} can be simulated"))
     if options["clock_speed"] != 1.0 and not options["simulated"]:
         problems.append(Problem("clock_speed", "must be 1: a real vehicle's time is that of life"))
     return tuple(problems)

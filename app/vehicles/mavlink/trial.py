@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.base import Sample
+from app.vehicles.base import Sample, ShouldStop, Stop
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.limits import Watch
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
@@ -55,10 +55,10 @@ class Flight:
         *,
         restore: Callable[[], str],
         on_sample: Callable[[Sample], None],
-        should_abort: Callable[[], str | None],
+        should_stop: ShouldStop,
     ) -> None:
         self._radio, self._restore = radio, restore
-        self._on_sample, self._should_abort = on_sample, should_abort
+        self._on_sample, self._should_stop = on_sample, should_stop
         self._samples: list[Keep] = []
         self._conversation: Conversation | None = None
         self._error: BaseException | None = None
@@ -98,12 +98,12 @@ class Flight:
     def _judge(self) -> None:
         if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
             self._advance(Restored(self._radio.clock.now_s(), self._restored()))
-        if (reason := self._wanted()) is not None:
-            self._advance(AbortWanted(reason, self._radio.clock.now_s()))
+        if (stop := self._wanted()) is not None:
+            self._advance(AbortWanted(stop.reason, self._radio.clock.now_s()))
         self._advance(Tick(self._radio.clock.now_s()))
 
-    def _wanted(self) -> str | None:
-        return self._should_abort() if self._error is None else _spoken(self._error)
+    def _wanted(self) -> Stop | None:
+        return self._should_stop() if self._error is None else Stop(_spoken(self._error))
 
     def _advance(self, event: Event) -> None:
         before = self._trial.state

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.core.policy import Gains
 from app.core.trajectory import Trajectory
-from app.vehicles.base import Ending, FlightOrder, FlightRecord, Sample
+from app.vehicles.base import Ending, FlightOrder, FlightRecord, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, limits, parameters, preflight
@@ -34,8 +34,6 @@ STAND_S: Final = 1.0
 HASTE: Final = 4.0
 """Up to this speed of its clock a simulated vehicle is waited for as a real one is. Beyond, waiting for packets takes
 longer by its time, because a busy computer's pauses are on the wall."""
-
-ShouldAbort = Callable[[], str | None]
 
 
 class MavlinkVehicle:
@@ -115,13 +113,13 @@ class MavlinkVehicle:
         order: FlightOrder,  # noqa: ARG002 - the vehicle owns its time, and chance is its own
         *,
         on_sample: Callable[[Sample], None],
-        should_abort: ShouldAbort,
+        should_stop: ShouldStop,
     ) -> FlightRecord:
         """Arm, take off to 3 m, record, land, disarm, and restore the safe gains.
 
-        The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_abort` is asked every
+        The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_stop` is asked every
         10 ms. Raises VehicleError when nothing was staged or the vehicle did not lift off; what `on_sample` and
-        `should_abort` raise lands the vehicle, and is raised again once it is down.
+        `should_stop` raise lands the vehicle, and is raised again once it is down.
         """
         self._require_trust()
         if not self._staged:
@@ -130,9 +128,9 @@ class MavlinkVehicle:
                 hint="Stage the gains, compare what is read back, then fly.",
             )
         ground = preflight.stand(self._radio, min_battery_v=float(self._options["min_battery_v"]), watched_s=STAND_S)
-        if (reason := should_abort()) is not None:
-            return self._not_begun(ground, reason)
-        flown = self._fly(ground, on_sample, should_abort)
+        if (stop := should_stop()) is not None:
+            return self._not_begun(ground, stop.reason)
+        flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
         return self._record(flown, ground)
@@ -141,7 +139,7 @@ class MavlinkVehicle:
         """End the conversation; the vehicle is left as it is."""
         self._link.close()
 
-    def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_abort: ShouldAbort) -> Flown:
+    def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> Flown:
         last = ground.last
         self._radio.aim = replace(self._radio.aim, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
@@ -153,7 +151,7 @@ class MavlinkVehicle:
             watch,
             restore=self._restore,
             on_sample=on_sample,
-            should_abort=should_abort,
+            should_stop=should_stop,
         )
         flown = flight.fly()
         self._state, self._why = flown.trial.state, flown.trial.why

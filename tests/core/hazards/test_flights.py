@@ -27,7 +27,7 @@ from app.core.hazards.kernels import (
 )
 from app.core.policy import Gains
 from app.core.spread import Spread, before_flight
-from app.vehicles.base import FlightOrder
+from app.vehicles.base import FlightOrder, Stop
 from app.vehicles.open import open_vehicle
 from tests.core.flying import TAKEOFF, compiled_only
 
@@ -179,7 +179,9 @@ def test_an_abort_is_what_the_simulated_vehicle_does(model_parameters: dict[str,
     with open_vehicle("twin", options, safe_gains=SAFE) as vehicle:
         vehicle.stage({"kp": 1600, "ki": 1023, "kd": 127})
         record = vehicle.fly(
-            FlightOrder(seed=1), on_sample=lambda _: None, should_abort=lambda: "now" if next(asked) >= 45 else None
+            FlightOrder(seed=1),
+            on_sample=lambda _: None,
+            should_stop=lambda: Stop("now") if next(asked) >= 45 else None,
         ).trajectory
     aborted_at = int(np.argmax(record["set_point_m"] == 0.0))
     assert aborted_at == pytest.approx(abort_step, abs=1)

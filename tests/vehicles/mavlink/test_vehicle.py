@@ -5,7 +5,7 @@ import pytest
 
 from app.core.errors import InputError
 from app.core.experiments.takeoff import Takeoff
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Stop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.dialects import PAPARAZZI, number, text
@@ -24,19 +24,19 @@ TAKEOFF = Takeoff()
 
 def fly(vehicle: MavlinkVehicle, gains: dict[str, float] | None = None) -> FlightRecord:
     vehicle.stage(TUNED if gains is None else gains)
-    return vehicle.fly(ORDER, on_sample=unwatched, should_abort=never)
+    return vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
 
 
 def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
     with open_vehicle("twin", {"scatter": 0.0}, safe_gains=SAFE) as twin:
         twin.stage(TUNED)
-        alone = TAKEOFF.error(twin.fly(ORDER, on_sample=unwatched, should_abort=never).trajectory)
+        alone = TAKEOFF.error(twin.fly(ORDER, on_sample=unwatched, should_stop=never).trajectory)
     watcher = Watcher()
     with Hangar() as hangar:
         vehicle = hangar.vehicle()
         assert vehicle.read_gains() == SAFE
         assert vehicle.stage(TUNED) == TUNED
-        record = vehicle.fly(ORDER, on_sample=watcher.see, should_abort=never)
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=never)
         assert vehicle.read_gains() == SAFE
         vehicle.close()
     flight = record.trajectory
@@ -105,7 +105,7 @@ def test_an_abort_sends_the_safe_gains_then_land_and_keeps_the_record() -> None:
         vehicle = hangar.vehicle()
         vehicle.stage(TUNED)
         before = len(hangar.heard)
-        record = vehicle.fly(ORDER, on_sample=watcher.see, should_abort=watcher.decide)
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
         assert vehicle.read_gains() == SAFE
         vehicle.close()
     assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
@@ -143,7 +143,7 @@ def test_what_would_end_the_program_lands_the_vehicle_first(error: BaseException
         vehicle = hangar.vehicle()
         vehicle.stage(TUNED)
         with pytest.raises(type(error)):
-            vehicle.fly(ORDER, on_sample=fail, should_abort=never)
+            vehicle.fly(ORDER, on_sample=fail, should_stop=never)
         assert vehicle.read_gains() == SAFE
         assert hangar.drone.body.stands
         vehicle.close()
@@ -153,7 +153,7 @@ def test_a_flight_aborted_before_it_starts_leaves_one_instant_and_arms_nothing()
     with Hangar() as hangar:
         vehicle = hangar.vehicle()
         vehicle.stage(TUNED)
-        record = vehicle.fly(ORDER, on_sample=unwatched, should_abort=lambda: "changed my mind")
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=lambda: Stop("changed my mind"))
         assert (record.ending, record.reason) == ("aborted", "changed my mind")
         assert record.trajectory.time_s.tolist() == [0.0]
         assert not hangar.told("SCRIPT_ITEM")
@@ -164,7 +164,7 @@ def test_nothing_flies_before_its_gains_are_staged() -> None:
     with Hangar() as hangar:
         vehicle = hangar.vehicle()
         with pytest.raises(VehicleError, match="No gains were staged"):
-            vehicle.fly(ORDER, on_sample=unwatched, should_abort=never)
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         vehicle.close()
 
 
@@ -271,7 +271,7 @@ def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str
         vehicle = hangar.vehicle()
         assert vehicle.stage(gains) == gains
         assert vehicle.read_gains() == gains
-        record = vehicle.fly(ORDER, on_sample=unwatched, should_abort=never)
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert vehicle.read_gains() == safe
         vehicle.close()
     flight = record.trajectory
@@ -295,7 +295,7 @@ def test_an_abort_lands_the_other_autopilots_too(autopilot: str) -> None:
         hangar.switch_on_failsafes()
         vehicle = hangar.vehicle()
         vehicle.stage(MILDER[autopilot])
-        record = vehicle.fly(ORDER, on_sample=watcher.see, should_abort=watcher.decide)
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
         assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
         assert vehicle.read_gains() == OWN_SAFE[autopilot]
         assert hangar.drone.body.stands
@@ -311,7 +311,7 @@ def test_a_link_that_breaks_here_leaves_the_vehicle_to_its_own_failsafe_and_in_q
             if sample.time_s > 1.0:
                 vehicle.close()
 
-        record = vehicle.fly(ORDER, on_sample=cut, should_abort=never)
+        record = vehicle.fly(ORDER, on_sample=cut, should_stop=never)
         assert (record.ending, hangar.drone.body.stands) == ("invalid", True)
         with pytest.raises(SafeGainsError, match="quarantined"):
             vehicle.stage(SAFE)
