@@ -1,8 +1,13 @@
-"""A second source of altitude beside the vehicle's own, such as motion capture."""
+"""A second source of altitude beside the vehicle's own, such as motion capture.
+
+A record has both: `altitude_m` is the scored one, `altitude_2_m` the other.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+from app.vehicles.mavlink.link import Received
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +26,7 @@ class SourceSample:
 
 
 class Source(Protocol):
-    """Hears in a thread of its own; `take` never waits."""
+    """Hears in a thread of its own, or what it is given; nothing of it ever waits."""
 
     @property
     def name(self) -> str:
@@ -31,6 +36,10 @@ class Source(Protocol):
     @property
     def trouble(self) -> str:
         """Why nothing comes, where the source knows; empty otherwise."""
+        ...
+
+    def hear(self, received: Received) -> None:
+        """Take in a message of the vehicle's own link; a source with a link of its own passes it over."""
         ...
 
     def take(self) -> Sequence[SourceSample]:
