@@ -21,8 +21,8 @@ from scipy.signal import find_peaks
 
 from app.core.checks import Check, Envelope
 from app.core.control.vertical_loop import RATE_HZ
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Matrix
+from app.core.experiments.takeoff import Takeoff
 from app.core.hazards.flights import (
     LARGEST_TOUCH_DOWN_M_S,
     SMALLEST_SWING_M_S,
@@ -42,7 +42,7 @@ SET_POINT_M: Final = 3.0
 TARGET: Final = 768
 BATCH: Final = 100
 
-TAKEOFF: Final = get_experiment("takeoff")
+TAKEOFF: Final = Takeoff()
 SAFE: Final = TAKEOFF.space.mapping(TAKEOFF.space.default)
 SAFE_COUNTS: Final[Counts] = TAKEOFF.space.default.astype(np.int64)
 

@@ -29,7 +29,7 @@ FULL_RECORDS: Final = 30
 """With more flights than this, all but the best and the latest are drawn from their coarse copies."""
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
-_CURVES: Final[Mapping[str, str]] = {"takeoff": "Takeoff curves", "pitch-tracking": "Pitch error curves"}
+_CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
 _INPUTS: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "takeoff": ("Thrust (of full)", {"thrust": "Thrust", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
     "pitch-tracking": (
@@ -89,7 +89,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool) -> History:
         proposal=_next_flight(session, campaign, rows, experiment.output),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
-        curves_title=_CURVES.get(experiment.name, "Flight curves"),
+        curves_title=_CURVES.get(experiment.output, "Flight curves"),
     )
 
 
@@ -149,12 +149,15 @@ def _coarse(row: TrialRow) -> Curve:
 
 @lru_cache
 def _goal(experiment_name: str) -> tuple[Curve, Curve | None]:
-    """Set point and reference of an experiment; the reference is the same whatever the gains."""
+    """Set point of an experiment, and its reference, if its model has one: the same whatever the gains."""
     experiment = get_experiment(experiment_name)
     grid = experiment.grid_s
-    model = experiment.simulate(experiment.space.default, experiment.nominal_model)
-    reference = Curve(model.time_s, model["reference_m"]) if "reference_m" in model.channels else None
-    return Curve(grid, experiment.set_point(grid)), reference
+    set_point = Curve(grid, experiment.set_point(grid))
+    modelled = experiment.modelled
+    if modelled is None:
+        return set_point, None
+    model = modelled.simulate(modelled.space.default, modelled.nominal_model)
+    return set_point, Curve(model.time_s, model["reference_m"]) if "reference_m" in model.channels else None
 
 
 def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow], output: str) -> NextFlight | None:

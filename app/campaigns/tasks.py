@@ -6,7 +6,7 @@ import structlog
 
 from app.campaigns import proposing
 from app.core.definition import Definition, Flight
-from app.core.experiments import experiment_of
+from app.core.experiments.takeoff import Takeoff
 from app.db.session import Database
 from app.errors import GainlineError
 from app.jobs import service as jobs
@@ -41,8 +41,7 @@ class Proposer:
 
 def prepare() -> None:
     """Load and compile what a proposal needs, so that the first one is as quick as the others."""
-    definition = Definition()
-    experiment = experiment_of(definition)
+    definition, experiment = Definition(), Takeoff()
     default = experiment.space.default
     flown = experiment.simulate(default, experiment.nominal_model)
     flight = Flight(

@@ -22,7 +22,7 @@ from scipy.linalg import hadamard, solve_toeplitz
 from scipy.optimize import lsq_linear
 
 from app.core.definition import Flight
-from app.core.experiments.base import Experiment, FittedParameter, Matrix, fitted_parameters
+from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, fitted_parameters
 from app.core.policy import Vector
 from app.core.recorded import on_grid
 from app.core.spread import Spread, before_flight
@@ -58,7 +58,7 @@ class Calibration:
     the output's unit). `own_models` are the flights' own, (k, m), in the order of `numbers`; `residual` is what the
     best flight did beyond its own, on the grid."""
 
-    experiment: Experiment
+    experiment: ModelledExperiment
     model: Vector
     covariance: Matrix
     noise: float
@@ -95,7 +95,7 @@ class Calibration:
         return fitted_parameters(self.experiment.model_parameters, self.model, self.covariance)
 
 
-def calibrate(experiment: Experiment, flights: Sequence[Flight]) -> Calibration:
+def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Calibration:
     """The model by the best and the latest valid flights, of which there must be one; the others are passed over."""
     valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
     best = min(valid, key=lambda flight: (flight.error, flight.number))
@@ -128,10 +128,11 @@ def calibrate(experiment: Experiment, flights: Sequence[Flight]) -> Calibration:
 
 def known(experiment: Experiment, flights: Sequence[Flight]) -> Spread:
     """What is known of the vehicle: the data sheet's spread before the first valid flight, the calibrated one after it;
-    always the data sheet's for experiments without a calibration."""
-    if experiment.name not in EXPERIMENTS or all(flight.error is None for flight in flights):
+    always the data sheet's for experiments without a calibration, and nothing for those without a model."""
+    modelled = experiment.modelled
+    if modelled is None or modelled.name not in EXPERIMENTS or all(flight.error is None for flight in flights):
         return before_flight(experiment)
-    return calibrate(experiment, flights).spread()
+    return calibrate(modelled, flights).spread()
 
 
 def _rounded(covariance: Matrix, sd: Vector) -> Matrix:
@@ -140,15 +141,15 @@ def _rounded(covariance: Matrix, sd: Vector) -> Matrix:
     return np.asarray((correlation + correlation.T) / 2.0 * np.outer(rounded, rounded))
 
 
-def _prior_sd(experiment: Experiment) -> Vector:
+def _prior_sd(experiment: ModelledExperiment) -> Vector:
     return np.array([parameter.prior_sd for parameter in experiment.model_parameters])
 
 
-def _flight_sd(experiment: Experiment) -> Vector:
+def _flight_sd(experiment: ModelledExperiment) -> Vector:
     return np.array([parameter.flight_sd for parameter in experiment.model_parameters])
 
 
-def _clipped(experiment: Experiment, models: Matrix) -> Matrix:
+def _clipped(experiment: ModelledExperiment, models: Matrix) -> Matrix:
     lower = [parameter.lower for parameter in experiment.model_parameters]
     upper = [parameter.upper for parameter in experiment.model_parameters]
     return np.asarray(np.clip(models, lower, upper))
@@ -158,7 +159,7 @@ class _Fit:
     """The residuals of k flights and their derivatives, in unknowns of shape (m + k·q,): the parameters, then what is
     each flight's own of the q that differ between flights."""
 
-    def __init__(self, experiment: Experiment, flights: Sequence[Flight]) -> None:
+    def __init__(self, experiment: ModelledExperiment, flights: Sequence[Flight]) -> None:
         parameters = experiment.model_parameters
         self.experiment = experiment
         self.mean = np.array([parameter.prior_mean for parameter in parameters])

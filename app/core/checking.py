@@ -62,9 +62,20 @@ def _options(definition: Definition) -> Iterator[Problem]:
 def _fit(definition: Definition) -> Iterator[Problem]:
     if definition.strategy not in STRATEGIES or definition.experiment not in EXPERIMENTS:
         return
-    fits = STRATEGIES[definition.strategy].experiments
-    if fits and definition.experiment not in fits:
-        yield Problem("strategy", f"{definition.strategy!r} works with {', '.join(fits)} only")
+    strategy = STRATEGIES[definition.strategy]
+    if EXPERIMENTS[definition.experiment].modelled is None:
+        yield from _without_model(definition)
+    elif strategy.experiments and definition.experiment not in strategy.experiments:
+        yield Problem("strategy", f"{strategy.name!r} works with {', '.join(strategy.experiments)} only")
+
+
+def _without_model(definition: Definition) -> Iterator[Problem]:
+    lacks = f"there is no model of what the gains of {definition.experiment!r} do"
+    if STRATEGIES[definition.strategy].needs_model:
+        by_hand = ", ".join(repr(name) for name, strategy in STRATEGIES.items() if not strategy.needs_model)
+        yield Problem("strategy", f"{definition.strategy!r} finds gains on a model, and {lacks}: choose {by_hand}")
+    if definition.start.kind == "simplex":
+        yield Problem("start.kind", f"'simplex' searches on a model, and {lacks}: choose 'default' or 'given'")
 
 
 def _policy(definition: Definition) -> tuple[Problem, ...]:

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from app.core.definition import Flight, Prediction
-from app.core.experiments.base import Experiment, Matrix
+from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
 from app.core.policy import PolicySpace, Vector
 from app.core.recorded import on_grid
 from app.core.spread import Spread
@@ -100,7 +100,7 @@ def prediction_of(proposal: Proposal) -> Prediction | None:
 
 
 def expected(
-    experiment: Experiment,
+    experiment: ModelledExperiment,
     space: PolicySpace,
     flights: Sequence[Flight],
     proposal: Proposal,
@@ -179,7 +179,7 @@ def _interval(lower: float, upper: float) -> Interval:
     return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
 
 
-def _likely(experiment: Experiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
+def _likely(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
     """Outputs of these gains on a few likely models, shape (k, n), each with its own bias where there is a base."""
     parameters = experiment.model_parameters
     prior = Spread(

@@ -7,7 +7,7 @@ from app.core.calibration import known
 from app.core.confirming import confirm, contest
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.gate import Gate, check_policy
 from app.core.policy import PolicySpace
 from app.core.predictions import expected, expected_again, track_record
@@ -17,6 +17,7 @@ from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Explanation, Kind, Proposal
 from app.core.strategies.bias import corrected_by, nominal
 from app.core.strategies.history import describe
+from app.core.strategies.manual import propose as by_hand
 from app.core.transfer import Transfer, transfer
 
 _ORIGIN = {
@@ -34,15 +35,19 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     their trajectories count as stored, in single precision. Without a valid flight the start gains are proposed.
     `donor` is the flight that `definition.start.donor` names; only with start kind `campaign`, and then needed.
 
-    Every proposal that predicts an error has an interval and a band. Under the stop rule `noise` it may be a flight of
-    the winner or of the first gains again, or kind `none`, once nothing is left to be told from noise.
+    Every proposal that predicts an error has an interval and a band; without a model none predicts any. Under the stop
+    rule `noise` it may be a flight of the winner or of the first gains again, or kind `none`, once nothing is left to
+    be told from noise.
     """
-    experiment = experiment_of(definition)
-    space = experiment.space.narrowed(definition.bounds)
+    chosen = experiment_of(definition)
+    space = chosen.space.narrowed(definition.bounds)
+    experiment = chosen.modelled
+    if experiment is None:
+        return _by_hand(definition, chosen, space, flights)
     warm = None if donor is None else transfer(definition, experiment, flights, donor)
     if warm is not None:
         experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
-    if not any(flight.outcome == "valid" for flight in flights):
+    if not _has_flown(flights):
         return _start(definition, experiment, space, flights, donor)
     scatter = pooled(groups_of(flights), experiment.scatter)
     strategy = STRATEGIES[definition.strategy]
@@ -50,13 +55,34 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     number = proposal.explanation.base_flight if strategy.learns else None
     base = next((flight for flight in flights if flight.number == number), None)
     proposal = expected(experiment, space, flights, proposal, scatter, base=base)
-    if definition.stop.kind == "noise":
-        proposal = _told_from_noise(definition, experiment, space, flights, proposal)
-    return _with_notes(proposal, flights, warm)
+    return _with_notes(_confirmed(definition, experiment, space, flights, proposal), flights, warm)
+
+
+def _has_flown(flights: Sequence[Flight]) -> bool:
+    return any(flight.outcome == "valid" for flight in flights)
+
+
+def _by_hand(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+    """Without a model: the start gains, then the operator's own; nothing is predicted."""
+    if _has_flown(flights):
+        proposal = by_hand(definition, experiment, space, flights)
+        return _confirmed(definition, experiment, space, flights, proposal)
+    gains = start_gains(definition, experiment, space)
+    summary = (
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({describe(gains)}); there is no model of this "
+        "vehicle's controller to predict it with."
+    )
+    lesson = "What these gains do, for the others to be measured against."
+    explanation = Explanation(summary=summary, lesson=lesson)
+    return Proposal(kind="start", gains=gains, predicted=None, predicted_error=None, explanation=explanation)
 
 
 def _start(
-    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], donor: Flight | None
+    definition: Definition,
+    experiment: ModelledExperiment,
+    space: PolicySpace,
+    flights: Sequence[Flight],
+    donor: Flight | None,
 ) -> Proposal:
     gains = start_gains(definition, experiment, space)
     model = nominal(experiment) if donor is None else corrected_by(experiment, donor)
@@ -77,12 +103,12 @@ def _start(
     return expected(experiment, space, flights, start, pooled((), experiment.scatter), base=None)
 
 
-def _told_from_noise(
+def _confirmed(
     definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], proposal: Proposal
 ) -> Proposal:
-    """The strategy's proposal where a step is still worth a flight, else the flight that the noise asks for; nothing
-    more where the gate refuses that one."""
-    now = contest(definition, experiment, flights)
+    """The strategy's proposal; under the rule `noise` only where a step is still worth a flight, else the flight that
+    the noise asks for, and nothing more where the gate refuses that one."""
+    now = contest(definition, experiment, flights) if definition.stop.kind == "noise" else None
     if now is None:
         return proposal
     wanted = confirm(definition, experiment, flights, proposal)

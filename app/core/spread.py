@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from app.core.policy import Vector
 
 if TYPE_CHECKING:  # experiments tell their hazards over a spread
-    from app.core.experiments.base import Experiment, Matrix
+    from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
 
 WIDEST_SD: Final = 2.0
 """Samples stay within so many standard deviations of the mean."""
@@ -25,16 +25,16 @@ class Spread:
     covariance: tuple[tuple[float, ...], ...]
     origin: str
 
-    def samples(self, experiment: "Experiment", count: int) -> "Matrix":
+    def samples(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
         """The mean, then `count` − 1 quasi-random models, shape (count, m); the same every time."""
         unit = qmc.Halton(len(self.mean), scramble=False).random(count)[1:]
         return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
 
-    def draws(self, experiment: "Experiment", count: int, seed: int) -> "Matrix":
+    def draws(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
         """Random models of the same distribution, shape (count, m)."""
         return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
 
-    def _models(self, experiment: "Experiment", unit: "Matrix") -> "Matrix":
+    def _models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
         """Models from numbers evenly spread over 0 … 1, shape (k, m)."""
         variances, axes = np.linalg.eigh(np.array(self.covariance))
         sd = np.sqrt(np.maximum(variances, 0.0))
@@ -48,11 +48,18 @@ class Spread:
 _PROBABILITY_WITHIN: Final = 0.9544997361036416
 
 
+NOTHING: Final = Spread(mean=(), covariance=(), origin="nothing: there is no model")
+
+
 def before_flight(experiment: "Experiment") -> Spread:
-    """What the data sheet leaves open: each parameter within `known_within` of its nominal value."""
-    sd: Vector = np.array([parameter.known_within for parameter in experiment.model_parameters]) / WIDEST_SD
+    """What the data sheet leaves open: each parameter within `known_within` of its nominal value. Nothing is known
+    without a model."""
+    modelled = experiment.modelled
+    if modelled is None:
+        return NOTHING
+    sd: Vector = np.array([parameter.known_within for parameter in modelled.model_parameters]) / WIDEST_SD
     return Spread(
-        mean=tuple(float(value) for value in experiment.nominal_model),
+        mean=tuple(float(value) for value in modelled.nominal_model),
         covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()),
         origin="the data sheet",
     )

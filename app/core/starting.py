@@ -8,9 +8,10 @@ from app.core.strategies.simplex import model_optimum
 
 def start_gains(definition: Definition, experiment: Experiment, space: PolicySpace) -> dict[str, float]:
     """The experiment's default gains, those of the definition (given, or the best of another campaign), or the nominal
-    model's optimum searched from the default."""
+    model's optimum searched from the default, where there is a model."""
+    modelled = experiment.modelled
     if definition.start.gains is not None:
         return space.check(definition.start.gains, field="start.gains")
-    if definition.start.kind == "simplex":
-        return space.mapping(model_optimum(experiment, space, space.nearest(space.default)).gains)
+    if definition.start.kind == "simplex" and modelled is not None:
+        return space.mapping(model_optimum(modelled, space, space.nearest(space.default)).gains)
     return space.mapping(space.default)

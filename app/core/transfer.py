@@ -18,7 +18,7 @@ import numpy as np
 
 from app.core import calibration
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import ModelledExperiment
 from app.core.predictions import cost_of_an_offset
 from app.core.strategies.bias import corrected_by
 from app.core.trajectory import CHANNEL_UNITS
@@ -35,13 +35,15 @@ class Transfer:
     """`agreement` is None until this vehicle has flown; `experiment` and `step_fraction` are what a strategy is to work
     with."""
 
-    experiment: Experiment
+    experiment: ModelledExperiment
     step_fraction: float
     agreement: float | None
     sentence: str
 
 
-def transfer(definition: Definition, experiment: Experiment, flights: Sequence[Flight], donor: Flight) -> Transfer:
+def transfer(
+    definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight
+) -> Transfer:
     """Judged by the first valid flight, for the whole campaign; the step is shortened for the flight after it only."""
     valid = [flight for flight in flights if flight.outcome == "valid"]
     plain = Transfer(experiment=experiment, step_fraction=definition.step_fraction, agreement=None, sentence="")
@@ -66,7 +68,7 @@ def transfer(definition: Definition, experiment: Experiment, flights: Sequence[F
     )
 
 
-def _agreement(experiment: Experiment, donor: Flight, own: Flight) -> tuple[float, float, float]:
+def _agreement(experiment: ModelledExperiment, donor: Flight, own: Flight) -> tuple[float, float, float]:
     """Agreement as above, and the r.m.s. of b_B − b_A and of b_B, in the output's unit."""
     theirs, ours = corrected_by(experiment, donor).bias, corrected_by(experiment, own).bias
     apart, whole = float(np.mean((ours - theirs) ** 2)), float(np.mean(ours**2))
@@ -76,7 +78,7 @@ def _agreement(experiment: Experiment, donor: Flight, own: Flight) -> tuple[floa
     return (agreed if unexplained else 1.0), float(np.sqrt(apart)), float(np.sqrt(whole))
 
 
-def _informed(experiment: Experiment, donor: Flight, agreed: float) -> Experiment:
+def _informed(experiment: ModelledExperiment, donor: Flight, agreed: float) -> ModelledExperiment:
     """The donor's fit as the nominal model, each standard deviation widened by what the two vehicles disagree in; the
     experiment itself where no fit is made."""
     if experiment.name not in calibration.EXPERIMENTS:

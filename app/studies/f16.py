@@ -15,7 +15,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule, flight_seed
-from app.core.experiments import get_experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.proposing import next_proposal
 from app.core.strategies.simplex import Optimum, model_optimum
@@ -189,7 +188,7 @@ def study(
 def showcase(seed: int = SHOWCASE_SEED, *, flights: int = SHOWCASE_FLIGHTS, perturbation: float = 0.45) -> Showcase:
     """The paper's method, scaled, on one inaccurate model, and the search that gave its start."""
     definition = _definition(METHODS["outside"], perturbation, seed, flights)
-    experiment = get_experiment(definition.experiment, definition.experiment_options)
+    experiment = PitchTracking(definition.experiment_options)
     default, optimum = experiment.space.default, start(perturbation, seed)
     return Showcase(
         search_errors=optimum.course,

@@ -12,8 +12,8 @@ from app.core.control.fixed_point import fix
 from app.core.control.vertical_loop import ALT, POSITION_BITS
 from app.core.descent import descend
 from app.core.errors import InputError, Problem
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Matrix
+from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains, Vector
 from app.core.trajectory import Samples, Trajectory
 from app.vehicles.base import OptionValue
@@ -35,7 +35,7 @@ _QUIET: Final = {"twin": {"scatter": 0.0}, "jsbsim": {"gust_m_s": 0.0, "altitude
 _SIMULATIONS: Final[Mapping[str, Callable[[dict[str, float], int], Simulation]]] = MappingProxyType(
     {"twin": TwinFlight, "jsbsim": JsbsimFlight}
 )
-_TAKEOFF: Final = get_experiment("takeoff")
+_TAKEOFF: Final = Takeoff()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 
 from app.core.definition import Flight, flight_seed
-from app.core.experiments import get_experiment
+from app.core.experiments.takeoff import Takeoff
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import Interval
 from app.studies.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error
 
-EXPERIMENT: Final = get_experiment("takeoff")
+EXPERIMENT: Final = Takeoff()
 SPACE: Final[PolicySpace] = EXPERIMENT.space
 DEFAULT: Final[Mapping[str, float]] = SPACE.mapping(SPACE.default)
 WORST_M: Final = 100.0

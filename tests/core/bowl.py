@@ -46,6 +46,10 @@ class Bowl:
         return type(self)(informed_parameters(self.model_parameters, mean, sd))
 
     @property
+    def modelled(self) -> Self:
+        return self
+
+    @property
     def nominal_model(self) -> Vector:
         return np.array([parameter.nominal for parameter in self.model_parameters])
 

@@ -35,7 +35,11 @@ def test_the_default_definition_has_no_problems() -> None:
         (replace(GOOD, ceiling_m=101.0), "ceiling_m", "must lie in 3.2 … 100 m, got 101"),
         (replace(GOOD, stop=StopRule(confidence=1.0)), "stop.confidence", "must be at least 0.5 and below 1, got 1"),
         (replace(GOOD, stop=StopRule(min_battery_v=-1.0)), "stop.min_battery_v", "must be above 0 V, got -1"),
-        (replace(GOOD, experiment="landing"), "experiment", "must be one of takeoff, pitch-tracking, got 'landing'"),
+        (
+            replace(GOOD, experiment="landing"),
+            "experiment",
+            "must be one of takeoff, takeoff-ardupilot, takeoff-px4, pitch-tracking, got 'landing'",
+        ),
         (
             replace(GOOD, strategy="luck"),
             "strategy",

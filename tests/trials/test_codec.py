@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from app.core.errors import TrajectoryError
-from app.core.experiments import get_experiment
+from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
 from app.errors import StorageError
 from app.trials.codec import pack, unpack
@@ -43,7 +43,7 @@ def test_what_comes_back_is_what_the_core_calls_stored() -> None:
 
 
 def test_a_takeoff_of_all_channels_takes_less_than_a_sixth_of_its_double_precision() -> None:
-    takeoff = get_experiment("takeoff")
+    takeoff = Takeoff()
     flight = takeoff.simulate(takeoff.space.default, takeoff.nominal_model)
     plain = 8 * len(flight) * (1 + len(flight.channels))
     assert len(pack(flight).data) < plain / 6

@@ -9,8 +9,9 @@ from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
+from app.core.experiments.takeoff_copters import TAKEOFF_ARDUPILOT, TAKEOFF_PX4
 
-_ALL: Final[tuple[Experiment, ...]] = (Takeoff(), PitchTracking())
+_ALL: Final[tuple[Experiment, ...]] = (Takeoff(), TAKEOFF_ARDUPILOT, TAKEOFF_PX4, PitchTracking())
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType({experiment.name: experiment for experiment in _ALL})
 

@@ -109,7 +109,7 @@ class SimplexSearch:
 
 
 class Experiment(Protocol):
-    """One manoeuvre with its policy space, its simple model, and its performance measure (lower is better)."""
+    """One manoeuvre with its policy space and its performance measure (lower is better)."""
 
     @property
     def name(self) -> str: ...
@@ -124,28 +124,15 @@ class Experiment(Protocol):
         """The experiment with these settings, the others at their defaults; they must be free of problems."""
         ...
 
-    def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model as its nominal one: both of shape (m,)."""
+    @property
+    def modelled(self) -> "ModelledExperiment | None":
+        """The same with its simple model; None where there is none, so that nothing can be foretold."""
         ...
 
     @property
     def space(self) -> PolicySpace: ...
     @property
-    def model_parameters(self) -> tuple[ModelParameter, ...]: ...
-    @property
-    def nominal_model(self) -> Vector:
-        """Shape (m,), in the order of `model_parameters`."""
-        ...
-
-    @property
     def scatter(self) -> Scatter: ...
-    @property
-    def search(self) -> SimplexSearch: ...
-    @property
-    def difference(self) -> float:
-        """Step of the gradient's differences, as a share of each gain's scale."""
-        ...
-
     @property
     def output(self) -> str:
         """The channel that is scored, e.g. `altitude_m`."""
@@ -165,6 +152,39 @@ class Experiment(Protocol):
 
     def set_point(self, time_s: Samples) -> Samples:
         """What the output is scored against, shape of `time_s`; zero before the command."""
+        ...
+
+    def errors(self, outputs: Matrix) -> Vector:
+        """Performance of outputs given on `grid_s`: (k, n) → (k,)."""
+        ...
+
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
+        """Performance of a recorded flight on its own time stamps. Raises TrajectoryError when it cannot be scored.
+
+        `accept_gaps`: somebody has looked at the gaps inside the record and counts the flight all the same.
+        """
+        ...
+
+
+class ModelledExperiment(Experiment, Protocol):
+    """An experiment with a simple model of its vehicle."""
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        """The experiment with another vehicle's fitted model as its nominal one: both of shape (m,)."""
+        ...
+
+    @property
+    def model_parameters(self) -> tuple[ModelParameter, ...]: ...
+    @property
+    def nominal_model(self) -> Vector:
+        """Shape (m,), in the order of `model_parameters`."""
+        ...
+
+    @property
+    def search(self) -> SimplexSearch: ...
+    @property
+    def difference(self) -> float:
+        """Step of the gradient's differences, as a share of each gain's scale."""
         ...
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
@@ -188,15 +208,4 @@ class Experiment(Protocol):
     def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
         """What could go wrong in a flight with these gains, inside the bounds or not, on vehicles as `spread` has them:
         the checks of the gate that only the experiment can make. Pure; a tenth of a second at most."""
-        ...
-
-    def errors(self, outputs: Matrix) -> Vector:
-        """Performance of outputs given on `grid_s`: (k, n) → (k,)."""
-        ...
-
-    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """Performance of a recorded flight on its own time stamps. Raises TrajectoryError when it cannot be scored.
-
-        `accept_gaps`: somebody has looked at the gaps inside the record and counts the flight all the same.
-        """
         ...

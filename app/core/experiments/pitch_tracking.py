@@ -133,6 +133,11 @@ class PitchTracking:
         return type(self)(self._options, informed_parameters(self.model_parameters, mean, sd))
 
     @property
+    def modelled(self) -> Self:
+        """The experiment itself."""
+        return self
+
+    @property
     def nominal_model(self) -> Vector:
         """Shape (19,): nothing is multiplied, until another aircraft's fit says more."""
         return np.array([parameter.nominal for parameter in self.model_parameters])

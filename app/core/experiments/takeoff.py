@@ -113,6 +113,11 @@ class Takeoff:
         return type(self)(informed_parameters(self.model_parameters, mean, sd))
 
     @property
+    def modelled(self) -> Self:
+        """The experiment itself."""
+        return self
+
+    @property
     def nominal_model(self) -> Vector:
         """What is known before the first flight; from the data sheet, mass and thrust and nothing of the rest."""
         return np.array([parameter.nominal for parameter in self.model_parameters])

@@ -50,7 +50,7 @@ def check_policy(
     spread: Spread | None = None,
 ) -> Gate:
     """Judge a complete set of gains (every name of `space`): its numbers, the campaign's bounds, its step limit, and
-    the experiment's hazards.
+    the experiment's hazards, where it has a model to find them with.
     What a valid flight of this campaign has flown may fly again although simulated takeoffs go astray: the flight is
     the better evidence.
     Pure; a takeoff's takes a tenth of a second.
@@ -62,15 +62,20 @@ def check_policy(
     """
     if numbers := check_numbers(space, gains):
         return Gate(numbers)
-    hazards = experiment.hazards(
-        space.vector(gains),
-        known(experiment, flights) if spread is None else spread,
-        envelope_of(definition, experiment),
-    )
+    hazards = _hazards(definition, experiment, space, gains, known(experiment, flights) if spread is None else spread)
     if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
         hazards = tuple(_flown_before(check) for check in hazards)
     limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
     return Gate(jointly_offered(gains, (*limits, *hazards)))
+
+
+def _hazards(
+    definition: Definition, experiment: Experiment, space: PolicySpace, gains: Gains, spread: Spread
+) -> tuple[Check, ...]:
+    modelled = experiment.modelled
+    if modelled is None:
+        return ()
+    return modelled.hazards(space.vector(gains), spread, envelope_of(definition, experiment))
 
 
 def _flown_before(check: Check) -> Check:

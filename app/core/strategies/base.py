@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment, FittedParameter
+from app.core.experiments.base import FittedParameter, ModelledExperiment
 from app.core.options import Option
 from app.core.policy import PolicySpace
 from app.core.spread import Spread
@@ -83,16 +83,17 @@ class Strategy:
     """A registered strategy: `propose(definition, experiment, space, flights)`, with at least one valid flight.
 
     `experiments` names those it works with; empty: with all. `learns`: whether its predictions are corrected by the
-    flight that its explanation names as the base.
+    flight that its explanation names as the base. `needs_model`: whether it finds gains by flying them on a model.
     """
 
     name: str
     title: str
     line: str
     options: tuple[Option, ...]
-    propose: Callable[[Definition, Experiment, PolicySpace, Sequence[Flight]], Proposal]
+    propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
     experiments: tuple[str, ...] = ()
     learns: bool = True
+    needs_model: bool = True
 
 
 def band_channels(output: str) -> tuple[str, str]:

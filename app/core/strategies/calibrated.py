@@ -12,7 +12,7 @@ import numpy as np
 
 from app.core.calibration import Calibration, calibrate
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment, Matrix
+from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import Explanation, Kind, Proposal, Strategy
@@ -43,7 +43,9 @@ class _Choice:
     notes: tuple[str, ...] = ()
 
 
-def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+def propose(
+    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
     """The hedged optimum of the calibrated model, as far as trust goes. At least one flight must be valid.
 
     Raises TypeError for an experiment that it is not made for.
@@ -130,7 +132,7 @@ def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
     return tuple(name for name, is_there in zip(space.names, at_edge, strict=True) if is_there)
 
 
-def _summary(experiment: Experiment, base: Flight, choice: _Choice, foretold: Foretold, flights: int) -> str:
+def _summary(experiment: ModelledExperiment, base: Flight, choice: _Choice, foretold: Foretold, flights: int) -> str:
     unit = experiment.error_unit
     told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
     best = f"flight {base.number} ({describe(base.gains)}, error {base.error:.4f} {unit})"

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 
 from app.core.calibration import Calibration
 from app.core.definition import Flight
-from app.core.experiments.base import Experiment, Matrix
+from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.plants.vertical_disturbed import ENTERED
 from app.core.policy import Vector
 from app.core.strategies.base import Interval, band_channels
@@ -82,6 +82,6 @@ def remaining_bias(calibration: Calibration, base: Flight, gains: Vector) -> Sam
     return np.asarray(disturbed - undisturbed)
 
 
-def _closeness(experiment: Experiment, gains: Vector, flown: Vector) -> float:
+def _closeness(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:
     """1 at the flown gains, 0.6 one scale away from them."""
     return float(np.exp(-0.5 * np.sum(((gains - flown) / experiment.space.scale) ** 2)))

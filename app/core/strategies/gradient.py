@@ -14,7 +14,7 @@ import numpy as np
 
 from app.core.calibration import known
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import ModelledExperiment
 from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import Explanation, LadderStep, Proposal, Strategy
@@ -60,7 +60,9 @@ def _raw_metric(space: PolicySpace) -> _Metric:
     return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER)
 
 
-def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+def propose(
+    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
     """The next gains on the line from the best flight. At least one flight must be valid."""
     metric = _Metric(space.scale, SCALED_LADDER) if definition.options.get("scaled", True) else _raw_metric(space)
     base = best_flight(flights)
@@ -136,7 +138,7 @@ def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
 
 
 def _summary(
-    experiment: Experiment,
+    experiment: ModelledExperiment,
     base: Flight,
     best: LadderStep,
     chosen: LadderStep | None,
@@ -160,7 +162,7 @@ def _summary(
     )
 
 
-def _corrected(definition: Definition, experiment: Experiment, base: Flight) -> tuple[CorrectedModel, str]:
+def _corrected(definition: Definition, experiment: ModelledExperiment, base: Flight) -> tuple[CorrectedModel, str]:
     """The corrected model, and how it is corrected."""
     if definition.options.get("bias") != "inside":
         return corrected_by(experiment, base), f"{_OUTSIDE}."

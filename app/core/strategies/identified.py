@@ -9,7 +9,7 @@ from scipy.special import erf
 from scipy.stats import qmc
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment, Matrix, fitted_parameters
+from app.core.experiments.base import Matrix, ModelledExperiment, fitted_parameters
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.identification import Fit, Identified, identify
 from app.core.options import Option
@@ -35,7 +35,9 @@ _TAIL: Final = 0.05
 _TAIL_SD: Final = 1.6449
 
 
-def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+def propose(
+    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
     """The optimum of the model identified from all flights, within the step limit of the best. At least one flight must
     be valid."""
     assert isinstance(experiment, PitchTracking)  # a definition with another experiment is refused

@@ -12,11 +12,12 @@ from app.core.strategies.history import best_flight, describe
 
 
 def propose(_definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
-    """The best flown gains, or the nearest inside the bounds, for the operator to change. At least one flight must be
-    valid."""
+    """The best flown gains, or the nearest inside the bounds, for the operator to change; without a model nothing is
+    predicted of them. At least one flight must be valid."""
     best = best_flight(flights)
     gains = space.nearest(space.vector(best.gains))
-    trajectory, error = corrected_by(experiment, best).predict(gains)
+    modelled = experiment.modelled
+    trajectory, error = (None, None) if modelled is None else corrected_by(modelled, best).predict(gains)
     summary = (
         f"You choose the next gains. The best so far are those of flight {best.number} ({describe(best.gains)}), "
         f"error {best.error:.4f} {experiment.error_unit}."
@@ -36,4 +37,5 @@ MANUAL: Final = Strategy(
     line="You choose every gain set; bounds and step limits are checked as for any other.",
     options=(),
     propose=propose,
+    needs_model=False,
 )

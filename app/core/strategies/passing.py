@@ -2,11 +2,11 @@
 
 from app.core.definition import Definition
 from app.core.envelope import envelope_of
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import ModelledExperiment
 from app.core.policy import Vector
 from app.core.spread import Spread
 
 
-def may_fly(definition: Definition, experiment: Experiment, gains: Vector, spread: Spread) -> bool:
+def may_fly(definition: Definition, experiment: ModelledExperiment, gains: Vector, spread: Spread) -> bool:
     """Whether the experiment sees no hazard in gains of shape (n,) over what is known of the vehicle."""
     return all(check.passed for check in experiment.hazards(gains, spread, envelope_of(definition, experiment)))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment, SimplexSearch
+from app.core.experiments.base import ModelledExperiment, SimplexSearch
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import Explanation, Proposal, Strategy
 from app.core.strategies.bias import nominal
@@ -36,7 +36,7 @@ class Optimum:
     course: tuple[float, ...] = ()
 
 
-def model_optimum(experiment: Experiment, space: PolicySpace, start: Vector) -> Optimum:
+def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vector) -> Optimum:
     """Nelder–Mead within the bounds, with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's own),
     first steps and budget the experiment's own; gains are rounded before each run of the model, and run once."""
     model, search = nominal(experiment), experiment.search
@@ -71,7 +71,9 @@ def model_optimum(experiment: Experiment, space: PolicySpace, start: Vector) -> 
     return Optimum(space.nearest(found.x), float(found.fun), int(found.nfev), tuple(course))
 
 
-def propose(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+def propose(
+    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
     """The nominal model's optimum, or as far towards it as the step limit lets the best flight go. At least one flight
     must be valid."""
     start = space.vector(definition.start.gains) if definition.start.gains else space.nearest(space.default)
