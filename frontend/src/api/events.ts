@@ -3,7 +3,8 @@
 import type { QueryClient } from "@tanstack/react-query";
 import { type Change, changeFrom, doubtfulOnce } from "../lib/events";
 import { telemetryFrom } from "../lib/live";
-import { setConnection, takePhase, takeTelemetry } from "../live/store";
+import { statusFrom } from "../lib/vehicle";
+import { setConnection, takePhase, takeStatus, takeTelemetry } from "../live/store";
 
 const GATHER_MS = 40;
 const AGAIN_MS = 1000;
@@ -55,6 +56,10 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     on("telemetry", (data) => {
       const news = telemetryFrom(data);
       if (news !== null) takeTelemetry(news);
+    });
+    on("vehicle", (data) => {
+      const status = statusFrom(data);
+      if (status !== null) takeStatus(status);
     });
     on("phase", (data) => {
       const { campaign_id, trial_id, phase } = JSON.parse(data) as {

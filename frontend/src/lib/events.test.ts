@@ -15,6 +15,11 @@ test("a changed job makes the jobs doubtful, and one without a campaign the repr
   expect(doubtful({ topic: "job", entity_id: 3, campaign_id: 4 })).toEqual([["jobs"], ["campaign", 4]]);
 });
 
+test("a changed vehicle makes itself and the list of vehicles doubtful", () => {
+  const keys = doubtful({ topic: "vehicle", entity_id: 2, campaign_id: null });
+  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2]]);
+});
+
 test("many changes together ask for each answer once", () => {
   const changes = [
     { topic: "proposal", entity_id: 1, campaign_id: 4 },

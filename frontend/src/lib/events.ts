@@ -12,6 +12,7 @@ export function doubtful(change: Change): QueryKey[] {
   const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
   if (change.topic === "trial") keys.push(["trial", change.entity_id]);
+  if (change.topic === "vehicle") keys.push(["vehicles"], ["vehicle", change.entity_id]);
   if (change.topic === "job" && change.campaign_id === null) keys.push(["reproductions"]);
   if (change.campaign_id !== null) keys.push(["campaign", change.campaign_id]);
   return keys;

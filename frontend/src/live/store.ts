@@ -1,7 +1,8 @@
-/** What the event stream says, kept outside of React: the state of the connection and the flights under way. */
+/** What the event stream says, kept outside of React: the connection, the flights under way, and how vehicles are. */
 
-import { useSyncExternalStore } from "react";
+import { useEffect, useMemo, useState, useSyncExternalStore } from "react";
 import { begun, extended, type LiveFlight, type Telemetry, underWay, withFlight } from "../lib/live";
+import { type Aged, aged, type Heard, type Moment, type VehicleStatus } from "../lib/vehicle";
 
 export interface Connection {
   state: "connecting" | "live" | "away";
@@ -33,6 +34,7 @@ class Store<Value> {
 
 const connection = new Store<Connection>({ state: "connecting", worker: true });
 const flights = new Store<ReadonlyMap<number, LiveFlight>>(new Map());
+const vehicles = new Store<ReadonlyMap<number, Heard>>(new Map());
 
 export function setConnection(change: Partial<Connection>): void {
   const next = { ...connection.get(), ...change };
@@ -47,6 +49,14 @@ export function takeTelemetry(news: Telemetry): void {
 export function takePhase(campaignId: number, trialId: number, phase: string): void {
   const known = flights.get().get(trialId) ?? begun(campaignId, trialId);
   flights.set(withFlight(flights.get(), { ...known, phase }));
+}
+
+export function takeStatus(status: VehicleStatus): void {
+  vehicles.set(new Map([...vehicles.get(), [status.vehicleId, { status, heardAt: momentNow() }]]));
+}
+
+export function momentNow(): Moment {
+  return { wallMs: Date.now(), steadyMs: performance.now() };
 }
 
 export function useConnection(): Connection {
@@ -74,4 +84,25 @@ export function onLive(trialId: number, draw: (flight: LiveFlight) => void): () 
   };
   tell();
   return flights.subscribe(tell);
+}
+
+const TICK_MS = 250;
+
+/** Now, again and again, so that ages count up while nothing comes. */
+function useMoment(): Moment {
+  const [now, setNow] = useState(momentNow);
+  useEffect(() => {
+    const ticking = setInterval(() => setNow(momentNow()), TICK_MS);
+    return () => clearInterval(ticking);
+  }, []);
+  return now;
+}
+
+/** How the vehicle is and how old that is, counting on; null while the stream has said nothing of it. */
+export function useVehicleStatus(vehicleId: number | null): Aged | null {
+  const heard = useSyncExternalStore(vehicles.subscribe, () =>
+    vehicleId === null ? null : (vehicles.get().get(vehicleId) ?? null),
+  );
+  const now = useMoment();
+  return useMemo(() => (heard === null ? null : aged(heard, now)), [heard, now]);
 }
