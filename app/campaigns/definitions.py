@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, replace
 from typing import Final
 
@@ -27,21 +27,23 @@ def core_definition(asked: DefinitionIn) -> Definition:
 
 
 def definition_of(row: CampaignRow) -> Definition:
-    """The definition of a stored campaign, with its vehicle's safe gains where they are not the experiment's own."""
+    """The definition of a stored campaign, with its vehicle's safe gains (once it has flown, those at its first flight)
+    where they are not the experiment's own."""
     space = get_experiment(row.experiment).space
-    own = dict(row.vehicle.safe_gains)
+    own = dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains)
     safe_gains = None if own == space.mapping(space.default) else own
     return replace(_ADAPTER.validate_python(row.definition), safe_gains=safe_gains)
 
 
 def frozen_digest(row: CampaignRow) -> str:
-    """SHA-256 over all that is frozen at the first flight: the definition, the vehicle with all its settings, and its
-    safe gains. Proposals carry the narrower digest of the definition, because they depend on nothing else."""
+    """SHA-256 over all that is frozen at the first flight: the definition, the vehicle (a registered one by its id, a
+    shared one with all its settings), and its safe gains. Proposals carry the narrower digest of the definition, because they depend on nothing else."""
     frozen = {
         "definition": definition_of(row).digest(),
         "vehicle": row.vehicle.kind,
         "options": row.vehicle_options,
         "safe_gains": row.vehicle.safe_gains,
+        **({"vehicle_id": row.vehicle.id} if row.vehicle.registered else {}),
     }
     return hashlib.sha256(json.dumps(frozen, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
@@ -63,7 +65,7 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
     problems = [
         *_refusals(lambda: check_definition(definition), "definition."),
         *_refusals(take_options, ""),
-        *_mismatch(definition, vehicle.kind),
+        *_mismatch(definition, vehicle.kind, options),
     ]
     if problems:
         raise InputError(
@@ -84,10 +86,17 @@ def _require_whole(asked: DefinitionIn) -> None:
         )
 
 
-def _mismatch(definition: Definition, kind: str) -> Iterator[Problem]:
-    if kind in VEHICLE_KINDS and definition.experiment not in (flies := VEHICLE_KINDS[kind].experiments):
+def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionValue]) -> Iterator[Problem]:
+    """`options` are empty where they could not be used."""
+    if kind not in VEHICLE_KINDS:
+        return
+    described = VEHICLE_KINDS[kind]
+    if definition.experiment not in described.experiments:
         yield Problem("definition.experiment", f"{definition.experiment!r} cannot be flown by {kind}")
-        yield Problem("vehicle.kind", f"{kind!r} flies {', '.join(flies)} only")
+        yield Problem("vehicle.kind", f"{kind!r} flies {', '.join(described.experiments)} only")
+    elif options and definition.experiment not in (flies := described.experiments_with(options)):
+        reason = f"{definition.experiment!r} has other gains than this vehicle, which flies {', '.join(flies)}"
+        yield Problem("definition.experiment", reason)
 
 
 def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:

@@ -21,7 +21,7 @@ IMPORT: Final = VehicleKind(
     line="You fly the proposed gains on your own vehicle and upload its log, or the altitude as CSV.",
     is_real=True,
     can_fly=False,
-    experiments=("takeoff",),
+    experiments=("takeoff", "takeoff-ardupilot", "takeoff-px4"),
     options=(),
     open=_open,
 )

@@ -27,13 +27,14 @@ def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
 class VehicleKind:
     """A registered kind of vehicle.
 
-    `experiments` names those that it can fly. `open(options, safe_gains)` gets complete, checked options and returns a
-    vehicle that holds its safe gains. `connect(options, safe_gains, identity)` opens a link that stays open between
-    flights; None: the kind has none, and is opened for each flight. It raises VehicleError when nobody answers, or
-    another than `identity` (None: whoever answers); an armed vehicle is returned, with nothing written to it and its
-    `concern` set. `conflicts(options, hosts)` names options that are possible one by one but not together;
-    `simulates(options, hosts)` says whether a vehicle of a real kind is a simulation all the same. The dashboard offers
-    and flies those that are `served`.
+    `experiments` names those that it can fly; where that depends on its settings, `suits(options)` those that it can
+    fly with these. `open(options, safe_gains)` gets complete, checked options and returns a vehicle that holds its safe
+    gains. `connect(options, safe_gains, identity)` opens a link that stays open between flights; None: the kind has
+    none, and is opened for each flight. It raises VehicleError when nobody answers, or another than `identity` (None:
+    whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
+    `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
+    says whether a vehicle of a real kind is a simulation all the same. The dashboard offers and flies those that are
+    `served`.
     """
 
     name: str
@@ -47,7 +48,12 @@ class VehicleKind:
     connect: Callable[[Options, Gains, Identity | None], ConnectedVehicle] | None = None
     conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
     simulates: Callable[[Options, Hosts], bool] = _never
+    suits: Callable[[Options], tuple[str, ...]] | None = None
     served: bool = True
+
+    def experiments_with(self, options: Options) -> tuple[str, ...]:
+        """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""
+        return self.experiments if self.suits is None else self.suits(options)
 
     def is_real_with(self, options: Options, simulation_hosts: Hosts = HERE) -> bool:
         """Whether a vehicle with these options, complete and checked, is REAL."""

@@ -42,6 +42,11 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
     return tuple(problems)
 
 
+def _experiments(options: Options) -> tuple[str, ...]:
+    """The one whose gains the autopilot has."""
+    return (PROFILES[str(options["autopilot"])].experiment,)
+
+
 def _number(name: str, title: str, unit: str, default: float, lower: float, upper: float) -> VehicleOption:
     return VehicleOption(name=name, title=title, unit=unit, default=default, lower=lower, upper=upper)
 
@@ -52,7 +57,7 @@ MAVLINK: Final = VehicleKind(
     line="A real vehicle under Paparazzi, ArduCopter or PX4, or a simulated one that speaks like it.",
     is_real=True,
     can_fly=True,
-    experiments=("takeoff",),
+    experiments=tuple(profile.experiment for profile in PROFILES.values()),
     options=(
         VehicleOption(name="autopilot", title="Autopilot: paparazzi, ardupilot or px4", unit="", default="paparazzi"),
         VehicleOption(
@@ -76,5 +81,6 @@ MAVLINK: Final = VehicleKind(
     open=_open,
     conflicts=_conflicts,
     simulates=is_simulated,
+    suits=_experiments,
     served=False,
 )

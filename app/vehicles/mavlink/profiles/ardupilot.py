@@ -25,6 +25,7 @@ class ArduPilot:
 
     name: Final = "ardupilot"
     title: Final = "ArduCopter"
+    experiment: Final = "takeoff-ardupilot"
     dialect: Final = ARDUPILOTMEGA
     autopilot: Final = 3
     heartbeat_s: Final = 1.0

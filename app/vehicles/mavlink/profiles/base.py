@@ -119,6 +119,11 @@ class Profile(Protocol):
     @property
     def dialect(self) -> Dialect: ...
     @property
+    def experiment(self) -> str:
+        """The one that tunes its gains."""
+        ...
+
+    @property
     def autopilot(self) -> int:
         """The number of its make in a heartbeat."""
         ...

@@ -28,6 +28,7 @@ class Paparazzi:
 
     name: Final = "paparazzi"
     title: Final = "Paparazzi"
+    experiment: Final = "takeoff"
     dialect: Final = DIALECT
     autopilot: Final = 9
     heartbeat_s: Final = 0.5

@@ -27,6 +27,7 @@ class Px4:
 
     name: Final = "px4"
     title: Final = "PX4"
+    experiment: Final = "takeoff-px4"
     dialect: Final = COMMON
     autopilot: Final = 12
     heartbeat_s: Final = 1.0
