@@ -196,6 +196,10 @@ def sim_drone(
     system: Annotated[
         int | None, typer.Option(min=1, max=255, show_default=False, help="Its MAVLink system id.")
     ] = None,
+    failsafes: Annotated[
+        bool,
+        typer.Option(help="ArduPilot and PX4: with the failsafes on that a flight needs, or all off, as they come."),
+    ] = True,
     any_network: Annotated[
         bool, typer.Option("--any-network", help="Allow links that lead beyond this computer.")
     ] = False,
@@ -212,6 +216,7 @@ def sim_drone(
         speed=speed,
         faults=fault or [],
         system=system,
+        failsafes=failsafes,
         any_network=any_network,
     )
 

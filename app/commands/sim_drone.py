@@ -27,6 +27,7 @@ def run_sim_drone(
     speed: float,
     faults: Sequence[str],
     system: int | None,
+    failsafes: bool,
     any_network: bool,
 ) -> None:
     """Serve the drone until SIGINT or SIGTERM; the main thread only. Raises InputError for what cannot be had, and
@@ -42,8 +43,9 @@ def run_sim_drone(
     planned = [parse_fault(text) for text in faults]
     clock = ScaledClock(speed)
     number = kind.system if system is None else system
+    switch_on = kind.set_up if failsafes else kind.make
     body = new_body(vehicle, _options(settings), seed=seed)
-    drone = Drone(body, lambda fresh: kind.make(fresh, number), planned)
+    drone = Drone(body, lambda fresh: switch_on(fresh, number), planned)
     transport = open_transport(address)
     try:
         server = Server(drone, transport, clock)

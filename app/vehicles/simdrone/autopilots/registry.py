@@ -8,14 +8,23 @@ from typing import Final
 from app.core.errors import InputError, Problem
 from app.vehicles.simdrone.autopilots.ardupilot import ArduPilot, ArduPilot47
 from app.vehicles.simdrone.autopilots.base import Autopilot
+from app.vehicles.simdrone.autopilots.copter.copter import Copter
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
 from app.vehicles.simdrone.autopilots.px4 import Px4
 from app.vehicles.simdrone.body import Body
 
+_ARDUPILOT_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0}
+"""Land when the ground station is lost; keep inside the fence."""
+_LAND: Final = 3.0
+_RETURN: Final = 3.0
+
+Make = Callable[[Body, int], Autopilot]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotKind:
-    """An autopilot that a simulated drone can have; `make(body, system)` switches one on."""
+    """An autopilot that a simulated drone can have; `make(body, system)` switches one on as it comes, `set_up` as a
+    person leaves it before a first flight: with the failsafes on that come switched off."""
 
     name: str
     title: str
@@ -23,22 +32,35 @@ class AutopilotKind:
     """Its system id unless another is asked for."""
     link: str
     """Where it speaks unless told otherwise."""
-    make: Callable[[Body, int], Autopilot]
+    make: Make
+    set_up: Make
 
 
 def _paparazzi(body: Body, system: int) -> Autopilot:
     return Paparazzi(body, system=system)
 
 
-def _ardupilot(body: Body, system: int) -> Autopilot:
+def _ardupilot(body: Body, system: int) -> Copter:
     return ArduPilot(body, system=system)
 
 
-def _ardupilot_47(body: Body, system: int) -> Autopilot:
+def _ardupilot_47(body: Body, system: int) -> Copter:
     return ArduPilot47(body, system=system)
 
 
-def _px4(body: Body, system: int) -> Autopilot:
+def _with(make: Callable[[Body, int], Copter], **parameters: float) -> Make:
+    """The same copter with these parameters set."""
+
+    def switch_on(body: Body, system: int) -> Autopilot:
+        copter = make(body, system)
+        for name, value in parameters.items():
+            copter.parameters[name] = value
+        return copter
+
+    return switch_on
+
+
+def _px4(body: Body, system: int) -> Copter:
     return Px4(body, system=system)
 
 
@@ -56,6 +78,7 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
                 system=31,
                 link="udp:127.0.0.1:4244@4245",
                 make=_paparazzi,
+                set_up=_paparazzi,
             ),
             AutopilotKind(
                 name="paparazzi-bare",
@@ -63,9 +86,15 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
                 system=31,
                 link="udp:127.0.0.1:4244@4245",
                 make=_bare_paparazzi,
+                set_up=_bare_paparazzi,
             ),
             AutopilotKind(
-                name="ardupilot", title="ArduCopter up to 4.6", system=1, link="udp:127.0.0.1:14550", make=_ardupilot
+                name="ardupilot",
+                title="ArduCopter up to 4.6",
+                system=1,
+                link="udp:127.0.0.1:14550",
+                make=_ardupilot,
+                set_up=_with(_ardupilot, **_ARDUPILOT_FAILSAFES),
             ),
             AutopilotKind(
                 name="ardupilot-4.7",
@@ -73,8 +102,16 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
                 system=1,
                 link="udp:127.0.0.1:14550",
                 make=_ardupilot_47,
+                set_up=_with(_ardupilot_47, **_ARDUPILOT_FAILSAFES),
             ),
-            AutopilotKind(name="px4", title="PX4", system=1, link="udp:127.0.0.1:14550", make=_px4),
+            AutopilotKind(
+                name="px4",
+                title="PX4",
+                system=1,
+                link="udp:127.0.0.1:14550",
+                make=_px4,
+                set_up=_with(_px4, NAV_DLL_ACT=_LAND, GF_ACTION=_RETURN, GF_MAX_VER_DIST=10.0),
+            ),
         )
     }
 )
