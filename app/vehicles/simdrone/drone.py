@@ -30,6 +30,10 @@ class Drone:
         """Since it was switched on."""
         return self._ticks * TICK_S
 
+    def afflict(self, fault: str, duration_s: float = float("inf")) -> None:
+        """Let a fault of `FAULTS` set in with the next tick."""
+        self._faults.add(Planned(fault, None, self.time_s + duration_s))
+
     def receive(self, data: bytes) -> None:
         """What came over the link."""
         if not self._faults.is_deaf and self.time_s >= self._silent_until_s:

@@ -262,8 +262,14 @@ class Faults:
     """The faults planned for one drone, and which of them are at work."""
 
     def __init__(self, planned: Sequence[Planned]) -> None:
-        self._waiting = [(plan, FAULTS[plan.fault]()) for plan in planned]
+        self._waiting: list[tuple[Planned, Fault]] = []
         self._working: list[tuple[Planned, Fault]] = []
+        for plan in planned:
+            self.add(plan)
+
+    def add(self, plan: Planned) -> None:
+        """One more, even while the drone flies."""
+        self._waiting.append((plan, FAULTS[plan.fault]()))
 
     def update(self, now_s: float, takeoff_s: float | None, drone: Afflicted) -> None:
         """Let those begin whose time has come, and those end whose time is over; none comes twice."""

@@ -44,6 +44,13 @@ class Autopilot(Protocol):
     took_off: bool
     """Whether a takeoff was ever commanded."""
 
+    @property
+    def armed(self) -> bool: ...
+
+    def held(self, parameter: str) -> float:
+        """What a parameter is now, whatever was said of it on the wire. Raises KeyError for an unknown name."""
+        ...
+
     def receive(self, data: bytes) -> None:
         """Take in what the radio received."""
         ...

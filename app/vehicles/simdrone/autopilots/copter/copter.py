@@ -140,6 +140,9 @@ class Copter(ABC):
                 if self.armed:
                     self.take_off(float("nan"))
 
+    def held(self, parameter: str) -> float:
+        return self.parameters[parameter]
+
     def find_mode(self, name: str) -> FlightMode:
         return next(mode for mode in self.manners.modes if mode.name == name)
 

@@ -125,8 +125,11 @@ class Paparazzi:
         return self._settings.count("aut_mod")
 
     @property
-    def motors_on(self) -> bool:
+    def armed(self) -> bool:
         return self._settings["kil_thr"] == 0.0
+
+    def held(self, parameter: str) -> float:
+        return self._settings[parameter]
 
     # ------------------------------------------------------------ flying
 
@@ -158,7 +161,7 @@ class Paparazzi:
             self._enter(following)
 
     def _command(self) -> Integers:
-        if not self.motors_on:
+        if not self.armed:
             return MOTORS_OFF
         if self.mode == FAILSAFE:
             return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
@@ -214,7 +217,7 @@ class Paparazzi:
             thrust=body.thrust,
             battery_v=body.battery_v,
             mode=self.mode,
-            motors_on=self.motors_on,
+            motors_on=self.armed,
         )
 
     def _send(self, kind: str, *, counter: str = "", **fields: FieldValue) -> None:
@@ -279,7 +282,7 @@ class Paparazzi:
         if command == _ARM_DISARM:
             wanted = param1 > 0.5
             self._set_motors(on=wanted)
-            result = ACCEPTED if self.motors_on == wanted else FAILED
+            result = ACCEPTED if self.armed == wanted else FAILED
         self._send("COMMAND_ACK", command=command, result=result)
 
     def _hear_set_mode(self, message: Message) -> None:
