@@ -128,7 +128,12 @@ class Worker:
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
-            live = LiveServer(live_address(self._settings.data_dir), abort=self._airspace.abort, hello=self._hello)
+            live = LiveServer(
+                live_address(self._settings.data_dir),
+                abort=self._airspace.abort,
+                order=lambda _vehicle, _order, _reason: False,
+                hello=self._hello,
+            )
             deck = FlightDeck(
                 database,
                 self._settings.data_dir,

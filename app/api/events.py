@@ -12,7 +12,8 @@ from app.api.deps import CurrentDatabase, Live
 from app.db.outbox import holds_everything_after, latest_event_id
 from app.db.session import Database
 from app.live.hub import Change, LinkState
-from app.live.messages import FlightPhase, Telemetry
+from app.live.hub import Live as LiveItem
+from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.live.tail import changes_after
 
 RETRY_MS: Final = 1000
@@ -29,7 +30,8 @@ async def events(
     `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
     entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
     server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
-    flight and `worker` tells when the worker comes or goes; these carry no id and may be dropped for a slow client.
+    flight, `vehicle` five times a second from a connected vehicle, and `worker` tells when the worker comes or goes;
+    these carry no id and may be dropped for a slow client.
     """
     with live.hub.subscribe() as stream:
         sent, known = await asyncio.to_thread(_start, database, last_event_id)
@@ -67,7 +69,7 @@ def _backlog(database: Database, event_id: int) -> list[Change]:
     return list(changes_after(database, event_id))
 
 
-def _event(item: Change | Telemetry | FlightPhase | LinkState) -> ServerSentEvent:
+def _event(item: Change | LiveItem) -> ServerSentEvent:
     match item:
         case Change():
             return ServerSentEvent(
@@ -77,5 +79,5 @@ def _event(item: Change | Telemetry | FlightPhase | LinkState) -> ServerSentEven
             )
         case LinkState():
             return ServerSentEvent(event="worker", data={"worker": item.worker})
-        case Telemetry() | FlightPhase():
+        case Telemetry() | FlightPhase() | VehicleStatus():
             return ServerSentEvent(event=item.type, data=item)

@@ -1,22 +1,38 @@
-"""The web process's end of the live link: it stays connected as long as there is a worker, and carries aborts to it."""
+"""The web process's end of the live link: it stays connected as long as there is a worker, and carries to it what
+cannot wait for the database."""
 
 import asyncio
 import itertools
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import structlog
 
 from app.core.errors import GainlineError, InputError
-from app.live.messages import MAX_LINE_BYTES, Abort, AbortAnswer, FromWorker, Message, WorkerHello, decode, encode
+from app.live.messages import (
+    MAX_LINE_BYTES,
+    Abort,
+    AbortAnswer,
+    Answer,
+    FromWorker,
+    Message,
+    Order,
+    ToWorker,
+    VehicleOrder,
+    VehicleOrderAnswer,
+    WorkerHello,
+    decode,
+    encode,
+)
 
 FIRST_PAUSE_S: Final = 0.05
 LONGEST_PAUSE_S: Final = 0.5
 ANSWER_TIMEOUT_S: Final = 2.0
 
 _log = structlog.get_logger(__name__)
+A = TypeVar("A", AbortAnswer, VehicleOrderAnswer)
 
 
 class LinkDownError(GainlineError):
@@ -36,7 +52,7 @@ class LiveClient:
         self._on_message = on_message
         self._on_link = on_link
         self._writer: asyncio.StreamWriter | None = None
-        self._waiting: dict[int, asyncio.Future[AbortAnswer]] = {}
+        self._waiting: dict[int, asyncio.Future[Answer]] = {}
         self._numbers = itertools.count(1)
 
     @property
@@ -58,17 +74,27 @@ class LiveClient:
 
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
         """Tell the worker to end a flight and wait for its answer. Raises LinkDownError when it cannot be told."""
+        return await self._ask(Abort(request=next(self._numbers), trial_id=trial_id, reason=reason), AbortAnswer)
+
+    async def order(self, vehicle_id: int, order: Order, reason: str) -> VehicleOrderAnswer:
+        """Have the worker tell a vehicle to land or to stop its motors. Raises LinkDownError as `abort` does."""
+        request = VehicleOrder(request=next(self._numbers), vehicle_id=vehicle_id, order=order, reason=reason)
+        return await self._ask(request, VehicleOrderAnswer)
+
+    async def _ask(self, question: ToWorker, kind: type[A]) -> A:
         if self._writer is None:
             raise _link_down("no worker is running")
-        request = next(self._numbers)
-        answer = self._waiting[request] = asyncio.get_running_loop().create_future()
-        self._writer.write(encode(Abort(request=request, trial_id=trial_id, reason=reason)))
+        answered = self._waiting[question.request] = asyncio.get_running_loop().create_future()
+        self._writer.write(encode(question))
         try:
-            return await asyncio.wait_for(answer, ANSWER_TIMEOUT_S)
+            answer = await asyncio.wait_for(answered, ANSWER_TIMEOUT_S)
         except TimeoutError as error:
             raise _link_down(f"the worker did not answer within {ANSWER_TIMEOUT_S:g} s") from error
         finally:
-            del self._waiting[request]
+            del self._waiting[question.request]
+        if not isinstance(answer, kind):
+            raise _link_down(f"the worker gave another answer: {answer.type}")
+        return answer
 
     async def _listen(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -85,11 +111,11 @@ class LiveClient:
                 self._writer = writer
                 self._on_message(message)
                 self._on_link(True)
-            case AbortAnswer(request=request):
+            case AbortAnswer(request=request) | VehicleOrderAnswer(request=request):
                 if (answer := self._waiting.get(request)) is not None and not answer.done():
                     answer.set_result(message)
-            case Abort():
-                raise InputError("The worker sent an abort.", hint="Restart the worker.")
+            case Abort() | VehicleOrder():
+                raise InputError(f"The worker sent an {message.type}.", hint="Restart the worker.")
             case _:
                 self._on_message(message)
 

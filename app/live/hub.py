@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
-from app.live.memory import FlightMemory
-from app.live.messages import FlightPhase, Telemetry
+from app.live.memory import Memory
+from app.live.messages import FlightPhase, Shown, Telemetry, VehicleStatus
 
 WAITING_CHANGES: Final = 2000
 """Changes a stream may lag behind before it is ended; its client comes back with the last id and misses none."""
 WAITING_TELEMETRY: Final = 100
-"""Telemetry messages a stream may lag behind before the oldest are dropped: 4 s of one flight."""
+"""Live messages a stream may lag behind before the oldest are dropped: more than 3 s of one flight and its vehicle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,7 @@ class LinkState:
     worker: bool
 
 
-Live = Telemetry | FlightPhase | LinkState
+Live = Shown | LinkState
 
 
 class Subscription:
@@ -75,16 +75,16 @@ class Hub:
 
     def __init__(self) -> None:
         self._subscriptions: set[Subscription] = set()
-        self._memory = FlightMemory()
+        self._memory = Memory()
         self._open = True
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:
-        """A subscription to whatever comes from now on, and before it to what is in the air since its command; over at
-        once when the hub is closed."""
+        """A subscription to whatever comes from now on, and before it to how the vehicles are and what is in the air
+        since its command; over at once when the hub is closed."""
         subscription = Subscription()
-        for flight in self._memory.so_far():
-            subscription.push(flight)
+        for known in self._memory.so_far():
+            subscription.push(known)
         self._subscriptions.add(subscription)
         if not self._open:
             subscription.end()
@@ -99,7 +99,7 @@ class Hub:
 
     def publish(self, item: Change | Live) -> None:
         match item:
-            case Telemetry() | FlightPhase():
+            case Telemetry() | FlightPhase() | VehicleStatus():
                 self._memory.take(item)
             case LinkState(worker=False):
                 self._memory.forget_all()

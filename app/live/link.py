@@ -10,7 +10,15 @@ from app.db.session import Database
 from app.live.address import live_address
 from app.live.client import LiveClient
 from app.live.hub import Hub, LinkState
-from app.live.messages import AbortAnswer, FlightPhase, FromWorker, Telemetry
+from app.live.messages import (
+    AbortAnswer,
+    FlightPhase,
+    FromWorker,
+    Order,
+    Telemetry,
+    VehicleOrderAnswer,
+    VehicleStatus,
+)
 from app.live.tail import OutboxTail
 
 T = TypeVar("T")
@@ -33,12 +41,16 @@ class Live:
         """Past the database, straight to the worker. Raises LinkDownError when it cannot be told."""
         return await self.client.abort(trial_id, reason)
 
+    async def order(self, vehicle_id: int, order: Order, reason: str) -> VehicleOrderAnswer:
+        """Land or motors off, the same way. Raises LinkDownError when the worker cannot be told."""
+        return await self.client.order(vehicle_id, order, reason)
+
     def close(self) -> None:
         """End every stream."""
         self.hub.close()
 
     def _heard(self, message: FromWorker) -> None:
-        if isinstance(message, Telemetry | FlightPhase):
+        if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
             self.hub.publish(message)
 
 

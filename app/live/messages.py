@@ -6,10 +6,13 @@ from typing import Annotated, Final, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from app.core.errors import InputError
+from app.vehicles.base import Condition
 
 MAX_LINE_BYTES: Final = 256 * 1024
 
-Phase = Literal["staging", "flying", "landed", "ended"]
+Phase = Literal["staging", "staged", "flying", "landed", "ended"]
+LinkTo = Literal["connecting", "connected", "gone"]
+Order = Literal["land", "motors off"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +40,18 @@ class FlightPhase:
     phase: Phase
     note: str = ""
     type: Literal["phase"] = "phase"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleStatus(Condition):
+    """How a vehicle with a link of its own is; `at` is UTC in ISO 8601. While nothing of it is heard the state is
+    `gone`, and the rest is as last heard. `concern` says why it may only be observed; empty when it may fly."""
+
+    vehicle_id: int
+    state: LinkTo
+    at: str
+    concern: str = ""
+    type: Literal["vehicle"] = "vehicle"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,8 +84,34 @@ class AbortAnswer:
     type: Literal["abort answer"] = "abort answer"
 
 
-FromWorker = Telemetry | FlightPhase | WorkerHello | AbortAnswer
-Message = FromWorker | Abort
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleOrder:
+    """Have this vehicle land, or stop its motors at any height, now and whatever it does. `request` comes back in the
+    answer."""
+
+    request: int
+    vehicle_id: int
+    order: Order
+    reason: str
+    type: Literal["order"] = "order"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleOrderAnswer:
+    """`accepted` is False when the worker has no link to that vehicle."""
+
+    request: int
+    vehicle_id: int
+    accepted: bool
+    type: Literal["order answer"] = "order answer"
+
+
+Shown = Telemetry | FlightPhase | VehicleStatus
+"""What streams show, as it comes."""
+Answer = AbortAnswer | VehicleOrderAnswer
+FromWorker = Shown | WorkerHello | Answer
+ToWorker = Abort | VehicleOrder
+Message = FromWorker | ToWorker
 
 _ADAPTER: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 

@@ -1,4 +1,5 @@
-"""The worker's end of the live link: it listens, publishes, and takes aborts, on a thread of its own.
+"""The worker's end of the live link: it listens, publishes, and takes aborts and orders, on a thread of its
+own.
 
 Neither direction waits for storage or for a flight: an abort is handed on from the socket's thread at once, and a
 client too slow to read loses telemetry instead of holding up the flight.
@@ -19,16 +20,21 @@ from app.live.messages import (
     MAX_LINE_BYTES,
     Abort,
     AbortAnswer,
-    FlightPhase,
     FromWorker,
+    Message,
+    Order,
+    Shown,
     Telemetry,
+    VehicleOrder,
+    VehicleOrderAnswer,
+    VehicleStatus,
     WorkerHello,
     decode,
     encode,
 )
 
 SLOW_CLIENT_BYTES: Final = 256 * 1024
-"""Unread bytes beyond which a client gets no telemetry until it has caught up."""
+"""Unread bytes beyond which a client gets neither telemetry nor a vehicle's status until it has caught up."""
 STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
 """Unread bytes beyond which a client is dropped; it reconnects and reads the database."""
 
@@ -38,13 +44,22 @@ _log = structlog.get_logger(__name__)
 class LiveServer:
     """Listens at `path` between enter and exit.
 
-    `abort(trial_id, reason)` is called on the socket's thread and says whether that trial flies; `hello()` describes
-    the worker to a new client. Both must return at once.
+    `abort(trial_id, reason)` is called on the socket's thread and says whether that trial flies;
+    `order(vehicle_id, order, reason)` whether that vehicle was told; `hello()` describes the worker to a new client.
+    All must return at once.
     """
 
-    def __init__(self, path: Path, *, abort: Callable[[int, str], bool], hello: Callable[[], WorkerHello]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        abort: Callable[[int, str], bool],
+        order: Callable[[int, Order, str], bool],
+        hello: Callable[[], WorkerHello],
+    ) -> None:
         self._path = path
         self._abort = abort
+        self._order = order
         self._hello = hello
         self._writers: set[asyncio.StreamWriter] = set()
         self._loop = asyncio.new_event_loop()
@@ -65,7 +80,7 @@ class LiveServer:
         self._loop.close()
         self._path.unlink(missing_ok=True)
 
-    def publish(self, message: Telemetry | FlightPhase) -> None:
+    def publish(self, message: Shown) -> None:
         """Send to every client, from any thread, without waiting."""
         self._loop.call_soon_threadsafe(self._send_all, message)
 
@@ -95,15 +110,22 @@ class LiveServer:
             writer.close()
 
     def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
-        message = decode(line)
-        if not isinstance(message, Abort):
-            raise InputError(
-                f"A client sent {message.type!r}, which only the worker sends.",
-                hint="Connect to the worker's socket with Gainline only.",
-            )
-        accepted = self._abort(message.trial_id, message.reason)
-        _log.info("abort asked", trial_id=message.trial_id, reason=message.reason, accepted=accepted)
-        writer.write(encode(AbortAnswer(request=message.request, trial_id=message.trial_id, accepted=accepted)))
+        answer: Message
+        match decode(line):
+            case Abort(request=request, trial_id=trial_id, reason=reason):
+                accepted = self._abort(trial_id, reason)
+                answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
+                _log.info("abort asked", trial_id=trial_id, reason=reason, accepted=accepted)
+            case VehicleOrder(request=request, vehicle_id=vehicle_id, order=order, reason=reason):
+                accepted = self._order(vehicle_id, order, reason)
+                answer = VehicleOrderAnswer(request=request, vehicle_id=vehicle_id, accepted=accepted)
+                _log.info("order given", vehicle_id=vehicle_id, order=order, reason=reason, accepted=accepted)
+            case other:
+                raise InputError(
+                    f"A client sent {other.type!r}, which only the worker sends.",
+                    hint="Connect to the worker's socket with Gainline only.",
+                )
+        writer.write(encode(answer))
 
     def _send_all(self, message: FromWorker) -> None:
         line = encode(message)
@@ -111,7 +133,7 @@ class LiveServer:
             unread = writer.transport.get_write_buffer_size()
             if unread > STUCK_CLIENT_BYTES:
                 writer.transport.abort()
-            elif unread <= SLOW_CLIENT_BYTES or not isinstance(message, Telemetry):
+            elif unread <= SLOW_CLIENT_BYTES or not isinstance(message, Telemetry | VehicleStatus):
                 writer.write(line)
 
 

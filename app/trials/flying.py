@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 
 from app.core.experiments.base import Experiment
-from app.live.messages import FlightPhase, Phase, Telemetry
+from app.live.messages import FlightPhase, Phase, Shown, Telemetry
 from app.vehicles.base import Sample
 
 MESSAGES_PER_S: Final = 25
 
-Publish = Callable[[Telemetry | FlightPhase], None]
+Publish = Callable[[Shown], None]
 
 
 class AbortFlag:

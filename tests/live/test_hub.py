@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live
-from app.live.messages import FlightPhase, Telemetry
+from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.live.watch import DatabaseWatch
 
 
@@ -79,6 +79,27 @@ def test_a_stream_that_joins_late_gets_the_flight_from_its_command_on() -> None:
         return joined, after_landing, await first_heard(hub, 0.4)
 
     assert asyncio.run(scenario()) == ([0.1, 0.2], [0.1], [0.4])
+
+
+def test_a_stream_that_joins_late_is_told_how_the_vehicles_are_while_there_is_a_worker(tmp_path: Path) -> None:
+    def status(vehicle_id: int, altitude_m: float) -> VehicleStatus:
+        return VehicleStatus(vehicle_id=vehicle_id, state="connected", at="", step="record", altitude_m=altitude_m)
+
+    async def first_heard(hub: Hub, count: int) -> list[Change | Live]:
+        with hub.subscribe() as stream:
+            hub.publish(change(1))
+            items = aiter(stream)
+            return [await anext(items) for _ in range(count)]
+
+    async def scenario() -> None:
+        hub = Hub()
+        for item in (status(5, 0.1), status(6, 0.0), status(5, 2.9)):
+            hub.publish(item)
+        assert await first_heard(hub, 3) == [change(1), status(5, 2.9), status(6, 0.0)]
+        hub.publish(LinkState(worker=False))
+        assert await first_heard(hub, 1) == [change(1)]
+
+    asyncio.run(scenario())
 
 
 def test_a_stream_too_far_behind_is_ended_so_that_it_resumes_from_the_database() -> None:

@@ -13,7 +13,16 @@ import pytest
 from app.core.errors import InputError
 from app.live.address import LONGEST_PATH_BYTES, live_address
 from app.live.client import LinkDownError, LiveClient
-from app.live.messages import FlightPhase, FromWorker, Telemetry, WorkerHello, decode, encode
+from app.live.messages import (
+    FlightPhase,
+    FromWorker,
+    Order,
+    Telemetry,
+    VehicleStatus,
+    WorkerHello,
+    decode,
+    encode,
+)
 from app.live.server import SLOW_CLIENT_BYTES, LiveServer
 
 
@@ -28,8 +37,26 @@ def telemetry(time_s: float = 1.0, rows: int = 1) -> Telemetry:
     )
 
 
-def server(path: Path, abort: Callable[[int, str], bool] = lambda _trial, _why: False) -> LiveServer:
-    return LiveServer(path, abort=abort, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2]))
+def status(altitude_m: float = 0.1) -> VehicleStatus:
+    return VehicleStatus(
+        vehicle_id=5,
+        state="connected",
+        at="2026-11-21T23:00:00+00:00",
+        step="idle",
+        armed=False,
+        altitude_m=altitude_m,
+        held={"kp": 283.0, "ki": 13.0, "kd": 82.0},
+    )
+
+
+def server(
+    path: Path,
+    abort: Callable[[int, str], bool] = lambda _trial, _why: False,
+    order: Callable[[int, Order, str], bool] = lambda _vehicle, _order, _why: False,
+) -> LiveServer:
+    return LiveServer(
+        path, abort=abort, order=order, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2])
+    )
 
 
 class Web:
@@ -61,6 +88,7 @@ async def connected(path: Path) -> AsyncIterator[Web]:
     [
         telemetry(),
         FlightPhase(campaign_id=1, trial_id=2, phase="landed", note="on the ground"),
+        status(),
         WorkerHello(pid=1, version="0", flying=[3]),
     ],
     ids=lambda message: message.type,
@@ -128,11 +156,31 @@ def test_an_abort_reaches_the_worker_and_its_answer_comes_back(tmp_path: Path) -
     assert asked == [(2, "too high"), (3, "too high")]
 
 
+def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_vehicle(tmp_path: Path) -> None:
+    given: list[tuple[int, Order, str]] = []
+
+    def order(vehicle_id: int, what: Order, reason: str) -> bool:
+        given.append((vehicle_id, what, reason))
+        return vehicle_id == 5
+
+    async def scenario() -> None:
+        with server(tmp_path / "w.sock", order=order):
+            async with connected(tmp_path / "w.sock") as web:
+                await web.until(lambda: web.client.connected)
+                assert (await web.client.order(5, "land", "it drifts")).accepted
+                assert not (await web.client.order(6, "motors off", "it burns")).accepted
+
+    asyncio.run(scenario())
+    assert given == [(5, "land", "it drifts"), (6, "motors off", "it burns")]
+
+
 def test_an_abort_without_a_worker_says_so_at_once(tmp_path: Path) -> None:
     async def scenario() -> None:
         async with connected(tmp_path / "w.sock") as web:
             with pytest.raises(LinkDownError, match="no worker is running"):
                 await web.client.abort(1, "now")
+            with pytest.raises(LinkDownError, match="no worker is running"):
+                await web.client.order(5, "land", "now")
 
     asyncio.run(scenario())
 
@@ -162,6 +210,7 @@ def test_a_client_that_never_reads_loses_telemetry_but_no_phase_and_holds_up_nob
         for number in range(count):
             worker.publish(telemetry(float(number), rows=100))
         worker.publish(FlightPhase(campaign_id=1, trial_id=2, phase="landed"))
+        asyncio.run_coroutine_threadsafe(asyncio.sleep(0), worker._loop).result()  # all is said before any is read
         heard = 0
         while isinstance(decode(reader.readline()), Telemetry):
             heard += 1
