@@ -23,6 +23,8 @@ from app.vehicles.mavlink.signals import Action
 
 ARMED_BIT: Final = 128
 REAL32: Final = 9
+AUTOPILOT: Final = 1
+"""The component id that autopilots have unless somebody changed it."""
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
 _RESULTS: Final = ("accepted", "temporarily rejected", "denied", "unsupported", "failed", "in progress", "cancelled")
@@ -165,13 +167,14 @@ class Profile(Protocol):
     def read_parameter(self, aim: Aim, parameter: str) -> Outgoing: ...
 
 
-def set_parameter(aim: Aim, parameter: str, value: float) -> Outgoing:
-    """A floating-point parameter, the only type that gains have."""
+def set_parameter(aim: Aim, parameter: str, value: float, *, component: int = 0) -> Outgoing:
+    """A floating-point parameter, the only type that gains have. Some vehicles heed no PARAM_SET to all components (0),
+    among them MAVSDK's."""
     return Outgoing(
         "PARAM_SET",
         {
             "target_system": aim.aircraft,
-            "target_component": 0,
+            "target_component": component,
             "param_id": parameter,
             "param_value": value,
             "param_type": REAL32,

@@ -72,7 +72,7 @@ class Px4:
                 return (Step((base.command(aim, _ARM, 0.0),)),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(aim, parameter, value)
+        return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
 
     def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
         return base.read_parameter(aim, parameter)

@@ -1,0 +1,62 @@
+"""Our ground side meets a vehicle that nobody here wrote, MAVSDK's own, over real UDP and in real time."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+
+import numpy as np
+import pytest
+
+from app.vehicles.base import FlightOrder, Vehicle
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.machine import Plan
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.open import open_vehicle
+from tests.vehicles.flying import never, unwatched
+from tests.vehicles.mavlink.speaking import free_port
+from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
+from tests.vehicles.peers.mavsdk_vehicle import MAKE, MavsdkVehicle
+
+TUNED = {"MPC_Z_P": 1.25, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.05, "MPC_Z_VEL_I_ACC": 1.7}
+RECORD_S = 6.0
+ORDER = FlightOrder(seed=1)
+
+
+@pytest.fixture(autouse=True)
+def generic_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that differs from PX4 is the make in the heartbeat; and the record is shorter, because time is real."""
+    monkeypatch.setattr(type(PROFILES["px4"]), "autopilot", MAKE)
+    monkeypatch.setattr("app.vehicles.mavlink.vehicle.Plan", partial(Plan, record_s=RECORD_S))
+
+
+@contextmanager
+def met(*, armable: bool = True) -> Iterator[tuple[MavsdkVehicle, Vehicle]]:
+    """MAVSDK's vehicle, and what we make of it."""
+    port = free_port()
+    options = {"autopilot": "px4", "address": f"udpin:127.0.0.1:{port}", "simulated": True}
+    with MavsdkVehicle(port, armable=armable) as peer, open_vehicle("mavlink", options, safe_gains=SAFE) as ours:
+        yield peer, ours
+
+
+def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back() -> None:
+    with met() as (peer, ours):
+        assert ours.stage(TUNED) == TUNED
+        record = ours.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert ours.read_gains() == SAFE
+        assert (peer.flew_with, peer.gains, peer.stands) == ([TUNED], SAFE, True)
+    flight = record.trajectory
+    assert (record.ending, record.reason) == ("completed", "")
+    assert (flight.time_s[0], flight.time_s[-1]) == pytest.approx((-1.0, RECORD_S), abs=0.2)
+    assert len(flight.time_s) / (flight.time_s[-1] - flight.time_s[0]) > 40.0
+    np.testing.assert_allclose(flight["altitude_m"][flight.time_s < 0.0], 0.0, atol=1e-3)
+    assert flight["altitude_m"][-1] == pytest.approx(3.0, abs=0.05)
+    assert flight["climb_rate_m_s"].max() == pytest.approx(1.5)
+    np.testing.assert_allclose(flight["battery_v"], 12.3)
+
+
+def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_gains() -> None:
+    with met(armable=False) as (peer, ours):
+        ours.stage(TUNED)
+        with pytest.raises(VehicleError, match="temporarily rejected"):
+            ours.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert (peer.flew_with, peer.gains, peer.stands) == ([], SAFE, True)
