@@ -29,6 +29,7 @@ class Failure(StrEnum):
     GLITCHES = "F9b"
     DISAGREEMENT = "F9c"
     UNEXPECTED = "F10"
+    OWN_LANDING = "F11"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +99,23 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "quarantine",
             "The vehicle changed its state without being asked; it was left alone.",
         ),
+        Failure.OWN_LANDING: Response(
+            "a landing that was not asked for: its own failsafe, or an exception of its flight plan",
+            "land",
+            "invalid",
+            "The vehicle began to land by itself.",
+        ),
     }
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """A limit that is not kept, in words."""
+
+    failure: Failure
+    why: str
+
 
 SUSPECT: Final = frozenset({failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"})
 """Failures that speak against the gains: the safe ones are sent before Land. A vehicle that lifted off late, its

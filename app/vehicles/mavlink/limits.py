@@ -1,10 +1,14 @@
 """What a trial keeps an eye on: a pure memory of what was heard, and the limits that it is held against."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Final
 
-from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.measurements import Battery, Breach, Heartbeat, Measurement, Position
+from app.vehicles.mavlink import agreement
+from app.vehicles.mavlink.agreement import Second
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.measurements import Battery, BlockEntered, Breach, Heartbeat, Measurement, Position
+from app.vehicles.mavlink.signals import Sighted
 
 GROUND_M: Final = 0.15
 """Nearer to the ground than this a vehicle may stand on it."""
@@ -28,7 +32,9 @@ _REBOOT_S: Final = 1.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it;
-    modes are as `Heartbeat` names them, empty where any will do; heartbeats come every `heartbeat_s`."""
+    modes are as `Heartbeat` names them, empty where any will do; heartbeats come every `heartbeat_s`. `blocks` are a
+    flight plan's by number, `arming_blocks` and so on the names of those that the vehicle may be in, empty where it has
+    none."""
 
     set_point_m: float
     heartbeat_s: float
@@ -42,6 +48,10 @@ class Limits:
     crossings: int = 4
     flying_modes: frozenset[str] = frozenset()
     landing_modes: frozenset[str] = frozenset()
+    blocks: Mapping[int, str] = field(default_factory=dict)
+    arming_blocks: frozenset[str] = frozenset()
+    flying_blocks: frozenset[str] = frozenset()
+    landing_blocks: frozenset[str] = frozenset()
 
     def stretched(self, patience: float) -> "Limits":
         """The same with so many times the patience for packets that do not come."""
@@ -51,14 +61,6 @@ class Limits:
             silent_s=self.silent_s * patience,
             stuck_s=self.stuck_s * patience,
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """A limit that is not kept, in words."""
-
-    failure: Failure
-    why: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +82,9 @@ class Watch:
     crossings: int = 0
     armed: bool = False
     mode: str = ""
+    block: str = ""
+    block_s: float = 0.0
+    second: Second | None = None
     rebooted: bool = False
     breached: bool = False
 
@@ -114,16 +119,25 @@ def hear(
             watch = replace(watch, battery_v=volts, battery_s=now_s, low_since_s=since)
         case Breach():
             watch = replace(watch, breached=True)
+        case BlockEntered(number=number):
+            watch = replace(watch, block=limits.blocks.get(number, str(number)), block_s=now_s)
         case _:
             pass
     return watch, ()
+
+
+def sight(watch: Watch, sighted: Sighted) -> Watch:
+    """The memory after the second source of altitude spoke."""
+    second = watch.second or Second(heard_s=sighted.now_s)
+    vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sighted.now_s) else None
+    return replace(watch, second=agreement.sight(second, sighted, vehicle_m))
 
 
 def find_on_ground(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
     """The gravest limit that a vehicle does not keep that has not been told to take off."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
-    return find_link(watch, limits, now_s) or find_frozen(watch, limits) or find_battery(watch, now_s)
+    return find_link(watch, limits, now_s) or find_frozen(watch, limits, now_s) or find_battery(watch, now_s)
 
 
 def too_many_glitches(watch: Watch) -> bool:
@@ -185,14 +199,28 @@ def _accept(watch: Watch, position: Position, limits: Limits) -> Watch:
     return replace(watch, last=position, origin=watch.origin or position, side=side, crossings=crossed)
 
 
-def find_unexpected(watch: Watch, modes: frozenset[str]) -> Finding | None:
+def find_unexpected(watch: Watch, modes: frozenset[str], blocks: frozenset[str] = frozenset()) -> Finding | None:
+    """`modes` and `blocks` are those that it may be in, empty where any will do."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
     if not watch.armed:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle disarmed itself in the air.")
     if modes and watch.mode not in modes:
         return Finding(failure=Failure.UNEXPECTED, why=f"The vehicle went into mode {watch.mode}.")
+    if blocks and watch.block and watch.block not in blocks:
+        why = f"Its flight plan went to the block “{watch.block}”."
+        return Finding(failure=Failure.UNEXPECTED, why=why)
     return None
+
+
+def find_own_landing(watch: Watch, limits: Limits, *, mode_known: bool) -> Finding | None:
+    """For a vehicle that should fly. `mode_known`: its mode is not the one from before the command."""
+    why = ""
+    if mode_known and watch.mode in limits.landing_modes - limits.flying_modes:
+        why = f"It went into mode {watch.mode}."
+    elif watch.block in limits.landing_blocks:
+        why = f"Its flight plan went to the block “{watch.block}”."
+    return Finding(failure=Failure.OWN_LANDING, why=why) if why else None
 
 
 def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
@@ -221,10 +249,10 @@ def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bo
     return Finding(failure=Failure.ENVELOPE, why=why) if why else None
 
 
-def find_frozen(watch: Watch, limits: Limits) -> Finding | None:
-    if watch.stuck_s <= limits.stuck_s:
-        return None
-    return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
+def find_frozen(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    if watch.stuck_s > limits.stuck_s:
+        return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
+    return agreement.find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
 
 
 def find_battery(watch: Watch, now_s: float) -> Finding | None:

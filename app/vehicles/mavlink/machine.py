@@ -4,13 +4,28 @@ It knows no autopilot and no clock: events carry their time, commands are data t
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
+from app.vehicles.mavlink import agreement
 from app.vehicles.mavlink import limits as watching
-from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Outcome, Reaction
-from app.vehicles.mavlink.limits import Finding, Limits, Watch
-from app.vehicles.mavlink.measurements import Heartbeat, Parameter
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.limits import Watch
+from app.vehicles.mavlink.measurements import Heartbeat
+from app.vehicles.mavlink.moves import (
+    Plan,
+    Step,
+    Trial,
+    abort,
+    disarm,
+    enter,
+    fail,
+    land,
+    note,
+    quarantine,
+    send_gains,
+    stop_motors,
+)
 from app.vehicles.mavlink.signals import (
     AbortWanted,
     Action,
@@ -19,19 +34,19 @@ from app.vehicles.mavlink.signals import (
     Event,
     Heard,
     Keep,
+    MotorsOffWanted,
     Perform,
     Refused,
     Restored,
     RestoreGains,
-    SendGain,
-    Setting,
+    Sighted,
 )
-from app.vehicles.mavlink.states import COMMANDED, MOVES, OVER, State
+from app.vehicles.mavlink.states import COMMANDED, State
+
+__all__ = ["Plan", "Trial", "advance", "begin"]
 
 BASELINE_S: Final = 1.0
 ARMED_WITHIN_S: Final = 2.0
-GAIN_S: Final = 0.1
-GAINS_S: Final = 0.3
 REPEAT_S: Final = 1.0
 LANDED_S: Final = 2.0
 DOWN_S: Final = 1.0
@@ -43,60 +58,6 @@ _MODE_KNOWN_S: Final = 1.0
 _DESCENDING_M_S: Final = -0.2
 _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
-    """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground and the zero of
-    the record's altitude are on the vehicle's datum, how long to record after the command, how soon the vehicle has to
-    lift off, and its limits."""
-
-    safe_gains: tuple[Setting, ...]
-    limits: Limits
-    ground_m: float
-    datum_m: float = 0.0
-    record_s: float = 33.0
-    lift_off_s: float = 1.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
-    """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
-    `failure` is the first that happened."""
-
-    plan: Plan
-    state: State
-    since_s: float
-    watch: Watch
-    failure: Failure | None = None
-    why: str = ""
-    asked_s: float | None = None
-    armed_s: float | None = None
-    commanded_s: float | None = None
-    commanded_boot_s: float | None = None
-    unsent: tuple[Setting, ...] = ()
-    awaited: Setting | None = None
-    gains_since_s: float | None = None
-    sent_s: float = 0.0
-    repeated_s: float = 0.0
-    resting_since_s: float | None = None
-
-    @property
-    def is_over(self) -> bool:
-        return self.state in OVER
-
-    @property
-    def outcome(self) -> Outcome | None:
-        """What the trial is worth; None when nothing went wrong."""
-        if self.state is State.QUARANTINE:
-            return "quarantine"
-        if self.failure is None:
-            return None
-        known = RESPONSES[self.failure].outcome
-        return "invalid" if known == "quarantine" else known
-
-
-Step = tuple[Trial, tuple[Command, ...]]
 
 
 def begin(plan: Plan, watch: Watch, now_s: float) -> Step:
@@ -111,6 +72,8 @@ def advance(trial: Trial, event: Event) -> Step:
     kept: tuple[Command, ...] = ()
     if isinstance(event, Heard):
         trial, kept = _hear(trial, event)
+    elif isinstance(event, Sighted):
+        trial = replace(trial, watch=watching.sight(trial.watch, event))
     trial, commands = _react(trial, event)
     return trial, (*kept, *commands)
 
@@ -121,12 +84,15 @@ def _hear(trial: Trial, event: Heard) -> Step:
     if trial.armed_s is None or trial.state not in _RECORDED:
         return trial, ()
     to_m = trial.plan.ground_m if trial.state not in _HOLDING else trial.plan.limits.set_point_m
-    return trial, tuple(Keep(position, to_m, watch.battery_v) for position in positions)
+    second_m = watch.second.altitude_m if watch.second is not None else None
+    return trial, tuple(Keep(position, to_m, watch.battery_v, second_m) for position in positions)
 
 
 def _react(trial: Trial, event: Event) -> Step:
+    if isinstance(event, MotorsOffWanted):
+        return stop_motors(trial, event.reason, event.now_s)
     if isinstance(event, AbortWanted) and trial.state in COMMANDED:
-        return _fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
+        return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
     return _COURSES[trial.state](trial, event)
 
 
@@ -137,11 +103,12 @@ def _arm(trial: Trial, event: Event) -> Step:
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if finding := watching.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
-        return _fail(trial, finding, now_s)
+        return fail(trial, finding, now_s)
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or trial.watch.last is None:
         return trial, ()
-    trial = replace(trial, commanded_s=now_s, commanded_boot_s=trial.watch.last.time_boot_s)
-    return _enter(trial, State.TAKEOFF, now_s), (Perform(Action.TAKE_OFF),)
+    watch = replace(trial.watch, block="")
+    trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=trial.watch.last.time_boot_s)
+    return enter(trial, State.TAKEOFF, now_s), (Perform(Action.TAKE_OFF),)
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
@@ -159,44 +126,44 @@ def _not_armed(trial: Trial, event: Event) -> Finding | None:
 def _take_off(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if finding := _finding(trial, now_s):
-        return _fail(trial, finding, now_s)
+        return fail(trial, finding, now_s)
     if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
-        return _enter(trial, State.RECORD, now_s), ()
+        return enter(trial, State.RECORD, now_s), ()
     if isinstance(event, Refused):
-        return _fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
+        return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
     if now_s - trial.since_s > trial.plan.lift_off_s:
         why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
-        return _fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
+        return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
     return trial, ()
 
 
 def _record(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if finding := _finding(trial, now_s):
-        return _fail(trial, finding, now_s)
+        return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
     if _rests_for(trial, DOWN_S, now_s):
-        return _fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
+        return fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
     last, start_s = trial.watch.last, trial.commanded_boot_s
     if last is None or start_s is None or last.time_boot_s - start_s < trial.plan.record_s:
         return trial, ()
     if watching.too_many_glitches(trial.watch):
-        trial = _note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
-    return _land(trial, State.LAND, now_s)
+        trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
+    return land(trial, State.LAND, now_s)
 
 
 def _landing(trial: Trial, event: Event) -> Step:
     """Land and abort-land: the safe gains that are still to be sent, Land until the vehicle descends, the ground."""
     now_s = event.now_s
     if trial.awaited is not None:
-        return _send_gains(trial, event)
+        return send_gains(trial, event)
     if finding := _taken_over(trial) or (_envelope(trial) if trial.gains_since_s is None else None):
-        return _fail(trial, finding, now_s)
+        return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
     if _has_landed(trial, now_s):
-        return _disarm(trial, now_s)
+        return disarm(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
-        return _quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
+        return quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
     if now_s - trial.repeated_s >= REPEAT_S and not _obeys(trial, now_s):
         return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
     return trial, ()
@@ -226,9 +193,9 @@ def _has_landed(trial: Trial, now_s: float) -> bool:
 def _link_lost(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat):
-        return _land(trial, State.ABORT_LAND, now_s)
+        return land(trial, State.ABORT_LAND, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
-        return _quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
+        return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
     if now_s - trial.repeated_s >= REPEAT_S:
         return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
     return trial, ()
@@ -237,15 +204,17 @@ def _link_lost(trial: Trial, event: Event) -> Step:
 def _disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat) and not event.measurement.armed:
-        return _enter(trial, State.RESTORE, now_s), (RestoreGains(),)
-    if trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
+        return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
+    airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    if airborne and not trial.stopped:
         why = "It was found in the air while its motors were to be stopped."
-        return _abort(_note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
+        return abort(note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
-        return _quarantine(trial, f"It has not disarmed within {DISARMED_WITHIN_S:g} s.", now_s)
-    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
-    if grounded and now_s - trial.repeated_s >= REPEAT_S:
-        return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
+        return quarantine(trial, f"It has not disarmed within {DISARMED_WITHIN_S:g} s.", now_s)
+    may_stop = trial.stopped or watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    if may_stop and now_s - trial.repeated_s >= REPEAT_S:
+        action = Action.KILL if trial.stopped else Action.MOTORS_OFF
+        return replace(trial, repeated_s=now_s), (Perform(action),)
     return trial, ()
 
 
@@ -253,8 +222,8 @@ def _restoring(trial: Trial, event: Event) -> Step:
     if not isinstance(event, Restored):
         return trial, ()
     if event.problem:
-        return _quarantine(trial, f"Its safe gains could not be verified: {event.problem}", event.now_s)
-    return _enter(trial, State.IDLE, event.now_s), ()
+        return quarantine(trial, f"Its safe gains could not be verified: {event.problem}", event.now_s)
+    return enter(trial, State.IDLE, event.now_s), ()
 
 
 _COURSES: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
@@ -275,10 +244,12 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     """The gravest limit that is not kept between the command and the end of the record."""
     plan, watch = trial.plan, trial.watch
     return (
-        watching.find_unexpected(watch, _modes(trial))
+        watching.find_unexpected(watch, _modes(trial), _blocks(trial))
         or watching.find_link(watch, plan.limits, now_s)
         or watching.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
-        or watching.find_frozen(watch, plan.limits)
+        or watching.find_own_landing(watch, plan.limits, mode_known=bool(_modes(trial)))
+        or watching.find_frozen(watch, plan.limits, now_s)
+        or agreement.find_disagreement(watch.second)
         or watching.find_battery(watch, now_s)
     )
 
@@ -289,7 +260,7 @@ def _envelope(trial: Trial) -> Finding | None:
 
 def _taken_over(trial: Trial) -> Finding | None:
     """A reboot, or a mode that is neither flight nor landing: both end in disarming on the ground."""
-    return watching.find_unexpected(replace(trial.watch, armed=True), _modes(trial))
+    return watching.find_unexpected(replace(trial.watch, armed=True), _modes(trial), _blocks(trial))
 
 
 def _modes(trial: Trial) -> frozenset[str]:
@@ -297,96 +268,15 @@ def _modes(trial: Trial) -> frozenset[str]:
     limits = trial.plan.limits
     if trial.commanded_s is None or trial.watch.heartbeat_s - trial.commanded_s < _MODE_KNOWN_S:
         return frozenset()
-    return limits.flying_modes if trial.state in _HOLDING else limits.flying_modes | limits.landing_modes
+    return limits.flying_modes | limits.landing_modes
 
 
-def _fail(trial: Trial, finding: Finding, now_s: float) -> Step:
-    """What a failure leads to, from a state in which the vehicle obeys."""
-    trial = _note(trial, finding)
-    if trial.state is State.ARM:
-        return _disarm(trial, now_s)
-    reaction = RESPONSES[finding.failure].reaction
-    if reaction == "cease":
-        return _quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
-    if trial.state is State.ABORT_LAND:
-        return _save(trial, now_s) if finding.failure in SUSPECT and trial.gains_since_s is None else (trial, ())
-    return _REACTIONS[reaction](trial, now_s)
-
-
-def _lose_link(trial: Trial, now_s: float) -> Step:
-    return _land(trial, State.LINK_LOST, now_s)
-
-
-def _give_up_take_off(trial: Trial, now_s: float) -> Step:
-    """Motors off where it is on the ground by height and speed. In the air its integrator is wound up."""
-    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
-    return _disarm(trial, now_s) if grounded else _abort(trial, now_s)
-
-
-def _abort_landing(trial: Trial, now_s: float) -> Step:
-    return _land(trial, State.ABORT_LAND, now_s)
-
-
-def _note(trial: Trial, finding: Finding) -> Trial:
-    if trial.failure is not None:
-        return trial
-    return replace(trial, failure=finding.failure, why=finding.why)
-
-
-def _enter(trial: Trial, state: State, now_s: float) -> Trial:
-    if state not in MOVES[trial.state]:
-        raise AssertionError(f"A trial cannot go from {trial.state} to {state}.")
-    return replace(trial, state=state, since_s=now_s, resting_since_s=None)
-
-
-def _abort(trial: Trial, now_s: float) -> Step:
-    return _save(_enter(trial, State.ABORT_LAND, now_s), now_s)
-
-
-def _save(trial: Trial, now_s: float) -> Step:
-    """The gains are suspect: the first safe gain leaves at once, Land follows the last."""
-    first, *others = trial.plan.safe_gains
-    trial = replace(trial, awaited=first, unsent=tuple(others), gains_since_s=now_s, sent_s=now_s)
-    return trial, (SendGain(first),)
-
-
-def _send_gains(trial: Trial, event: Event) -> Step:
-    """One request in flight: the next safe gain when the last was echoed or 0.1 s have passed; Land after 0.3 s."""
-    now_s = event.now_s
-    echoed = (
-        isinstance(event, Heard)
-        and isinstance(event.measurement, Parameter)
-        and trial.awaited is not None
-        and event.measurement.name == trial.awaited.parameter
-    )
-    late = now_s - (trial.gains_since_s or now_s) >= GAINS_S
-    if not late and not echoed and now_s - trial.sent_s < GAIN_S:
-        return trial, ()
-    if trial.unsent and not late:
-        following, *others = trial.unsent
-        return replace(trial, awaited=following, unsent=tuple(others), sent_s=now_s), (SendGain(following),)
-    rest = tuple(SendGain(setting) for setting in trial.unsent)
-    trial = replace(trial, awaited=None, unsent=(), repeated_s=now_s)
-    return trial, (*rest, Perform(Action.LAND))
-
-
-def _land(trial: Trial, state: State, now_s: float) -> Step:
-    """Land now; it is repeated from `state`."""
-    return replace(_enter(trial, state, now_s), repeated_s=now_s), (Perform(Action.LAND),)
-
-
-def _disarm(trial: Trial, now_s: float) -> Step:
-    """Motors off at once where the vehicle is on the ground by height and speed; else only once it is."""
-    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
-    trial = _enter(trial, State.DISARM, now_s)
-    if not grounded:
-        return trial, ()
-    return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
-
-
-def _quarantine(trial: Trial, why: str, now_s: float) -> Step:
-    whole = " ".join(part for part in (trial.why, why) if part)
-    return replace(_enter(trial, State.QUARANTINE, now_s), why=whole), ()
+def _blocks(trial: Trial) -> frozenset[str]:
+    """The blocks of its flight plan that the vehicle may be in; at first it may still tell of those before."""
+    limits = trial.plan.limits
+    allowed = limits.flying_blocks | limits.landing_blocks
+    early = trial.commanded_s is None or trial.watch.block_s - trial.commanded_s < _MODE_KNOWN_S
+    return allowed | limits.arming_blocks if early and allowed else allowed
 
 
 def _obeys(trial: Trial, now_s: float) -> bool:
@@ -396,12 +286,3 @@ def _obeys(trial: Trial, now_s: float) -> bool:
         return False
     near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     return near or last.climb_rate_m_s < _DESCENDING_M_S
-
-
-_REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
-    "land, gains first": _abort,
-    "land": _abort_landing,
-    "repeat land": _lose_link,
-    "disarm": _give_up_take_off,
-}
-"""By what the failure's row in the table says, for a vehicle that has been told to take off and obeys."""

@@ -1,6 +1,6 @@
 """What a vehicle's messages mean, whichever autopilot sent them: SI, altitude and climb positive up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,12 @@ class Spoken:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
+    """`place` of `count` in the vehicle's own list, where it is told; the same parameter with or without."""
+
     name: str
     value: float
+    place: int | None = field(default=None, compare=False)
+    count: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,4 +75,20 @@ class Block:
     name: str
 
 
-Measurement = Position | Heartbeat | Battery | Spoken | Parameter | Reply | Breach | BlockCount | Block
+@dataclass(frozen=True, slots=True)
+class BlockEntered:
+    """Paparazzi's flight plan has come to another block."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Version:
+    """What the autopilot's firmware calls itself."""
+
+    version: str
+
+
+Measurement = (
+    Position | Heartbeat | Battery | Spoken | Parameter | Reply | Breach | BlockCount | Block | BlockEntered | Version
+)

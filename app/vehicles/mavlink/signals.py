@@ -13,6 +13,9 @@ class Action(StrEnum):
     TAKE_OFF = "take off"
     LAND = "land"
     MOTORS_OFF = "motors off"
+    """On the ground: some autopilots refuse it in the air."""
+    KILL = "stop its motors"
+    """At any height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +46,24 @@ class AbortWanted:
 
 
 @dataclass(frozen=True, slots=True)
+class MotorsOffWanted:
+    """By a person, who has seen what the program has not: at any height."""
+
+    reason: str
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sighted:
+    """The second source of altitude spoke. `altitude_m` is on the vehicle's datum; `is_new` where it really saw the
+    vehicle, and not once more what it saw before."""
+
+    altitude_m: float
+    is_new: bool
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Done:
     """The vehicle has taken what an action sends."""
 
@@ -65,7 +86,7 @@ class Restored:
     problem: str = ""
 
 
-Event = Tick | Heard | AbortWanted | Done | Refused | Restored
+Event = Tick | Heard | AbortWanted | MotorsOffWanted | Sighted | Done | Refused | Restored
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +108,12 @@ class RestoreGains:
 
 @dataclass(frozen=True, slots=True)
 class Keep:
-    """A sample that belongs to the record, with what it was to be."""
+    """A sample that belongs to the record, with what it was to be, and where the second source saw the vehicle."""
 
     position: Position
     set_point_m: float
     battery_v: float | None
+    second_m: float | None = None
 
 
 Command = Perform | SendGain | RestoreGains | Keep

@@ -35,7 +35,7 @@ def test_a_hover_keeps_every_limit() -> None:
     watch = told(watch_of(3.0, 3.0, 3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.05)
     assert envelope(watch) is None
     assert limits.find_link(watch, LIMITS, 10.1) is None
-    assert limits.find_frozen(watch, LIMITS) is None
+    assert limits.find_frozen(watch, LIMITS, 10.3) is None
     assert limits.find_battery(watch, 10.1) is None
     assert limits.find_unexpected(watch, LIMITS.flying_modes) is None
 
@@ -132,28 +132,28 @@ def repeated(watch: Watch, *, until_s: float) -> Watch:
 
 
 def test_a_clock_that_stands_still_among_packets_is_frozen() -> None:
-    assert limits.find_frozen(repeated(watch_of(3.0), until_s=10.24), LIMITS) is None
-    frozen = limits.find_frozen(repeated(watch_of(3.0), until_s=10.28), LIMITS)
+    assert limits.find_frozen(repeated(watch_of(3.0), until_s=10.24), LIMITS, 10.3) is None
+    frozen = limits.find_frozen(repeated(watch_of(3.0), until_s=10.28), LIMITS, 10.3)
     assert frozen is not None
     assert frozen.failure is Failure.FROZEN
 
 
 def test_what_a_stall_delayed_may_come_in_any_order() -> None:
     watch = told(watch_of(3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.8)
-    assert limits.find_frozen(watch, LIMITS) is None
+    assert limits.find_frozen(watch, LIMITS, 10.3) is None
 
 
 def test_a_position_that_stays_away_among_other_packets_is_frozen_too() -> None:
     watch = watch_of(3.0)
     for beat in range(1, 4):
         watch = told(watch, Heartbeat(9, True, "4"), at_s=10.0 + beat * 0.5)
-    assert limits.find_frozen(watch, LIMITS) is not None
+    assert limits.find_frozen(watch, LIMITS, 10.3) is not None
 
 
 def test_silence_alone_is_not_frozen() -> None:
     watch = watch_of(3.0, 3.0)
     watch, _ = limits.hear(watch, Position(10.9, 3.0, 0.0), 10.9, LIMITS)
-    assert limits.find_frozen(watch, LIMITS) is None
+    assert limits.find_frozen(watch, LIMITS, 10.3) is None
 
 
 def test_a_packet_that_was_overtaken_is_left_out_and_a_clock_that_falls_back_is_a_reboot() -> None:

@@ -38,6 +38,18 @@ LIMITS = Limits(
     min_battery_v=10.5,
     flying_modes=PAPARAZZI.flying_modes,
     landing_modes=PAPARAZZI.landing_modes,
+    blocks={
+        2: "Holding point",
+        3: "Start Engine",
+        4: "Takeoff",
+        13: "land here",
+        14: "land",
+        15: "flare",
+        16: "landed",
+    },
+    arming_blocks=PAPARAZZI.arming_blocks,
+    flying_blocks=PAPARAZZI.flying_blocks,
+    landing_blocks=PAPARAZZI.landing_blocks,
 )
 SAFE_GAINS = tuple(Setting(name, 0.0) for name in ("gui_v_kp", "gui_v_kd", "gui_v_ki"))
 

@@ -22,7 +22,7 @@ def test_from_every_state_a_trial_can_come_to_rest() -> None:
 
 def test_what_was_armed_comes_to_rest_only_with_its_gains_restored_or_in_quarantine() -> None:
     before = {state for state, following in MOVES.items() if State.IDLE in following}
-    assert before == {State.CONNECT, State.PREFLIGHT, State.SET_GAINS, State.RESTORE, State.QUARANTINE}
+    assert before == {State.CONNECT, State.PREFLIGHT, State.SET_GAINS, State.RESTORE, State.QUARANTINE, State.OBSERVE}
 
 
 def test_nothing_goes_back_into_the_air() -> None:

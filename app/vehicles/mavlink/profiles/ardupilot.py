@@ -16,7 +16,9 @@ _ARM: Final = 400
 _SET_MODE: Final = 176
 _TAKE_OFF: Final = 22
 _SET_MESSAGE_INTERVAL: Final = 511
+_REQUEST_MESSAGE: Final = 512
 _LOCAL_POSITION_NED: Final = 32
+_AUTOPILOT_VERSION: Final = 148
 _CUSTOM_MODE: Final = 1.0
 
 
@@ -33,6 +35,9 @@ class ArduPilot:
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({str(GUIDED)})
     landing_modes: Final = frozenset({str(LAND)})
+    arming_blocks: Final[frozenset[str]] = frozenset()
+    flying_blocks: Final[frozenset[str]] = frozenset()
+    landing_blocks: Final[frozenset[str]] = frozenset()
     gain_sets: Final = (
         (
             GainParameter("PSC_POSZ_P", "PSC_POSZ_P", 0.1, 4.0),
@@ -63,6 +68,9 @@ class ArduPilot:
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
         return (request_positions(aim, telemetry_hz),)
 
+    def ask_version(self, aim: Aim) -> Outgoing:
+        return request_version(aim)
+
     def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
@@ -77,6 +85,8 @@ class ArduPilot:
                 return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, LAND),)),)
             case Action.MOTORS_OFF:
                 return (Step((base.command(aim, _ARM, 0.0),)),)
+            case Action.KILL:
+                return (Step((base.command(aim, _ARM, 0.0, base.FORCED),)),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
@@ -92,7 +102,12 @@ def request_positions(aim: Aim, telemetry_hz: float) -> Step:
     return Step((asked,), awaits="command 511")
 
 
-def _heartbeat(message: Message) -> Measurement:
+def request_version(aim: Aim) -> Outgoing:
+    """AUTOPILOT_VERSION, once."""
+    return base.command(aim, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
+
+
+def _heartbeat(message: Message) -> Measurement | None:
     return base.heartbeat(message, f"{number(message, 'custom_mode'):.0f}")
 
 

@@ -18,10 +18,15 @@ from app.vehicles.mavlink.measurements import (
     Position,
     Reply,
     Spoken,
+    Version,
 )
 from app.vehicles.mavlink.signals import Action
 
 ARMED_BIT: Final = 128
+NO_AUTOPILOT: Final = 8
+"""In heartbeats of gimbals, companion computers and ground stations."""
+FORCED: Final = 21196.0
+"""The second parameter of 400 that stops motors in the air."""
 REAL32: Final = 9
 AUTOPILOT: Final = 1
 """The component id that autopilots have unless somebody changed it."""
@@ -119,12 +124,12 @@ class Profile(Protocol):
     @property
     def title(self) -> str: ...
     @property
-    def dialect(self) -> Dialect: ...
-    @property
     def experiment(self) -> str:
         """The one that tunes its gains."""
         ...
 
+    @property
+    def dialect(self) -> Dialect: ...
     @property
     def autopilot(self) -> int:
         """The number of its make in a heartbeat."""
@@ -147,6 +152,15 @@ class Profile(Protocol):
     @property
     def landing_modes(self) -> frozenset[str]: ...
     @property
+    def arming_blocks(self) -> frozenset[str]:
+        """Of its flight plan, where it has one: in which it stands on the ground before the take-off."""
+        ...
+
+    @property
+    def flying_blocks(self) -> frozenset[str]: ...
+    @property
+    def landing_blocks(self) -> frozenset[str]: ...
+    @property
     def gain_sets(self) -> tuple[GainSet, ...]:
         """The gains under the names that releases have for them, newest last."""
         ...
@@ -160,6 +174,10 @@ class Profile(Protocol):
 
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
         """Set up telemetry and what a take-off needs, on the ground."""
+        ...
+
+    def ask_version(self, aim: Aim) -> Outgoing | None:
+        """None where it tells unasked, or never."""
         ...
 
     def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]: ...
@@ -189,6 +207,18 @@ def read_parameter(aim: Aim, parameter: str) -> Outgoing:
     )
 
 
+def list_parameters(aim: Aim) -> Outgoing:
+    return Outgoing("PARAM_REQUEST_LIST", {"target_system": aim.aircraft, "target_component": 0})
+
+
+def read_place(aim: Aim, place: int) -> Outgoing:
+    """A parameter by its place in the vehicle's list, never past its end: Paparazzi reads on behind its table."""
+    return Outgoing(
+        "PARAM_REQUEST_READ",
+        {"target_system": aim.aircraft, "target_component": 0, "param_id": "", "param_index": place},
+    )
+
+
 def command(aim: Aim, code: int, *parameters: float) -> Outgoing:
     """COMMAND_LONG; what is not given is 0."""
     filled = (*parameters, *(0.0 for _ in range(7 - len(parameters))))
@@ -215,7 +245,10 @@ def position(message: Message) -> Position:
     )
 
 
-def heartbeat(message: Message, mode: str) -> Heartbeat:
+def heartbeat(message: Message, mode: str) -> Heartbeat | None:
+    """None where it is not the autopilot's but that of something else on board."""
+    if number(message, "autopilot") == NO_AUTOPILOT:
+        return None
     return Heartbeat(
         autopilot=int(number(message, "autopilot")),
         armed=bool(int(number(message, "base_mode")) & ARMED_BIT),
@@ -231,7 +264,9 @@ def battery(message: Message) -> Battery | None:
 
 
 def parameter(message: Message) -> Parameter:
-    return Parameter(text(message, "param_id"), number(message, "param_value"))
+    count, place = int(number(message, "param_count")), int(number(message, "param_index"))
+    in_list = place if 0 <= place < count else None
+    return Parameter(text(message, "param_id"), number(message, "param_value"), in_list, count)
 
 
 def answer(message: Message) -> Reply | None:
@@ -250,6 +285,12 @@ def spoken(message: Message) -> Spoken:
 def breach(message: Message) -> Breach | None:
     """FENCE_STATUS."""
     return Breach() if number(message, "breach_status") else None
+
+
+def version(message: Message) -> Version | None:
+    """AUTOPILOT_VERSION: a byte each for major, minor and patch; None where they are not told."""
+    packed = int(number(message, "flight_sw_version"))
+    return Version(f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}") if packed else None
 
 
 def bytewise_integer(value: float) -> int:
@@ -271,6 +312,7 @@ READERS: Final[Readers] = MappingProxyType(
         "COMMAND_ACK": answer,
         "STATUSTEXT": spoken,
         "FENCE_STATUS": breach,
+        "AUTOPILOT_VERSION": version,
     }
 )
 """What most autopilots mean by their messages, by the message's name."""

@@ -6,7 +6,7 @@ from typing import Final
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import PAPARAZZI as DIALECT
 from app.vehicles.mavlink.dialects import Message, number, text
-from app.vehicles.mavlink.measurements import Block, BlockCount, Measurement, Reply
+from app.vehicles.mavlink.measurements import Block, BlockCount, BlockEntered, Measurement, Reply, Version
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
 from app.vehicles.mavlink.signals import Action
@@ -15,6 +15,8 @@ HOLDING: Final = "Holding point"
 START_ENGINE: Final = "Start Engine"
 TAKE_OFF: Final = "Takeoff"
 LAND: Final = "land here"
+AFTER_LAND: Final = ("land", "flare", "landed")
+"""The blocks that "land here" leads through in stock plans. It is passed at once, so the vehicle tells of the first."""
 BLOCKS: Final = (HOLDING, START_ENGINE, TAKE_OFF, LAND)
 
 _LOCAL_ENU: Final = 4
@@ -36,6 +38,9 @@ class Paparazzi:
     climbs_from_ground: Final = False
     flying_modes: Final = frozenset({_NAV})
     landing_modes: Final = frozenset({_NAV})
+    arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
+    flying_blocks: Final = frozenset({TAKE_OFF})
+    landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
     gain_sets: Final = (
         (
             GainParameter("kp", "gui_v_kp", 0.0, 4000.0, whole=True),
@@ -70,6 +75,9 @@ class Paparazzi:
         """Ends the listing of blocks, which else keeps every change of block away for 15 s."""
         return (Step((_acknowledge(aim),)),)
 
+    def ask_version(self, aim: Aim) -> None:
+        """It tells every few seconds."""
+
     def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
@@ -82,7 +90,7 @@ class Paparazzi:
                 return (Step(_block(aim, TAKE_OFF)),)
             case Action.LAND:
                 return (Step(_block(aim, LAND)),)
-            case Action.MOTORS_OFF:
+            case Action.MOTORS_OFF | Action.KILL:
                 return (Step((self.set_parameter(aim, "kil_thr", 1.0),)),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
@@ -129,7 +137,7 @@ def _without_blocks(what: str) -> VehicleError:
     )
 
 
-def _heartbeat(message: Message) -> Measurement:
+def _heartbeat(message: Message) -> Measurement | None:
     """Its mode is the base mode without the bit for armed."""
     return base.heartbeat(message, str(int(number(message, "base_mode")) & ~base.ARMED_BIT))
 
@@ -147,10 +155,22 @@ def _named(message: Message) -> Measurement:
     return Block(int(number(message, "seq")), text(message, "name"))
 
 
+def _entered(message: Message) -> Measurement:
+    return BlockEntered(int(number(message, "seq")))
+
+
+def _version(message: Message) -> Version | None:
+    """In decimal digits: 51000 is 5.10.0."""
+    packed = int(number(message, "flight_sw_version"))
+    return Version(f"{packed // 10000}.{packed // 100 % 100}.{packed % 100}") if packed else None
+
+
 _READERS: Final[base.Readers] = {
     **base.READERS,
     "HEARTBEAT": _heartbeat,
     "MISSION_ACK": _taken,
     "SCRIPT_COUNT": _count,
     "SCRIPT_ITEM": _named,
+    "SCRIPT_CURRENT": _entered,
+    "AUTOPILOT_VERSION": _version,
 }

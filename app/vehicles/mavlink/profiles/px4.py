@@ -1,12 +1,13 @@
 """PX4: its take-off and landing modes, and the gains of its vertical controllers."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.measurements import Measurement, Parameter
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.ardupilot import request_positions
+from app.vehicles.mavlink.profiles.ardupilot import request_positions, request_version
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
 from app.vehicles.mavlink.signals import Action
 
@@ -35,6 +36,9 @@ class Px4:
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
+    arming_blocks: Final[frozenset[str]] = frozenset()
+    flying_blocks: Final[frozenset[str]] = frozenset()
+    landing_blocks: Final[frozenset[str]] = frozenset()
     gain_sets: Final = (
         (
             GainParameter("MPC_Z_P", "MPC_Z_P", 0.1, 1.5),
@@ -59,6 +63,9 @@ class Px4:
         altitude = self.set_parameter(aim, TAKE_OFF_ALTITUDE, aim.altitude_m)
         return (request_positions(aim, telemetry_hz), Step((altitude,), awaits=TAKE_OFF_ALTITUDE))
 
+    def ask_version(self, aim: Aim) -> Outgoing:
+        return request_version(aim)
+
     def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
@@ -70,6 +77,8 @@ class Px4:
                 return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
             case Action.MOTORS_OFF:
                 return (Step((base.command(aim, _ARM, 0.0),)),)
+            case Action.KILL:
+                return (Step((base.command(aim, _ARM, 0.0, base.FORCED),)),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
@@ -82,10 +91,10 @@ def _parameter(message: Message) -> Parameter:
     heard = base.parameter(message)
     if number(message, "param_type") != _INT32:
         return heard
-    return Parameter(heard.name, base.bytewise_integer(heard.value))
+    return replace(heard, value=base.bytewise_integer(heard.value))
 
 
-def _heartbeat(message: Message) -> Measurement:
+def _heartbeat(message: Message) -> Measurement | None:
     mode = int(number(message, "custom_mode"))
     return base.heartbeat(message, f"{mode >> 16 & 0xFF}.{mode >> 24 & 0xFF}")
 

@@ -1,0 +1,180 @@
+"""The moves of a trial from one state to the next, each with the commands that belong to it: pure functions of a trial
+and the time. When each is made is decided in `machine.py`."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+from app.vehicles.mavlink import limits as watching
+from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Finding, Outcome, Reaction
+from app.vehicles.mavlink.limits import Limits, Watch
+from app.vehicles.mavlink.measurements import Parameter
+from app.vehicles.mavlink.signals import Action, Command, Event, Heard, Perform, SendGain, Setting
+from app.vehicles.mavlink.states import MOVES, OVER, State
+
+GAIN_S: Final = 0.1
+GAINS_S: Final = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground and the zero of
+    the record's altitude are on the vehicle's datum, how long to record after the command, how soon the vehicle has to
+    lift off, and its limits."""
+
+    safe_gains: tuple[Setting, ...]
+    limits: Limits
+    ground_m: float
+    datum_m: float = 0.0
+    record_s: float = 33.0
+    lift_off_s: float = 1.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
+    `failure` is the first that happened; `stopped`: a person has had its motors stopped."""
+
+    plan: Plan
+    state: State
+    since_s: float
+    watch: Watch
+    failure: Failure | None = None
+    why: str = ""
+    asked_s: float | None = None
+    armed_s: float | None = None
+    commanded_s: float | None = None
+    commanded_boot_s: float | None = None
+    unsent: tuple[Setting, ...] = ()
+    awaited: Setting | None = None
+    gains_since_s: float | None = None
+    sent_s: float = 0.0
+    repeated_s: float = 0.0
+    resting_since_s: float | None = None
+    stopped: bool = False
+
+    @property
+    def is_over(self) -> bool:
+        return self.state in OVER
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """What the trial is worth; None when nothing went wrong."""
+        if self.state is State.QUARANTINE:
+            return "quarantine"
+        if self.failure is None:
+            return None
+        known = RESPONSES[self.failure].outcome
+        return "invalid" if known == "quarantine" else known
+
+
+Step = tuple[Trial, tuple[Command, ...]]
+
+
+def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
+    """What a failure leads to, from a state in which the vehicle obeys."""
+    trial = note(trial, finding)
+    if trial.state is State.ARM:
+        return disarm(trial, now_s)
+    reaction = RESPONSES[finding.failure].reaction
+    if reaction == "cease":
+        return quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
+    if trial.state is State.ABORT_LAND:
+        return save(trial, now_s) if finding.failure in SUSPECT and trial.gains_since_s is None else (trial, ())
+    return _REACTIONS[reaction](trial, now_s)
+
+
+def _lose_link(trial: Trial, now_s: float) -> Step:
+    return land(trial, State.LINK_LOST, now_s)
+
+
+def _give_up_take_off(trial: Trial, now_s: float) -> Step:
+    """Motors off where it is on the ground by height and speed. In the air its integrator is wound up."""
+    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    return disarm(trial, now_s) if grounded else abort(trial, now_s)
+
+
+def _abort_landing(trial: Trial, now_s: float) -> Step:
+    return land(trial, State.ABORT_LAND, now_s)
+
+
+def note(trial: Trial, finding: Finding) -> Trial:
+    if trial.failure is not None:
+        return trial
+    return replace(trial, failure=finding.failure, why=finding.why)
+
+
+def enter(trial: Trial, state: State, now_s: float) -> Trial:
+    if state not in MOVES[trial.state]:
+        raise AssertionError(f"A trial cannot go from {trial.state} to {state}.")
+    return replace(trial, state=state, since_s=now_s, resting_since_s=None)
+
+
+def abort(trial: Trial, now_s: float) -> Step:
+    return save(enter(trial, State.ABORT_LAND, now_s), now_s)
+
+
+def save(trial: Trial, now_s: float) -> Step:
+    """The gains are suspect: the first safe gain leaves at once, Land follows the last."""
+    first, *others = trial.plan.safe_gains
+    trial = replace(trial, awaited=first, unsent=tuple(others), gains_since_s=now_s, sent_s=now_s)
+    return trial, (SendGain(first),)
+
+
+def land(trial: Trial, state: State, now_s: float) -> Step:
+    """Land now; it is repeated from `state`."""
+    return replace(enter(trial, state, now_s), repeated_s=now_s), (Perform(Action.LAND),)
+
+
+def disarm(trial: Trial, now_s: float) -> Step:
+    """Motors off at once where the vehicle is on the ground by height and speed; else only once it is."""
+    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    trial = enter(trial, State.DISARM, now_s)
+    if not grounded:
+        return trial, ()
+    return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
+
+
+def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
+    """At once, wherever the vehicle is; the trial is aborted, whatever came before. It is repeated from disarm."""
+    if trial.stopped:
+        return trial, ()
+    why = " ".join(part for part in (trial.why, f"The motors were stopped: {reason}") if part)
+    trial = replace(trial, failure=Failure.OPERATOR, why=why, stopped=True, awaited=None, unsent=())
+    if trial.state not in (State.DISARM, State.RESTORE):
+        trial = enter(trial, State.DISARM, now_s)
+    return replace(trial, repeated_s=now_s), (Perform(Action.KILL),)
+
+
+def quarantine(trial: Trial, why: str, now_s: float) -> Step:
+    whole = " ".join(part for part in (trial.why, why) if part)
+    return replace(enter(trial, State.QUARANTINE, now_s), why=whole), ()
+
+
+def send_gains(trial: Trial, event: Event) -> Step:
+    """One request in flight: the next safe gain when the last was echoed or 0.1 s have passed; Land after 0.3 s."""
+    now_s = event.now_s
+    echoed = (
+        isinstance(event, Heard)
+        and isinstance(event.measurement, Parameter)
+        and trial.awaited is not None
+        and event.measurement.name == trial.awaited.parameter
+    )
+    late = now_s - (trial.gains_since_s or now_s) >= GAINS_S
+    if not late and not echoed and now_s - trial.sent_s < GAIN_S:
+        return trial, ()
+    if trial.unsent and not late:
+        following, *others = trial.unsent
+        return replace(trial, awaited=following, unsent=tuple(others), sent_s=now_s), (SendGain(following),)
+    rest = tuple(SendGain(setting) for setting in trial.unsent)
+    trial = replace(trial, awaited=None, unsent=(), repeated_s=now_s)
+    return trial, (*rest, Perform(Action.LAND))
+
+
+_REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
+    "land, gains first": abort,
+    "land": _abort_landing,
+    "repeat land": _lose_link,
+    "disarm": _give_up_take_off,
+}
+"""By what the failure's row in the table says, for a vehicle that has been told to take off and obeys."""

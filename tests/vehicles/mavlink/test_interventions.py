@@ -1,0 +1,160 @@
+"""What a trial does about a person's slide, a landing that the vehicle begins by itself, and a second source."""
+
+from dataclasses import replace
+
+import pytest
+
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.measurements import BlockEntered
+from app.vehicles.mavlink.signals import AbortWanted, Action, MotorsOffWanted, Sighted
+from app.vehicles.mavlink.states import State
+from tests.vehicles.mavlink.test_machine import STAGES
+from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, Walk
+
+TAKE_OFF, STANDBY, LAND_BLOCK = 4, 5, 14
+BLOCKS = {2: "Holding point", 3: "Start Engine", TAKE_OFF: "Takeoff", STANDBY: "Standby", LAND_BLOCK: "land"}
+WITH_BLOCKS = replace(
+    PLAN,
+    limits=replace(
+        LIMITS,
+        blocks=BLOCKS,
+        arming_blocks=frozenset({"Holding point", "Start Engine"}),
+        flying_blocks=frozenset({"Takeoff"}),
+        landing_blocks=frozenset({"land here", "land", "flare", "landed"}),
+    ),
+)
+COPTER = replace(PLAN, limits=replace(LIMITS, flying_modes=frozenset({"guided"}), landing_modes=frozenset({"land"})))
+
+
+def slide(walk: Walk, reason: str = "it flies towards people") -> Walk:
+    return walk.give(MotorsOffWanted(reason, walk.now_s))
+
+
+@pytest.mark.parametrize("state", STAGES)
+def test_motors_off_is_sent_at_once_in_every_state_and_the_trial_is_aborted(state: State) -> None:
+    walk = STAGES[state]()
+    slid_s = walk.now_s
+    slide(walk)
+    assert walk.when(Action.KILL) == [slid_s]
+    assert walk.state is (State.RESTORE if state is State.RESTORE else State.DISARM)
+    assert (walk.trial.failure, walk.trial.outcome) == (Failure.OPERATOR, "aborted")
+    assert walk.trial.why.endswith("The motors were stopped: it flies towards people")
+
+
+def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_says_so() -> None:
+    walk = slide(STAGES[State.RECORD]()).pass_s(2.5)
+    assert walk.altitude_m > 2.0
+    assert len(walk.when(Action.KILL)) == 3
+    walk.disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, "aborted")
+
+
+def test_motors_off_that_is_not_obeyed_quarantines_the_vehicle() -> None:
+    walk = slide(STAGES[State.RECORD]()).pass_s(5.1)
+    assert walk.state is State.QUARANTINE
+
+
+def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -> None:
+    walk = STAGES[State.RECORD]()
+    walk.give(AbortWanted("too high", walk.now_s)).pass_s(0.2)
+    for _ in range(55):
+        slide(walk).pass_s(STEP_S)
+    assert len(walk.when(Action.KILL)) == 2
+    assert walk.trial.why == "too high The motors were stopped: it flies towards people"
+
+
+def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void() -> None:
+    walk = Walk(plan=WITH_BLOCKS).lift_off()
+    walk.hear(BlockEntered(LAND_BLOCK)).pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
+    assert walk.trial.why == "Its flight plan went to the block “land”."
+    walk.touch_down().disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
+
+
+def test_a_flight_plan_that_goes_where_nobody_sent_it_is_left_alone() -> None:
+    walk = Walk(plan=WITH_BLOCKS).lift_off()
+    walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.UNEXPECTED)
+    assert walk.trial.why == "Its flight plan went to the block “Standby”."
+
+
+def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
+    walk = Walk(plan=WITH_BLOCKS).arm()
+    walk.hear(BlockEntered(3)).hear(BlockEntered(TAKE_OFF))
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(2.9)
+    walk.climb_rate_m_s = 0.0
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    walk.hear(BlockEntered(LAND_BLOCK)).touch_down().disarm().restore()
+    assert (walk.state, walk.trial.failure) == (State.IDLE, None)
+
+
+def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
+    walk = Walk(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
+    walk.mode = "land"
+    walk.pass_s(0.6)
+    assert (walk.state, walk.trial.failure, walk.trial.why) == (
+        State.ABORT_LAND,
+        Failure.OWN_LANDING,
+        "It went into mode land.",
+    )
+
+
+def test_the_mode_of_the_landing_before_is_no_landing() -> None:
+    walk = Walk(plan=COPTER, mode="land").arm()
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(0.8)
+    walk.mode = "guided"
+    walk.pass_s(2.0)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+
+
+def watched(walk: Walk, seconds: float, off_m: float = 0.0, *, is_new: bool = True) -> Walk:
+    """Let time pass under the eyes of a second source, 50 times a second."""
+    for _ in range(round(seconds / STEP_S)):
+        walk.pass_s(STEP_S)
+        walk.give(Sighted(walk.altitude_m + off_m, is_new, walk.now_s))
+    return walk
+
+
+def hovering() -> Walk:
+    return watched(Walk().lift_off(), 0.5)
+
+
+def test_two_sources_that_disagree_for_a_third_of_a_second_land_the_vehicle() -> None:
+    walk = watched(hovering(), 0.28, off_m=0.35)
+    assert walk.state is State.RECORD
+    watched(walk, 0.1, off_m=0.35)
+    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.DISAGREEMENT, "invalid")
+    assert walk.trial.why == "They were 0.35 m apart, over 0.3 m for 0.3 s."
+    assert walk.gains_sent == []
+
+
+def test_a_short_disagreement_and_a_small_one_are_borne() -> None:
+    walk = hovering()
+    for _ in range(5):
+        watched(watched(walk, 0.2, off_m=-0.5), 0.2, off_m=0.29)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+
+
+def test_a_second_source_that_loses_the_vehicle_lands_it() -> None:
+    walk = watched(hovering(), 0.24, is_new=False)
+    assert walk.state is State.RECORD
+    watched(walk, 0.06, is_new=False)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
+    assert walk.trial.why == "The second source of altitude did not see it for more than 0.25 s."
+
+
+def test_a_second_source_that_falls_silent_lands_it_after_a_second() -> None:
+    walk = hovering().pass_s(0.9)
+    assert walk.state is State.RECORD
+    assert walk.pass_s(0.2).trial.why == "Nothing came from the second source of altitude for 1 s."
+
+
+def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle() -> None:
+    walk = watched(hovering(), 1.0, off_m=0.1)
+    assert [kept.second_m for kept in walk.kept][-1] == pytest.approx(3.1 + GROUND_M - 0.1, abs=0.05)
+    assert walk.kept[0].second_m is None
+    assert walk.gains_sent != list(SAFE_GAINS)
