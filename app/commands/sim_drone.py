@@ -2,16 +2,19 @@
 
 import signal
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from types import FrameType
 
 from app.commands.console import console
 from app.errors import InputError, Problem
-from app.vehicles.mavlink.addresses import is_loopback, parse
+from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
 from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.transports import open_transport
+from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress
+from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import new_body
+from app.vehicles.simdrone.cameras import open_outlet
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
 from app.vehicles.simdrone.server import Server
@@ -28,36 +31,56 @@ def run_sim_drone(
     faults: Sequence[str],
     system: int | None,
     failsafes: bool,
+    mocap: str | None,
     any_network: bool,
 ) -> None:
     """Serve the drone until SIGINT or SIGTERM; the main thread only. Raises InputError for what cannot be had, and
     LinkError when the link cannot be opened."""
     kind = get_autopilot(autopilot)
     address = parse(link or kind.link)
-    if not any_network and not is_loopback(address):
-        raise InputError(
-            "A simulated drone keeps to this computer.",
-            problems=(Problem("--link", f"{address} leads elsewhere"),),
-            hint="Anybody who reaches it can fly it; if that is meant, add --any-network.",
-        )
+    seen_at = None if mocap is None else parse_source(mocap)
+    if not any_network:
+        _require_loopback("--link", address)
+        _require_loopback("--mocap", _led_to(seen_at))
     planned = [parse_fault(text) for text in faults]
     clock = ScaledClock(speed)
     number = kind.system if system is None else system
     switch_on = kind.set_up if failsafes else kind.make
     body = new_body(vehicle, _options(settings), seed=seed)
-    drone = Drone(body, lambda fresh: switch_on(fresh, number), planned)
-    transport = open_transport(address)
-    try:
+    with ExitStack() as opened:
+        outlet = None if seen_at is None else opened.enter_context(closing(open_outlet(seen_at)))
+        drone = Drone(body, lambda fresh: switch_on(fresh, number), planned, outlet)
+        transport = opened.enter_context(closing(open_transport(address)))
         server = Server(drone, transport, clock)
         out = console()
         out.print(f"{kind.title}, system {number}, in the body of {vehicle}, on {address}.")
+        if seen_at is not None:
+            out.print(f"Motion capture sees it: {seen_at}.")
         out.print(f"Its time runs {speed:g} times as fast as the clock's. Ctrl-C switches it off.")
         with _stopped_by_signals(server):
             server.run()
         if server.lost_s > 0.0:
             out.print(f"This computer was too slow: the drone's clock is {server.lost_s:.1f} s late.")
-    finally:
-        transport.close()
+
+
+def _led_to(source: SourceAddress | None) -> Address | None:
+    """Where what motion capture says is to be heard, None where that is the drone's own link."""
+    match source:
+        case StreamAddress(link):
+            return link
+        case NatNetAddress():
+            return UdpInAddress(source.host, source.command_port)
+        case _:
+            return None
+
+
+def _require_loopback(option: str, address: Address | None) -> None:
+    if address is not None and not is_loopback(address):
+        raise InputError(
+            "A simulated drone keeps to this computer.",
+            problems=(Problem(option, f"{address} leads elsewhere"),),
+            hint="Anybody who reaches it can fly it; if that is meant, add --any-network.",
+        )
 
 
 def _options(settings: Sequence[str]) -> dict[str, float]:

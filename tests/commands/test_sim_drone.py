@@ -46,6 +46,9 @@ def test_it_speaks_until_it_is_stopped_and_then_ends_well() -> None:
     ("arguments", "words"),
     [
         (["--link", "udp:192.0.2.1:14550"], "--any-network"),
+        (["--mocap", "natnet:192.0.2.1?body=1"], "--any-network"),
+        (["--mocap", "mavlink:udp:192.0.2.1:14600"], "--any-network"),
+        (["--mocap", "vicon:127.0.0.1"], "must be natnet:HOST?body=ID, odometry or"),
         (["--autopilot", "betaflight"], "must be one of paparazzi"),
         (["--vehicle", "lti"], "must be one of jsbsim, twin"),
         (["--fault", "gremlins@3"], "must be one of no-heartbeat"),

@@ -6,6 +6,7 @@ from typing import Final
 from app.vehicles.mavlink.dialects import Codec
 from app.vehicles.simdrone.autopilots.base import Autopilot, Letter
 from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body
+from app.vehicles.simdrone.cameras import Cameras, Outlet
 from app.vehicles.simdrone.faults import Faults, Planned
 
 BOOT_S: Final = 2.0
@@ -13,10 +14,19 @@ BOOT_S: Final = 2.0
 
 
 class Drone:
-    """Time passes in ticks of TICK_S; `switch_on(body)` gives an autopilot fresh from its start."""
+    """Time passes in ticks of TICK_S; `switch_on(body)` gives an autopilot fresh from its start. What motion capture
+    sees of the body leaves by `outlet`."""
 
-    def __init__(self, body: Body, switch_on: Callable[[Body], Autopilot], faults: Sequence[Planned] = ()) -> None:
+    def __init__(
+        self,
+        body: Body,
+        switch_on: Callable[[Body], Autopilot],
+        faults: Sequence[Planned] = (),
+        outlet: Outlet | None = None,
+    ) -> None:
         self.body = body
+        self.cameras = Cameras()
+        self._outlet = outlet
         self.autopilot = switch_on(body)
         self._switch_on = switch_on
         self._faults = Faults(faults)
@@ -43,10 +53,11 @@ class Drone:
         """Let one tick pass; the packets that leave. Raises VehicleError when the simulation broke down."""
         self._faults.update(self.time_s, self._takeoff_s, self)
         self._ticks += 1
+        seen = self._outlet.say(self.cameras.look(self.time_s, self.body.altitude_m)) if self._outlet else []
         if self.time_s < self._silent_until_s:
             self.body.advance(TICK_STEPS, MOTORS_OFF)
             return []
-        letters = self._faults.letters(self.autopilot.tick())
+        letters = self._faults.letters([*self.autopilot.tick(), *seen])
         if self._takeoff_s is None and self.autopilot.took_off:
             self._takeoff_s = self.time_s
         return self._faults.frames([self._packed(letter) for letter in letters])

@@ -10,6 +10,7 @@ from app.core.policy import is_finite
 from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.simdrone.autopilots.base import Autopilot, Letter
 from app.vehicles.simdrone.body import Body
+from app.vehicles.simdrone.cameras import Cameras
 
 CONNECT: Final = "connect"
 FORM: Final = "NAME[:DURATION]@T, T in seconds after the takeoff command, or NAME[:DURATION]@connect"
@@ -28,6 +29,7 @@ class Afflicted(Protocol):
 
     body: Body
     autopilot: Autopilot
+    cameras: Cameras
 
     def reboot(self) -> None: ...
 
@@ -210,6 +212,42 @@ class WrongSystem(Fault):
         return [replace(letter, system=_WRONG_SYSTEM) for letter in letters]
 
 
+class MocapLost(Fault):
+    """Motion capture does not see the drone any more, says so, and repeats where it was."""
+
+    name = "mocap-lost"
+
+    def begin(self, drone: Afflicted) -> None:
+        drone.cameras.blind = True
+
+    def end(self, drone: Afflicted) -> None:
+        drone.cameras.blind = False
+
+
+class MocapFrozen(Fault):
+    """Motion capture sends its last frame again and again."""
+
+    name = "mocap-frozen"
+
+    def begin(self, drone: Afflicted) -> None:
+        drone.cameras.stuck = True
+
+    def end(self, drone: Afflicted) -> None:
+        drone.cameras.stuck = False
+
+
+class MocapDrift(Fault):
+    """The altitude that motion capture tells goes away from the true one, by 0.1 m/s."""
+
+    name = "mocap-drift"
+
+    def begin(self, drone: Afflicted) -> None:
+        drone.cameras.drifts = True
+
+    def end(self, drone: Afflicted) -> None:
+        drone.cameras.drifts = False
+
+
 FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
     {
         fault.name: fault
@@ -226,6 +264,9 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             DuplicatedPackets,
             ReorderedPackets,
             WrongSystem,
+            MocapLost,
+            MocapFrozen,
+            MocapDrift,
         )
     }
 )

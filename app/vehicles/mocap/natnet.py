@@ -1,0 +1,192 @@
+"""A rigid body that Motive (or whatever speaks NatNet) streams."""
+
+import contextlib
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+from natnet import NatNetClient, NatNetError, Version
+
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.clock import Clock
+from app.vehicles.mavlink.link import Received
+from app.vehicles.mavlink.sources import SourceSample
+from app.vehicles.mocap.addresses import NatNetAddress
+from app.vehicles.mocap.stream import SILENT_S, PoseStream
+
+ANSWERED_WITHIN_S: Final = 1.0
+ATTEMPTS: Final = 3
+SEEN_WITHIN_S: Final = 2.0
+POLL_S: Final = 0.004
+_TELLS_TRACKING: Final = Version(2, 6)
+_GARBLED: Final = (struct.error, ValueError, TypeError, LookupError, OverflowError, MemoryError, NatNetError)
+"""What the library raises for packets that are not as the protocol says."""
+_UP: Final = {"y": 1, "z": 2}
+
+
+class _RigidBody(Protocol):
+    id_num: int
+    pos: tuple[float, float, float]
+    rot: tuple[float, float, float, float]
+    tracking_valid: bool | None
+
+
+class _Suffix(Protocol):
+    timestamp: float
+
+
+class _Frame(Protocol):
+    rigid_bodies: Sequence[_RigidBody]
+    suffix: _Suffix
+
+
+class _Event(Protocol):
+    handlers: list[Callable[[_Frame], None]]
+
+
+class _Client(Protocol):
+    """The library's client: every packet is taken in by the thread that calls `connect` or `update_sync`."""
+
+    on_data_frame_received_event: _Event
+    protocol_version: Version
+
+    def connect(self, timeout: float) -> None: ...
+    def update_sync(self) -> None: ...
+    def shutdown(self) -> None: ...
+
+
+class NatNetSource:
+    """Heard in a thread of its own, which looks for packets every 4 ms."""
+
+    def __init__(self, address: NatNetAddress, clock: Clock) -> None:
+        """Find the server and wait for the body. Raises VehicleError when nobody answers there, no frames come, or
+        the body is not among those streamed."""
+        self.name: Final = f"rigid body {address.body} of the motion capture at {address.host}"
+        self._address, self._clock = address, clock
+        self._stream = PoseStream()
+        self._heard_bodies: set[int] = set()
+        self._frame_s: float | None = None
+        self._client = self._connect()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=str(address), daemon=True)
+        try:
+            self._meet()
+        except BaseException:
+            self._client.shutdown()
+            raise
+        self._thread.start()
+
+    @property
+    def trouble(self) -> str:
+        if not self._thread.is_alive():
+            return f"{self.name} is not listened to any more."
+        if self._frame_s is not None and (silent_s := time.monotonic() - self._frame_s) > SILENT_S:
+            return f"Nothing has come of {self.name} for {silent_s:.0f} s."
+        newest = self._stream.newest
+        return f"The cameras do not see {self.name}." if newest is not None and not newest.tracking_valid else ""
+
+    def hear(self, received: Received) -> None:
+        """The vehicle's own link is another."""
+
+    def take(self) -> Sequence[SourceSample]:
+        return self._stream.take()
+
+    def close(self) -> None:
+        self._closing.set()
+        self._thread.join()
+        self._client.shutdown()
+
+    def _connect(self) -> _Client:
+        host = self._address.host
+        try:
+            server = socket.gethostbyname(host)
+            local = self._address.local or _interface_towards(server, self._address.command_port)
+        except OSError as error:
+            raise _unreachable(self._address, f"there is no way to it: {error.strerror or error}") from error
+        client: _Client = NatNetClient(
+            server_ip_address=server,
+            local_ip_address=local,
+            multicast_address=self._address.multicast,
+            command_port=self._address.command_port,
+            data_port=self._address.data_port,
+            use_multicast=bool(self._address.multicast),
+        )
+        client.on_data_frame_received_event.handlers.append(self._hear)
+        for _ in range(ATTEMPTS):
+            try:
+                client.connect(timeout=ANSWERED_WITHIN_S)
+            except TimeoutError:
+                continue
+            except (OSError, *_GARBLED) as error:
+                client.shutdown()
+                raise _unreachable(self._address, f"{error}") from error
+            return client
+        raise _unreachable(self._address, f"it did not answer within {ATTEMPTS * ANSWERED_WITHIN_S:g} s")
+
+    def _meet(self) -> None:
+        version = self._client.protocol_version
+        if version < _TELLS_TRACKING:
+            raise VehicleError(
+                f"The motion capture at {self._address.host} speaks NatNet {version}, which does not tell whether a "
+                f"body is tracked.",
+                hint=f"Let it stream NatNet {_TELLS_TRACKING} or newer.",
+            )
+        until_s = time.monotonic() + SEEN_WITHIN_S
+        while self._stream.newest is None and time.monotonic() < until_s:
+            self._take_in()
+            time.sleep(POLL_S)
+        if self._stream.newest is None:
+            raise self._absent()
+
+    def _absent(self) -> VehicleError:
+        if self._frame_s is None:
+            return VehicleError(
+                f"The motion capture at {self._address.host} answers, but no frames came within {SEEN_WITHIN_S:g} s.",
+                hint="See that Motive streams live, to the multicast group (or unicast) and over the interface that "
+                "the address names: &multicast=GROUP or no, &local=ADDRESS of this computer.",
+            )
+        heard = ", ".join(map(str, sorted(self._heard_bodies))) or "none"
+        return VehicleError(
+            f"The motion capture at {self._address.host} streams no rigid body {self._address.body}; it streams these "
+            f"ids: {heard}.",
+            hint="Take the streaming id that Motive shows with the body, as ?body=ID, and see that it is enabled.",
+        )
+
+    def _run(self) -> None:
+        while not self._closing.wait(POLL_S):
+            self._take_in()
+
+    def _take_in(self) -> None:
+        """A garbled packet or a network that is down is silence: who listens notices."""
+        with contextlib.suppress(OSError, *_GARBLED):
+            self._client.update_sync()
+
+    def _hear(self, frame: _Frame) -> None:
+        self._frame_s = time.monotonic()
+        for body in frame.rigid_bodies:
+            self._heard_bodies.add(body.id_num)
+            if body.id_num == self._address.body:
+                self._stream.put(
+                    body.pos[_UP[self._address.up]],
+                    (*body.pos, *body.rot),
+                    time_s=frame.suffix.timestamp,
+                    arrived_s=self._clock.now_s(),
+                    tracking_valid=bool(body.tracking_valid),
+                )
+
+
+def _interface_towards(server: str, port: int) -> str:
+    """The address of ours from which packets to `server` leave; none is sent. Raises OSError when there is no way."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect((server, port))
+        return str(probe.getsockname()[0])
+
+
+def _unreachable(address: NatNetAddress, why: str) -> VehicleError:
+    return VehicleError(
+        f"The motion capture at {address.host} (NatNet, port {address.command_port}) is not there: {why}.",
+        hint="See that Motive runs there with streaming switched on, and that no firewall keeps its answers away.",
+    )

@@ -1,0 +1,170 @@
+"""Motion capture as MAVLink carries it: ODOMETRY and VISION_POSITION_ESTIMATE, on the vehicle's link or another."""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.clock import Clock
+from app.vehicles.mavlink.dialects import COMMON, Message, is_known, number
+from app.vehicles.mavlink.link import Received
+from app.vehicles.mavlink.sources import SourceSample
+from app.vehicles.mavlink.transports import Peer, open_transport
+from app.vehicles.mocap.addresses import StreamAddress
+from app.vehicles.mocap.stream import SILENT_S, PoseStream
+
+_UP_FRAMES: Final = frozenset({4, 13, 15, 17, 19, 21})
+"""MAV_FRAME: the local ones whose third axis points up (ENU and FLU; 13 to 19 are the names of old)."""
+HEARD_WITHIN_S: Final = 2.0
+_SYSTEM: Final = 255
+_COMPONENT: Final = 190
+_READ_S: Final = 0.1
+_LOST: Final = -1.0
+"""ODOMETRY's quality when odometry has failed; 0: it does not tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """By the sender's clock, altitude up on the sender's zero; `values` are all that the message says of it."""
+
+    time_s: float
+    altitude_m: float
+    values: tuple[float, ...]
+    tracking_valid: bool
+
+
+def _odometry(message: Message) -> Pose:
+    up = 1.0 if int(number(message, "frame_id")) in _UP_FRAMES else -1.0
+    values = tuple(number(message, field) for field in ("x", "y", "z", "vx", "vy", "vz"))
+    # MAVLink 1 has no room for the quality.
+    failed = "quality" in message.get_fieldnames() and number(message, "quality") == _LOST
+    return Pose(number(message, "time_usec") / 1e6, up * values[2], values, not failed)
+
+
+def _vision(message: Message) -> Pose:
+    values = tuple(number(message, field) for field in ("x", "y", "z", "roll", "pitch", "yaw"))
+    return Pose(number(message, "usec") / 1e6, -values[2], values, tracking_valid=True)
+
+
+READERS: Final[Mapping[str, Callable[[Message], Pose]]] = MappingProxyType(
+    {"ODOMETRY": _odometry, "VISION_POSITION_ESTIMATE": _vision}
+)
+
+
+class OdometrySource:
+    """The odometry messages among those that `hear` is given. The kind that comes first is the one taken:
+    two estimates by turns would be none."""
+
+    def __init__(self, name: str, clock: Clock) -> None:
+        self.name: Final = name
+        self._clock = clock
+        self._stream = PoseStream()
+        self._kind = ""
+        self._heard_s = clock.now_s()
+
+    @property
+    def trouble(self) -> str:
+        if (silent_s := self._clock.now_s() - self._heard_s) > SILENT_S:
+            return f"No odometry has come from {self.name} for {silent_s:.0f} s."
+        newest = self._stream.newest
+        return f"The odometry from {self.name} has failed." if newest is not None and not newest.tracking_valid else ""
+
+    def hear(self, received: Received) -> None:
+        message, arrived_s = received.message, received.received_s
+        kind = message.get_type()
+        if kind not in READERS or kind != (self._kind or kind):
+            return
+        self._kind, self._heard_s = kind, arrived_s
+        pose = READERS[kind](message)
+        self._stream.put(
+            pose.altitude_m,
+            pose.values,
+            time_s=pose.time_s,
+            arrived_s=arrived_s,
+            tracking_valid=pose.tracking_valid and math.isfinite(pose.altitude_m),
+        )
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether any odometry has come yet."""
+        return self._stream.newest is not None
+
+    def take(self) -> Sequence[SourceSample]:
+        return self._stream.take()
+
+    def close(self) -> None:
+        """The link is another's."""
+
+
+class StreamSource:
+    """Odometry on a link of its own, heard in a thread of its own. Nothing is sent; whoever first says something that
+    is odometry is listened to."""
+
+    def __init__(self, address: StreamAddress, clock: Clock) -> None:
+        """Wait for the first odometry. Raises LinkError when the address cannot be opened, VehicleError when none
+        comes."""
+        self._inner: Final = OdometrySource(str(address), clock)
+        self._clock = clock
+        self._transport = open_transport(address.link)
+        self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=str(address), daemon=True)
+        self._thread.start()
+        try:
+            self._meet(address)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def name(self) -> str:
+        return self._inner.name
+
+    @property
+    def trouble(self) -> str:
+        return self._inner.trouble if self._thread.is_alive() else f"{self.name} is not listened to any more."
+
+    def hear(self, received: Received) -> None:
+        """The vehicle's own link is another."""
+
+    def take(self) -> Sequence[SourceSample]:
+        return self._inner.take()
+
+    def close(self) -> None:
+        """Again is harmless."""
+        if not self._closing.is_set():
+            self._closing.set()
+            self._transport.wake()
+        self._thread.join()
+
+    def _meet(self, address: StreamAddress) -> None:
+        until_s = time.monotonic() + HEARD_WITHIN_S
+        while not self._inner.is_heard:
+            if time.monotonic() > until_s:
+                raise VehicleError(
+                    f"No ODOMETRY and no VISION_POSITION_ESTIMATE came at {address} within {HEARD_WITHIN_S:g} s.",
+                    hint="See that the motion capture's bridge runs and sends to this computer's port.",
+                )
+            time.sleep(_READ_S / 10.0)
+
+    def _run(self) -> None:
+        try:
+            while not self._closing.is_set():
+                for data, peer in self._transport.read(_READ_S):
+                    self._take_in(data, peer)
+        finally:
+            self._transport.close()
+
+    def _take_in(self, data: bytes, peer: Peer) -> None:
+        is_stranger = self._transport.remote is None
+        codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT) if is_stranger else self._codec
+        messages = [message for message in codec.parse(data) if is_known(message)]
+        if is_stranger and any(message.get_type() in READERS for message in messages):
+            self._transport.adopt(peer)
+        now_s = self._clock.now_s()
+        for message in messages:
+            self._inner.hear(Received(message, now_s))

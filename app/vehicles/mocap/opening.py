@@ -1,0 +1,19 @@
+"""Opens the second source of altitude that a text names."""
+
+from app.vehicles.mavlink.clock import Clock
+from app.vehicles.mavlink.sources import Source
+from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, StreamAddress, parse
+from app.vehicles.mocap.natnet import NatNetSource
+from app.vehicles.mocap.odometry import OdometrySource, StreamSource
+
+
+def open_source(text: str, clock: Clock) -> Source:
+    """Raises InputError for a text that names none, VehicleError when nothing is heard there; what the vehicle's own
+    link is to bring is not waited for."""
+    match parse(text):
+        case NatNetAddress() as address:
+            return NatNetSource(address, clock)
+        case OdometryAddress():
+            return OdometrySource("the vehicle's own link", clock)
+        case StreamAddress() as address:
+            return StreamSource(address, clock)

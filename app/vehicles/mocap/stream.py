@@ -1,0 +1,66 @@
+"""What a stream of poses says, as samples of altitude: put on our clock, and whether each says anything new."""
+
+from collections import deque
+from typing import Final
+
+from app.vehicles.mavlink.sources import SourceSample
+
+SILENT_S: Final = 1.0
+KEPT: Final = 20_000
+"""Samples kept for a program that does not ask for them; then the oldest are dropped."""
+
+_WINDOW: Final = 500
+_RESTART_S: Final = 1.0
+"""A source whose clock goes back by so much has started anew; by less, a packet came late."""
+
+
+class Arrivals:
+    """A source's time stamps on our clock, as if every message had travelled as fast as the fastest of late: without
+    what the network and a busy computer hold back."""
+
+    def __init__(self) -> None:
+        self._offsets_s: deque[float] = deque(maxlen=_WINDOW)
+
+    def received_s(self, time_s: float, arrived_s: float) -> float:
+        """When what was stamped `time_s` and came at `arrived_s` would have come at its fastest."""
+        offset_s = arrived_s - time_s
+        if self._offsets_s and abs(offset_s - self._offsets_s[-1]) > _RESTART_S:
+            self._offsets_s.clear()
+        self._offsets_s.append(offset_s)
+        return time_s + min(self._offsets_s)
+
+
+class PoseStream:
+    """Poses in, samples out; one thread may put while another takes.
+
+    A pose says something new when its time has advanced and it is not, to the last bit, the one before: cameras never
+    see the same twice, but a system that has lost a body may go on to repeat where it was.
+    """
+
+    def __init__(self) -> None:
+        self._samples: deque[SourceSample] = deque(maxlen=KEPT)
+        self._arrivals = Arrivals()
+        self._time_s = float("-inf")
+        self._pose: tuple[float, ...] = ()
+        self.newest: SourceSample | None = None
+        """The last sample that came, whether it was taken or not."""
+
+    def put(
+        self, altitude_m: float, pose: tuple[float, ...], *, time_s: float, arrived_s: float, tracking_valid: bool
+    ) -> None:
+        """`time_s` by the source's clock, `arrived_s` by ours."""
+        later = time_s > self._time_s or time_s < self._time_s - _RESTART_S
+        sample = SourceSample(
+            received_s=self._arrivals.received_s(time_s, arrived_s) if later else arrived_s,
+            altitude_m=altitude_m,
+            tracking_valid=tracking_valid,
+            advances=later and pose != self._pose,
+        )
+        if later:
+            self._time_s, self._pose = time_s, pose
+        self.newest = sample
+        self._samples.append(sample)
+
+    def take(self) -> list[SourceSample]:
+        """What came since the last call, oldest first."""
+        return [self._samples.popleft() for _ in range(len(self._samples))]

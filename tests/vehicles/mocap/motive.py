@@ -1,0 +1,60 @@
+"""A motion-capture system on real UDP sockets: the simulated drone's, moved by hand."""
+
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, Self
+
+from app.vehicles.mavlink.sources import Source, SourceSample
+from app.vehicles.mocap.addresses import SourceAddress
+from app.vehicles.simdrone.cameras import Cameras, Outlet, open_outlet
+
+LOOPBACK: Final = "127.0.0.1"
+
+
+class Motive:
+    """Streams in real time what is `altitude_m` high, from its beginning to its end; its clock begins at `clock_s`."""
+
+    def __init__(self, address: SourceAddress, outlet: Outlet | None = None, *, clock_s: float = 0.0) -> None:
+        self.cameras = Cameras()
+        self.altitude_m = 0.0
+        self._clock_s = clock_s
+        self._outlet = outlet or open_outlet(address)
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._outlet.close()
+
+    def _run(self) -> None:
+        begun_s = time.monotonic() - self._clock_s
+        while not self._stopping.wait(0.002):
+            self._outlet.say(self.cameras.look(time.monotonic() - begun_s, self.altitude_m))
+
+
+def comes_true(condition: Callable[[], bool], within_s: float = 10.0) -> bool:
+    until_s = time.monotonic() + within_s
+    while not (held := condition()) and time.monotonic() < until_s:
+        time.sleep(0.01)
+    return held
+
+
+def news(source: Source, count: int = 10, within_s: float = 10.0) -> list[SourceSample]:
+    """What comes from now on, at least so many samples."""
+    source.take()
+    heard: list[SourceSample] = []
+    until_s = time.monotonic() + within_s
+    while len(heard) < count:
+        assert time.monotonic() < until_s, f"only {len(heard)} samples came"
+        time.sleep(0.01)
+        heard += source.take()
+    return heard

@@ -1,0 +1,45 @@
+import pytest
+
+from app.vehicles.mocap.stream import Arrivals, PoseStream
+
+
+def put(stream: PoseStream, time_s: float, altitude_m: float, *, arrived_s: float | None = None) -> None:
+    arrived_s = time_s if arrived_s is None else arrived_s
+    stream.put(altitude_m, (altitude_m,), time_s=time_s, arrived_s=arrived_s, tracking_valid=True)
+
+
+def test_a_frame_that_was_held_up_is_dated_as_if_it_had_not_been() -> None:
+    arrivals = Arrivals()
+    held_up_s = (0.003, 0.001, 0.004, 0.050, 0.041, 0.002)
+    sent_s = [100.0 + 0.01 * place for place in range(len(held_up_s))]
+    dated_s = [arrivals.received_s(at, at - 60.0 + late) for at, late in zip(sent_s, held_up_s, strict=True)]
+    assert dated_s[1:] == pytest.approx([at - 60.0 + 0.001 for at in sent_s[1:]])
+
+
+def test_a_source_that_starts_anew_is_dated_by_its_new_clock() -> None:
+    arrivals = Arrivals()
+    arrivals.received_s(5000.0, 10.0)
+    assert arrivals.received_s(0.5, 12.0) == 12.0
+    assert arrivals.received_s(0.6, 12.3) == pytest.approx(12.1)
+
+
+def test_late_packets_and_repeated_frames_say_nothing_new() -> None:
+    stream = PoseStream()
+    for time_s, altitude_m in ((1.00, 0.10), (1.02, 0.12), (1.01, 0.11), (1.02, 0.12), (1.03, 0.13)):
+        put(stream, time_s, altitude_m)
+    assert [sample.advances for sample in stream.take()] == [True, True, False, False, True]
+    assert stream.take() == []
+
+
+def test_a_pose_that_comes_back_to_the_last_bit_is_stale_though_its_frames_advance() -> None:
+    stream = PoseStream()
+    for time_s, altitude_m in ((1.00, 0.10), (1.01, 0.11), (1.02, 0.11), (1.03, 0.11), (1.04, 0.12)):
+        put(stream, time_s, altitude_m)
+    assert [sample.advances for sample in stream.take()] == [True, True, False, False, True]
+
+
+def test_a_source_that_was_switched_off_and_on_advances_again() -> None:
+    stream = PoseStream()
+    put(stream, 900.0, 0.1, arrived_s=5.0)
+    put(stream, 0.01, 0.2, arrived_s=25.0)
+    assert [(sample.received_s, sample.advances) for sample in stream.take()] == [(5.0, True), (25.0, True)]
