@@ -200,6 +200,15 @@ def sim_drone(
         bool,
         typer.Option(help="ArduPilot and PX4: with the failsafes on that a flight needs, or all off, as they come."),
     ] = True,
+    mocap: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SOURCE",
+            show_default=False,
+            help="Motion capture sees it and says so: natnet:HOST?body=ID, odometry (on its own link), or "
+            "mavlink:ADDRESS.",
+        ),
+    ] = None,
     any_network: Annotated[
         bool, typer.Option("--any-network", help="Allow links that lead beyond this computer.")
     ] = False,
@@ -217,6 +226,7 @@ def sim_drone(
         faults=fault or [],
         system=system,
         failsafes=failsafes,
+        mocap=mocap,
         any_network=any_network,
     )
 
