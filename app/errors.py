@@ -8,6 +8,7 @@ GainlineError                 (app.core.errors)
 │   ├── KeyReusedError        an idempotency key that already stands for another request
 │   ├── TooLargeError         more bytes than the program takes
 │   └── MediaTypeError        a kind of content that is not read here
+├── NotAllowedError           not from there, or not by them: a real vehicle's safety forbids it
 ├── NotFoundError             there is no such thing
 ├── ConflictError             it is not possible now: the state or the version forbids it
 │   └── BusyError             the vehicle is flying for somebody else
@@ -29,6 +30,7 @@ __all__ = [
     "InputError",
     "KeyReusedError",
     "MediaTypeError",
+    "NotAllowedError",
     "NotFoundError",
     "Problem",
     "SchemaError",
@@ -53,6 +55,10 @@ class TooLargeError(InputError):
 
 class MediaTypeError(InputError):
     """The content is of a kind that is not read here."""
+
+
+class NotAllowedError(GainlineError):
+    """What was asked is possible, but not from where it was asked, or not by whom."""
 
 
 class NotFoundError(GainlineError):

@@ -1,7 +1,6 @@
 """`gainline serve`: the web process, with a worker beside it."""
 
 import errno
-import ipaddress
 import signal
 import socket
 import sys
@@ -19,7 +18,7 @@ from app.errors import AddressError, AlreadyRunningError, Problem
 from app.locks import LockedError, exclusive
 from app.main import create_app
 from app.observability import configure_logs
-from app.settings import Settings
+from app.settings import Settings, is_loopback
 from app.supervisor import Supervisor
 from app.worker import run_supervised_worker
 
@@ -76,11 +75,8 @@ def web_address(host: str, port: int) -> str:
 
 def exposure(host: str) -> str | None:
     """What listening on this host opens to others; None on loopback."""
-    try:
-        if host == "localhost" or ipaddress.ip_address(host).is_loopback:
-            return None
-    except ValueError:
-        pass  # a name: it may be anything
+    if is_loopback(host):
+        return None
     return (
         f"Warning: listening on {host}, so anybody who can reach this machine over the network can see, change and "
         "delete every campaign and start simulated flights: Gainline has no accounts yet. "

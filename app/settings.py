@@ -1,12 +1,13 @@
 """Settings, and the only reader of the environment: every field is also a variable, `GAINLINE_DATA_DIR` and so on."""
 
+import ipaddress
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
-from pydantic import Field, ValidationError
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, Field, ValidationError
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.core.errors import InputError, Problem
 
@@ -28,6 +29,23 @@ def default_ui_dir() -> Path:
     return packaged if packaged.is_dir() else CHECKOUT / "frontend" / "dist"
 
 
+def is_loopback(host: str) -> bool:
+    """Whether nobody but this computer reaches a server that listens there; a name other than localhost may be
+    anything."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _listed(given: object) -> object:
+    return [part for part in (part.strip() for part in given.split(",")) if part] if isinstance(given, str) else given
+
+
+Hosts = Annotated[frozenset[str], NoDecode, BeforeValidator(_listed)]
+"""Given as one text with commas."""
+
+
 class Settings(BaseSettings):
     """What a person may set. Command-line options win over variables, variables over these defaults."""
 
@@ -41,6 +59,9 @@ class Settings(BaseSettings):
     ui_dir: Path = Field(default_factory=default_ui_dir, description="folder of the built dashboard")
     max_upload_bytes: int = Field(default=48 * 2**20, ge=2**16, description="largest flight record that is taken")
     lease_s: float = Field(default=30.0, gt=0, description="silence after which a worker's job is given to another")
+    simulation_hosts: Hosts = Field(
+        default=frozenset(), description="hosts on which simulated vehicles run, beside this computer; with commas"
+    )
     log_level: str = Field(default="info", description="least level of a message that is written to the log")
 
     @property

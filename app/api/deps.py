@@ -11,7 +11,9 @@ from sqlalchemy.orm import Session
 from app.db.idempotency import carry_out_once
 from app.db.session import Database
 from app.errors import MediaTypeError
+from app.fleet.control import Asker
 from app.live.link import Live as LiveLink
+from app.settings import Settings, is_loopback
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -25,6 +27,15 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=200,
         description="a text of the caller's own, new for each act: the same request sent again with it is harmless",
+    ),
+]
+
+ControlToken = Annotated[
+    str | None,
+    Header(
+        alias="X-Gainline-Control",
+        max_length=100,
+        description="token of the lease by which one is in control of the vehicle",
     ),
 ]
 
@@ -44,6 +55,27 @@ async def _live(request: Request) -> LiveLink:
 
 CurrentDatabase = Annotated[Database, Depends(_database)]
 Live = Annotated[LiveLink, Depends(_live)]
+
+
+async def _settings(request: Request) -> Settings:
+    settings: Settings = request.app.state.settings
+    return settings
+
+
+CurrentSettings = Annotated[Settings, Depends(_settings)]
+
+
+async def _asker(request: Request, settings: CurrentSettings, token: ControlToken = None) -> Asker:
+    """No script in a page can set Sec-Fetch-Site: browsers do."""
+    return Asker(
+        token=token,
+        on_loopback=is_loopback(settings.host),
+        from_our_page=request.headers.get("sec-fetch-site") == "same-origin",
+        simulation_hosts=settings.simulation_hosts,
+    )
+
+
+Asking = Annotated[Asker, Depends(_asker)]
 
 
 def _reader(database: CurrentDatabase) -> Iterator[Session]:

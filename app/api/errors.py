@@ -20,6 +20,7 @@ from app.errors import (
     InputError,
     KeyReusedError,
     MediaTypeError,
+    NotAllowedError,
     NotFoundError,
     StorageError,
     TooLargeError,
@@ -32,6 +33,7 @@ from app.schemas import Problem, ProblemField
 MEDIA_TYPE: Final = "application/problem+json"
 
 _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
+    NotAllowedError: (HTTPStatus.FORBIDDEN, "Not allowed"),
     NotFoundError: (HTTPStatus.NOT_FOUND, "Not found"),
     BusyError: (HTTPStatus.CONFLICT, "Vehicle busy"),
     ConflictError: (HTTPStatus.CONFLICT, "Conflict"),

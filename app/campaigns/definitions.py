@@ -37,7 +37,8 @@ def definition_of(row: CampaignRow) -> Definition:
 
 def frozen_digest(row: CampaignRow) -> str:
     """SHA-256 over all that is frozen at the first flight: the definition, the vehicle (a registered one by its id, a
-    shared one with all its settings), and its safe gains. Proposals carry the narrower digest of the definition, because they depend on nothing else."""
+    shared one with all its settings), and its safe gains. Proposals carry the narrower digest of the definition,
+    because they depend on nothing else."""
     frozen = {
         "definition": definition_of(row).digest(),
         "vehicle": row.vehicle.kind,

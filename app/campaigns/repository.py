@@ -95,6 +95,13 @@ def _filters(search: str, states: Collection[CampaignState], vehicles: Collectio
     ]
 
 
+def unflown_on(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
+    """The vehicle's campaigns that have not flown."""
+    return session.scalars(
+        select(CampaignRow).where(CampaignRow.vehicle_id == vehicle_id, CampaignRow.definition_digest.is_(None))
+    ).all()
+
+
 def get_proposal_or_none(session: Session, proposal_id: int) -> ProposalRow | None:
     return session.get(ProposalRow, proposal_id)
 

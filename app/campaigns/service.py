@@ -23,15 +23,16 @@ from app.campaigns.schemas import (
 )
 from app.campaigns.states import ACTIONS, CampaignState, Outcome
 from app.campaigns.views import campaign_view, next_flight_view, summaries
+from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
-from app.db.models import CampaignRow
+from app.db.models import CampaignRow, VehicleRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 from app.moves import check_action, check_version
-from app.schemas import Page
+from app.schemas import OptionValue, Page
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
 
@@ -93,7 +94,7 @@ def create_campaign(session: Session, new: NewCampaign) -> Campaign:
 def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
     """A new draft with the same definition, linked to its origin, with a warm start from the origin's best flight."""
     origin = repository.get_one(session, campaign_id)
-    vehicle = clone.vehicle or VehicleChoice(kind=origin.vehicle.kind, options=origin.vehicle_options)
+    vehicle = clone.vehicle or _choice_of(origin)
     name = clone.name or f"{origin.name[:110]} (again)"
     definition = Definition.model_validate(origin.definition)
     if clone.warm_start:
@@ -116,6 +117,7 @@ def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Cam
                 ("name", row.name, edit.name),
                 ("definition", row.definition, definition),
                 ("vehicle.kind", row.vehicle.kind, edit.vehicle.kind if edit.vehicle else None),
+                ("vehicle.id", row.vehicle.id, edit.vehicle.id if edit.vehicle else None),
             )
             if sent is not None
         },
@@ -181,6 +183,7 @@ def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
 def begin_flying(row: CampaignRow) -> None:
     """A trial lifts off, or a record of one arrives: from the first one on the definition is frozen."""
     if row.definition_digest is None:
+        row.safe_gains = dict(row.vehicle.safe_gains)
         row.definition_digest = frozen_digest(row)
     move_campaign(row, CampaignState.FLYING)
 
@@ -199,12 +202,17 @@ def history_changed(session: Session, row: CampaignRow) -> None:
     request_proposal(session, row)
 
 
+def safe_gains_changed(session: Session, vehicle_id: int) -> None:
+    """What has not flown yet begins from the vehicle's safe gains: the gains proposed for it are outdated."""
+    for row in repository.unflown_on(session, vehicle_id):
+        cancel_outdated(session, row)
+        request_proposal(session, row)
+
+
 def _add(
     session: Session, name: str, asked: Definition, choice: VehicleChoice, *, parent_id: int | None
 ) -> CampaignRow:
-    definition, options = check_campaign(with_donor(session, asked), choice)
-    space = get_experiment(definition.experiment).space
-    vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
+    definition, options, vehicle = _checked(session, asked, choice)
     row = CampaignRow(
         name=name,
         state=CampaignState.DRAFT,
@@ -221,14 +229,29 @@ def _add(
     return row
 
 
+def _choice_of(row: CampaignRow) -> VehicleChoice:
+    vehicle = row.vehicle
+    if vehicle.registered:
+        return VehicleChoice(kind=vehicle.kind, id=vehicle.id)
+    return VehicleChoice(kind=vehicle.kind, options=row.vehicle_options)
+
+
+def _checked(
+    session: Session, asked: Definition, choice: VehicleChoice
+) -> tuple[CoreDefinition, dict[str, OptionValue], VehicleRow]:
+    """The definition, the campaign's own settings of its vehicle, none for a registered one, and the vehicle."""
+    own = choice if choice.id is None else VehicleChoice(kind=choice.kind)
+    definition, options = check_campaign(with_donor(session, asked), own)
+    space = get_experiment(definition.experiment).space
+    vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
+    return definition, {} if vehicle.registered else options, vehicle
+
+
 def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     check_action(ACTIONS, "define", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     asked = edit.definition or Definition.model_validate(row.definition)
-    choice = edit.vehicle or VehicleChoice(kind=row.vehicle.kind, options=row.vehicle_options)
-    definition, options = check_campaign(with_donor(session, asked), choice)
-    space = get_experiment(definition.experiment).space
-    row.vehicle = fleet.vehicle_of_kind(session, choice.kind, safe_gains=space.mapping(space.default))
+    definition, options, row.vehicle = _checked(session, asked, edit.vehicle or _choice_of(row))
     row.experiment, row.strategy = definition.experiment, definition.strategy
     row.definition, row.vehicle_options = stored(definition), options
     cancel_unflown(history.trials_of(session, row.id), None, "the campaign's definition was changed")

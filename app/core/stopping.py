@@ -47,6 +47,12 @@ def landing_battery_v(record: Trajectory) -> float | None:
     return float(recorded[-1]) if recorded is not None and len(recorded) else None
 
 
+def starting_battery_v(record: Trajectory) -> float | None:
+    """The battery's voltage at the start of a flight, V; None where it was not recorded."""
+    recorded = record.channels.get("battery_v")
+    return float(recorded[0]) if recorded is not None and len(recorded) else None
+
+
 def verdict(
     rule: StopRule,
     errors: Sequence[float | None],

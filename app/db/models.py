@@ -22,9 +22,9 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 from app.campaigns.states import CampaignState, Outcome
 from app.core.strategies.base import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
-from app.fleet.states import VehicleState
+from app.fleet.states import ACT_UNDER_WAY, ActKind, ActState, VehicleState
 from app.jobs.states import JobState
-from app.trials.states import UNDER_WAY, Ending, FlightState, TrialKind, TrialState
+from app.trials.states import UNDER_WAY, Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
 JsonObject = dict[str, Any]
@@ -80,26 +80,91 @@ class Reported:
 
 
 class VehicleRow(Base, Reported):
-    """Something that can fly a trial. A simulation's settings stand in each campaign, the row is shared by all."""
+    """Something that can fly a trial.
+
+    A simulation's row is made when the first campaign wants its kind, and shared; its settings stand in each campaign.
+    A registered vehicle has a row and settings of its own. `held` are the gains it said it has, `concern` why it is
+    quarantined, or was when its link was closed. `operator…`: who is in control, until when, and the digest of the
+    token that shows it. `version` counts the edits that people made.
+    """
 
     __tablename__ = "vehicle"
     __table_args__ = (_state_check(VehicleState), _NEVER_REUSE_IDS)
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    kind: Mapped[str] = mapped_column(unique=True)
+    version: Mapped[int] = mapped_column(default=1, server_default="1")
+    kind: Mapped[str] = mapped_column(index=True)
+    name: Mapped[str] = mapped_column(unique=True)
     title: Mapped[str]
     is_real: Mapped[bool]
+    registered: Mapped[bool] = mapped_column(default=False, server_default=text("0"))
     state: Mapped[VehicleState] = mapped_column(_state_type(VehicleState))
-    safe_gains: Mapped[GainsJson]
     concern: Mapped[str] = mapped_column(default="")
+    options: Mapped[OptionsJson] = mapped_column(default=dict, server_default=text("'{}'"))
+    identity: Mapped[JsonObject | None]
+    safe_gains: Mapped[GainsJson]
+    held: Mapped[GainsJson | None]
+    held_at: Mapped[datetime | None]
+    checks: Mapped[list[JsonObject] | None]
+    checked_at: Mapped[datetime | None]
+    battery: Mapped[str] = mapped_column(default="", server_default="")
+    wanted_connected: Mapped[bool] = mapped_column(default=False, server_default=text("0"))
+    operator: Mapped[str | None]
+    operator_token_hash: Mapped[str | None]
+    operator_until: Mapped[datetime | None]
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
 
     def reported_as(self) -> tuple[Topic, int, int | None]:
         return "vehicle", self.id, None
 
 
+_ACT_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACT_UNDER_WAY))
+
+
+class VehicleActRow(Base, Reported):
+    """What a registered vehicle was asked beside its flights, who asked and why, and what it answered.
+
+    Written before anything is sent, but for landing and motors off, which wait for nothing and are written afterwards.
+    """
+
+    __tablename__ = "vehicle_act"
+    __table_args__ = (
+        _state_check(ActState),
+        _state_check(ActKind, column="kind"),
+        Index(
+            "uq_vehicle_act_vehicle_under_way",
+            "vehicle_id",
+            unique=True,
+            sqlite_where=text(_ACT_UNDER_WAY_SQL),
+            postgresql_where=text(_ACT_UNDER_WAY_SQL),
+        ),
+        _NEVER_REUSE_IDS,
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
+    kind: Mapped[ActKind] = mapped_column(_state_type(ActKind))
+    state: Mapped[ActState] = mapped_column(_state_type(ActState))
+    by: Mapped[str] = mapped_column(default="")
+    reason: Mapped[str] = mapped_column(default="")
+    asked: Mapped[GainsJson | None]
+    read_back: Mapped[GainsJson | None]
+    result: Mapped[JsonObject | None]
+    problem: Mapped[str] = mapped_column(default="")
+    worker: Mapped[str | None]
+    requested_at: Mapped[datetime] = mapped_column(default=utc_now)
+    claimed_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+    vehicle: Mapped[VehicleRow] = relationship()
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "vehicle", self.vehicle_id, None
+
+
 class CampaignRow(Base, Reported):
-    """One vehicle, one experiment, one strategy. `version` counts the edits that people made."""
+    """One vehicle, one experiment, one strategy. `version` counts the edits that people made; `safe_gains` are the
+    vehicle's at the first flight, from which on they are part of the frozen definition."""
 
     __tablename__ = "campaign"
     __table_args__ = (
@@ -119,6 +184,7 @@ class CampaignRow(Base, Reported):
     strategy: Mapped[str]
     definition: Mapped[JsonObject]
     definition_digest: Mapped[str | None]
+    safe_gains: Mapped[GainsJson | None]
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
     vehicle_options: Mapped[OptionsJson]
     parent_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="SET NULL"), index=True)
@@ -203,6 +269,10 @@ _UNDER_WAY_SQL: Final = _is_one_of("state", sorted(UNDER_WAY))
 class FlightRow(Base, Reported):
     """One order to a vehicle: what it was asked, written before it is sent, and what it answered.
 
+    One of mode `stage` waits with its gains on the vehicle until `take_off_at` is set by an operator's act, or
+    `stand_down` says why it is not to fly. `safe_gains` are those to be restored after it, `restored` what was read
+    back then; `battery` is the label of the one that was in.
+
     A line of the vehicle's ledger: while it is there, neither its trial nor its campaign can be deleted.
     """
 
@@ -224,8 +294,17 @@ class FlightRow(Base, Reported):
     trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="RESTRICT"), index=True)
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
     state: Mapped[FlightState] = mapped_column(_state_type(FlightState))
+    mode: Mapped[FlightMode] = mapped_column(String, default="fly", server_default="fly")
     gains: Mapped[GainsJson]
     read_back: Mapped[GainsJson | None]
+    take_off_at: Mapped[datetime | None]
+    stand_down: Mapped[str] = mapped_column(default="", server_default="")
+    safe_gains: Mapped[GainsJson | None]
+    restored: Mapped[GainsJson | None]
+    restored_at: Mapped[datetime | None]
+    battery: Mapped[str] = mapped_column(default="", server_default="")
+    battery_v_before: Mapped[float | None]
+    battery_v_after: Mapped[float | None]
     speed: Mapped[float | None]
     worker: Mapped[str | None]
     problem: Mapped[str] = mapped_column(default="")

@@ -1,23 +1,41 @@
-"""Queries on vehicles."""
+"""Queries on vehicles, their acts and their flights."""
 
 from collections.abc import Sequence
+from typing import Final
 
-from sqlalchemy import func, select
+from sqlalchemy import String, func, literal, null, select, tuple_, union_all
 from sqlalchemy.orm import Session
 
-from app.db.models import FlightRow, VehicleRow
+from app.db.models import FlightRow, VehicleActRow, VehicleRow
+from app.db.paging import Position, instant
+from app.db.types import UtcDateTime
 from app.errors import NotFoundError
+from app.fleet.states import ACT_UNDER_WAY, GIVES_GAINS, ActState, VehicleState
+from app.trials.states import UNDER_WAY
+
+RESTORE_AFTER_FLIGHT: Final = "restore after flight"
+Line = tuple[str, int]
+"""A line of the ledger: its purpose, and the id of its flight or act."""
 
 
 def get_one(session: Session, vehicle_id: int) -> VehicleRow:
     """Raises NotFoundError."""
-    if (row := session.get(VehicleRow, vehicle_id)) is None:
+    if (row := one_or_none(session, vehicle_id)) is None:
         raise NotFoundError("vehicle", vehicle_id)
     return row
 
 
-def of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
-    return session.scalar(select(VehicleRow).where(VehicleRow.kind == kind))
+def one_or_none(session: Session, vehicle_id: int) -> VehicleRow | None:
+    return session.get(VehicleRow, vehicle_id)
+
+
+def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
+    return session.scalar(select(VehicleRow).where(VehicleRow.kind == kind, VehicleRow.registered.is_(False)))
+
+
+def of_name_or_none(session: Session, name: str) -> VehicleRow | None:
+    """Whatever the case of its letters."""
+    return session.scalar(select(VehicleRow).where(func.lower(VehicleRow.name) == name.lower()).limit(1))
 
 
 def page(session: Session, *, after_id: int, limit: int) -> tuple[Sequence[VehicleRow], int]:
@@ -27,10 +45,82 @@ def page(session: Session, *, after_id: int, limit: int) -> tuple[Sequence[Vehic
     return session.scalars(wanted).all(), total
 
 
-def flights(session: Session, vehicle_id: int, *, before_id: int | None, limit: int) -> tuple[Sequence[FlightRow], int]:
-    """The newest flights before that id, one more than `limit`, and the number of all."""
-    wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id)
+def registered_in(session: Session, *states: VehicleState) -> Sequence[VehicleRow]:
+    """The registered vehicles in those states."""
+    wanted = select(VehicleRow).where(VehicleRow.registered.is_(True), VehicleRow.state.in_(states))
+    return session.scalars(wanted.order_by(VehicleRow.id)).all()
+
+
+def flight_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
+    return session.scalar(select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(UNDER_WAY)))
+
+
+def get_act(session: Session, act_id: int) -> VehicleActRow:
+    """Raises NotFoundError."""
+    if (row := session.get(VehicleActRow, act_id)) is None:
+        raise NotFoundError("act", act_id)
+    return row
+
+
+def act_under_way(session: Session, vehicle_id: int) -> VehicleActRow | None:
+    wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
+    return session.scalar(wanted.where(VehicleActRow.state.in_(ACT_UNDER_WAY)))
+
+
+def acts_under_way(session: Session) -> Sequence[VehicleActRow]:
+    return session.scalars(select(VehicleActRow).where(VehicleActRow.state.in_(ACT_UNDER_WAY))).all()
+
+
+def first_requested_act(session: Session) -> VehicleActRow | None:
+    """The one that has waited longest."""
+    wanted = select(VehicleActRow).where(VehicleActRow.state == ActState.REQUESTED)
+    return session.scalar(wanted.order_by(VehicleActRow.id).limit(1))
+
+
+def acts(
+    session: Session, vehicle_id: int, *, before_id: int | None, limit: int
+) -> tuple[Sequence[VehicleActRow], int]:
+    """The newest acts before that id, one more than `limit`, and the number of all."""
+    wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
     total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
     if before_id is not None:
-        wanted = wanted.where(FlightRow.id < before_id)
-    return session.scalars(wanted.order_by(FlightRow.id.desc()).limit(limit + 1)).all(), total
+        wanted = wanted.where(VehicleActRow.id < before_id)
+    return session.scalars(wanted.order_by(VehicleActRow.id.desc()).limit(limit + 1)).all(), total
+
+
+def ledger(
+    session: Session, vehicle_id: int, *, before: Position | None, limit: int
+) -> tuple[list[tuple[Line, Position]], int]:
+    """The newest lines before that position, one more than `limit`, each with its own; and the number of all.
+
+    A flight is a line from the moment it was asked for, and another one once the safe gains are restored after it.
+    """
+    flight = FlightRow.vehicle_id == vehicle_id
+    lines = union_all(
+        select(
+            FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("rank"), literal("flight", String).label("why")
+        ).where(flight),
+        select(FlightRow.restored_at, 2 * FlightRow.id + 1, literal(RESTORE_AFTER_FLIGHT, String)).where(
+            flight, FlightRow.restored_at.is_not(null())
+        ),
+        select(VehicleActRow.requested_at, 2 * VehicleActRow.id, VehicleActRow.kind.cast(String)).where(
+            VehicleActRow.vehicle_id == vehicle_id,
+            VehicleActRow.kind.in_(GIVES_GAINS),
+            VehicleActRow.claimed_at.is_not(null()),
+        ),
+    ).subquery()
+    total = session.scalar(select(func.count()).select_from(lines)) or 0
+    wanted = select(lines).order_by(lines.c.at.desc(), lines.c.rank.desc())
+    if before is not None:
+        at = literal(instant(before[0]), UtcDateTime())
+        wanted = wanted.where(tuple_(lines.c.at, lines.c.rank) < tuple_(at, literal(before[1])))
+    found = session.execute(wanted.limit(limit + 1)).all()
+    return [((row.why, row.rank // 2), (row.at.isoformat(), row.rank)) for row in found], total
+
+
+def flights_by_id(session: Session, ids: Sequence[int]) -> dict[int, FlightRow]:
+    return {row.id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(ids)))}
+
+
+def acts_by_id(session: Session, ids: Sequence[int]) -> dict[int, VehicleActRow]:
+    return {row.id: row for row in session.scalars(select(VehicleActRow).where(VehicleActRow.id.in_(ids)))}

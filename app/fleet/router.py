@@ -1,19 +1,42 @@
 """Vehicles over HTTP."""
 
-from fastapi import APIRouter, Depends
+from typing import Literal
 
-from app.api.deps import Act, CursorText, Id, Limit, Reader, json_only
-from app.fleet import service
-from app.fleet.schemas import GivenGains, Release, Vehicle
+from fastapi import APIRouter, Depends, status
+
+from app.api.deps import Act, Asking, CursorText, Id, Limit, Live, Reader, Writer, json_only
+from app.campaigns import service as campaigns
+from app.fleet import acts, control, registering, service, views
+from app.fleet.schemas import (
+    GivenGains,
+    Lease,
+    LeaseRequest,
+    NewVehicle,
+    OrderAnswer,
+    Release,
+    Vehicle,
+    VehicleAct,
+    VehicleEdit,
+    VehicleOrder,
+)
+from app.fleet.states import ActKind
 from app.schemas import Page
 
 router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])
 
+_NO_LINK = "The worker has no link to this vehicle, so it was told nothing: use its own remote control now."
+
 
 @router.get("")
 def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None) -> Page[Vehicle]:
-    """Every vehicle that a campaign has used."""
+    """Every registered vehicle, and every shared simulation that a campaign has used."""
     return service.list_vehicles(session, limit=limit, cursor=cursor)
+
+
+@router.post("", status_code=status.HTTP_201_CREATED)
+def register_vehicle(act: Act, asking: Asking, body: NewVehicle) -> Vehicle:
+    """Register a vehicle that the program keeps a link to. Whether it is REAL follows from its settings."""
+    return act(Vehicle, lambda session: registering.register_vehicle(session, body, asking))
 
 
 @router.get("/{vehicle_id}")
@@ -21,13 +44,90 @@ def get_vehicle(session: Reader, vehicle_id: Id) -> Vehicle:
     return service.get_vehicle(session, vehicle_id)
 
 
+@router.patch("/{vehicle_id}")
+def edit_vehicle(session: Writer, asking: Asking, vehicle_id: Id, body: VehicleEdit) -> Vehicle:
+    """Change a registered vehicle's name, settings, battery or safe gains, while it is at rest."""
+    edited = registering.edit_vehicle(session, vehicle_id, body, asking)
+    if body.safe_gains is not None:
+        campaigns.safe_gains_changed(session, vehicle_id)
+    return edited
+
+
+@router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)
+def connect_vehicle(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+    """Open the link, and keep it open; the vehicle's safe gains are written and read back, unless it is armed."""
+    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.CONNECT, asking))
+
+
+@router.post("/{vehicle_id}/disconnect", status_code=status.HTTP_202_ACCEPTED)
+def disconnect_vehicle(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+    """Close the link."""
+    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.DISCONNECT, asking))
+
+
+@router.post("/{vehicle_id}/check", status_code=status.HTTP_202_ACCEPTED)
+def check_vehicle(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+    """Look at everything that has to be so before a flight."""
+    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.CHECK, asking))
+
+
+@router.post("/{vehicle_id}/restore", status_code=status.HTTP_202_ACCEPTED)
+def restore_safe_gains(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+    """Write the safe gains and read them back."""
+    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.RESTORE, asking))
+
+
+@router.post("/{vehicle_id}/parameters", status_code=status.HTTP_202_ACCEPTED)
+def read_parameters(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+    """Read every parameter of the vehicle; they are in the act's result."""
+    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.PARAMETERS, asking))
+
+
+@router.get("/{vehicle_id}/acts")
+def list_acts(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[VehicleAct]:
+    """What the vehicle was asked beside its flights, the newest first."""
+    return views.acts_view(session, vehicle_id, limit=limit, cursor=cursor)
+
+
 @router.get("/{vehicle_id}/ledger")
 def list_given_gains(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[GivenGains]:
-    """Every gain set that the vehicle was given, the newest first."""
-    return service.list_given_gains(session, vehicle_id, limit=limit, cursor=cursor)
+    """Every gain set that the vehicle was given, the newest first: in flights, restored after them, and beside them."""
+    return views.ledger_view(session, vehicle_id, limit=limit, cursor=cursor)
+
+
+@router.post("/{vehicle_id}/land", status_code=status.HTTP_202_ACCEPTED)
+async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = None) -> OrderAnswer:
+    """Have the vehicle land now, whatever it does. Goes straight to the worker and waits for no storage."""
+    return await _order(live, vehicle_id, "land", body, "The vehicle is told to land until it agrees.")
+
+
+@router.post("/{vehicle_id}/motors-off", status_code=status.HTTP_202_ACCEPTED)
+async def stop_motors(live: Live, vehicle_id: Id, body: VehicleOrder | None = None) -> OrderAnswer:
+    """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage."""
+    return await _order(live, vehicle_id, "motors off", body, "The vehicle is told to stop its motors.")
+
+
+async def _order(
+    live: Live, vehicle_id: int, order: Literal["land", "motors off"], body: VehicleOrder | None, sentence: str
+) -> OrderAnswer:
+    answer = await live.order(vehicle_id, order, (body or VehicleOrder()).reason)
+    return OrderAnswer(accepted=answer.accepted, sentence=sentence if answer.accepted else _NO_LINK)
 
 
 @router.post("/{vehicle_id}/release")
-def release_vehicle(act: Act, vehicle_id: Id, body: Release) -> Vehicle:
-    """Take a vehicle out of quarantine, on the word of a person who has looked at it."""
-    return act(Vehicle, lambda session: service.release_vehicle(session, vehicle_id, body.statement))
+def release_vehicle(act: Act, asking: Asking, vehicle_id: Id, body: Release) -> Vehicle:
+    """Take a vehicle out of quarantine, on the word of a person who has looked at it. One with a link is released once
+    it is seen to be disarmed and to hold its safe gains; the act says what came of that."""
+    return act(Vehicle, lambda session: acts.release_vehicle(session, vehicle_id, body.statement, asking))
+
+
+@router.put("/{vehicle_id}/control")
+def take_control(session: Writer, vehicle_id: Id, body: LeaseRequest) -> Lease:
+    """Take control for 15 s, or renew it with one's token; a take-over from somebody else is recorded as an act."""
+    return control.take_control(session, vehicle_id, body)
+
+
+@router.delete("/{vehicle_id}/control", status_code=status.HTTP_204_NO_CONTENT)
+def give_up_control(session: Writer, asking: Asking, vehicle_id: Id) -> None:
+    """Hand over: nobody is in control afterwards."""
+    control.give_up_control(session, vehicle_id, asking.token)

@@ -1,53 +1,162 @@
 """What a vehicle looks like from outside."""
 
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.fleet.states import VehicleState
-from app.schemas import Gains, OptionValue, Reason, Request
+from app.fleet.states import ActKind, ActState, VehicleState
+from app.schemas import Gains, Name, Number, OptionValue, Reason, Request, Version
+
+OrderReason = Annotated[str, Field(max_length=500)]
+Battery = Annotated[str, Field(max_length=60)]
 
 
 class VehicleChoice(Request):
-    """Which vehicle flies, and its settings; a setting left out has its default."""
+    """Which vehicle flies: a simulation by its kind with its settings, where one left out has its default, or a
+    registered vehicle by its id, which has settings of its own."""
 
     kind: Annotated[str, Field(max_length=40, examples=["jsbsim"])]
     options: dict[str, OptionValue] = Field(default_factory=dict)
+    id: Annotated[int | None, Field(ge=1, le=2**63 - 1, strict=True)] = None
 
 
 class CampaignVehicle(BaseModel):
-    """A campaign's vehicle with the campaign's settings of it."""
+    """A campaign's vehicle with its settings: the campaign's own, or those it is registered with."""
 
     id: int
     kind: str
+    name: str
     title: str
     is_real: bool
+    registered: bool
     can_fly: Annotated[bool, Field(description="false when flights are made elsewhere and uploaded")]
+    needs_staging: Annotated[bool, Field(description="true when a flight is staged first, and taken off by a person")]
     state: VehicleState
     options: dict[str, OptionValue]
 
 
+class NewVehicle(Request):
+    """A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real one a person
+    has looked at them (`safe_gains_confirmed`), and says so in `statement`."""
+
+    name: Name
+    kind: Annotated[str, Field(max_length=40, examples=["mavlink"])]
+    options: dict[str, OptionValue] = Field(default_factory=dict)
+    safe_gains: Annotated[dict[str, Number], Field(max_length=50)] | None = None
+    safe_gains_confirmed: bool = False
+    statement: Annotated[str, Field(max_length=500)] = ""
+
+
+class VehicleEdit(Request):
+    """Changes of a registered vehicle; what is left out stays. Options change only while it is disconnected, and let
+    the next connection pin the identity anew; safe gains need a statement by whom and why."""
+
+    version: Version
+    name: Name | None = None
+    options: dict[str, OptionValue] | None = None
+    battery: Battery | None = None
+    safe_gains: Annotated[dict[str, Number], Field(max_length=50)] | None = None
+    statement: Reason | None = None
+
+
+class Identity(BaseModel):
+    """Who answers at the other end of the link; pinned at the first connection."""
+
+    system_id: int
+    autopilot: str
+    version: Annotated[str, Field(description="empty where the autopilot does not tell")]
+
+
+class VehicleCheck(BaseModel):
+    """One item of the preflight check."""
+
+    name: str
+    title: str
+    passed: bool
+    found: str
+    needed: str
+    hint: str = ""
+
+
+class Control(BaseModel):
+    """Who is in control. Renewals are not announced: load it again after `until` to see whether it is over."""
+
+    operator: str
+    until: datetime
+
+
+class Lease(BaseModel):
+    """Control of a vehicle until then. The token goes into the header X-Gainline-Control of what needs it."""
+
+    operator: str
+    token: str
+    until: datetime
+
+
+class LeaseRequest(Request):
+    """Take control, renew it with the token of the lease that one has, or take over from somebody else."""
+
+    operator: Annotated[Name, Field(max_length=80)]
+    take_over: bool = False
+    token: Annotated[str, Field(max_length=100)] | None = None
+
+
 class Vehicle(BaseModel):
-    """Something that can fly a trial. `concern` says why it is quarantined."""
+    """Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it said it has,
+    at `held_at`. A simulation that is shared by campaigns is not `registered`, and keeps no link."""
 
     id: int
+    version: int
     kind: str
+    name: str
     title: str
     is_real: bool
     can_fly: bool
+    registered: bool
     state: VehicleState
     concern: str
+    options: dict[str, OptionValue]
+    identity: Identity | None
     safe_gains: Gains
-    actions: Annotated[list[str], Field(description="what may be done with it now: fly, release")]
+    held: Gains | None
+    held_at: datetime | None
+    checks: list[VehicleCheck] | None
+    checked_at: datetime | None
+    battery: Annotated[str, Field(description="label of the battery that is in; empty when nobody said")]
+    control: Annotated[Control | None, Field(description="null while nobody is in control")]
+    actions: Annotated[list[str], Field(description="what may be done with it now: fly, stage, connect, release, …")]
+
+
+class VehicleAct(BaseModel):
+    """What a vehicle was asked beside its flights, by whom and why, and what came of it. `result` of a check holds its
+    items, of `parameters` every parameter of the vehicle."""
+
+    id: int
+    vehicle_id: int
+    kind: ActKind
+    state: ActState
+    by: Annotated[str, Field(description="the operator in control; empty when nobody was")]
+    reason: str
+    asked: Gains | None
+    read_back: Gains | None
+    result: dict[str, object] | None
+    problem: Annotated[str, Field(description="why it failed; empty when it did not")]
+    requested_at: datetime
+    finished_at: datetime | None
+
+
+Purpose = Literal["flight", "restore after flight", "connect", "restore", "release"]
 
 
 class GivenGains(BaseModel):
-    """One line of a vehicle's ledger: the gains it was asked to take, and those it said it had."""
+    """One line of a vehicle's ledger: the gains it was asked to take, for what, and those it said it had."""
 
-    flight_id: int
-    campaign_id: int
-    trial_id: int
+    purpose: Purpose
+    flight_id: int | None
+    campaign_id: int | None
+    trial_id: int | None
+    act_id: int | None
     asked: Gains
     read_back: Gains | None
     outcome: str
@@ -58,3 +167,16 @@ class Release(Request):
     """Who has looked at the vehicle, and found what."""
 
     statement: Reason
+
+
+class VehicleOrder(Request):
+    """Why the vehicle is to land, or its motors are to stop, now."""
+
+    reason: OrderReason = "asked for by the operator"
+
+
+class OrderAnswer(BaseModel):
+    """`accepted` is false when the worker has no link to the vehicle; what comes of it is seen in its status."""
+
+    accepted: bool
+    sentence: str

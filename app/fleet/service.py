@@ -1,57 +1,123 @@
-"""Vehicles: who they are, what state they are in, and every gain set that they were given."""
+"""Vehicles as campaigns and flights know them: who they are, and what state they are in.
+
+Registering is in `registering`, what a vehicle is asked beside its flights in `acts`, who is in control in `control`.
+"""
+
+from collections.abc import Mapping
 
 from sqlalchemy.orm import Session
 
 from app.core.policy import Gains
-from app.db.models import CampaignRow, VehicleRow
+from app.db.models import VehicleRow
 from app.db.paging import decode_cursor, encode_cursor
-from app.errors import ConflictError
+from app.db.types import utc_now
+from app.errors import BusyError, ConflictError, InputError, Problem
 from app.fleet import repository
-from app.fleet.schemas import CampaignVehicle, GivenGains, Vehicle
+from app.fleet.kinds import can_fly, is_registered_one_by_one, needs_staging
+from app.fleet.schemas import Vehicle, VehicleChoice
 from app.fleet.states import ACTIONS, MOVES, VehicleState
-from app.moves import allowed, check_action, check_move
+from app.fleet.views import campaign_vehicle, options_of, vehicle_view
+from app.moves import check_action, check_move
 from app.schemas import Page
-from app.vehicles.open import VEHICLE_KINDS, get_kind
+from app.vehicles.open import get_kind
+
+__all__ = [
+    "campaign_vehicle",
+    "can_fly",
+    "chosen_vehicle",
+    "classed_by_program",
+    "get_vehicle",
+    "hold_gains",
+    "list_vehicles",
+    "move_vehicle",
+    "needs_staging",
+    "options_of",
+    "require_idle",
+    "require_ready",
+    "settle_vehicle",
+]
 
 
-def vehicle_of_kind(session: Session, kind: str, *, safe_gains: Gains) -> VehicleRow:
-    """The vehicle of that kind; registered with these safe gains when it is the first time that anybody wants it.
+def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Gains) -> VehicleRow:
+    """The registered vehicle that is chosen by its id, or the shared one of a kind, made when it is the first time that
+    anybody wants it. `default_gains` are the experiment's.
 
-    Raises InputError when there is no such kind.
+    Raises InputError when there is none, or when it tunes other gains than the experiment.
     """
-    described = get_kind(kind)
-    if (known := repository.of_kind_or_none(session, kind)) is not None:
+    if choice.id is not None:
+        return _registered(session, choice, choice.id, default_gains)
+    described = get_kind(choice.kind)
+    if is_registered_one_by_one(described):
+        raise _no_choice("id", "is missing: vehicles of this kind are registered one by one")
+    if (known := repository.shared_of_kind_or_none(session, choice.kind)) is not None:
         return known
     row = VehicleRow(
-        kind=kind,
+        kind=choice.kind,
+        name=described.title,
         title=described.title,
         is_real=described.is_real,
-        safe_gains=dict(safe_gains),
+        safe_gains=dict(default_gains),
         state=VehicleState.READY if described.can_fly and described.served else VehicleState.DISCONNECTED,
-        concern="",
     )
     session.add(row)
     session.flush()
     return row
 
 
-def require_ready(row: VehicleRow) -> None:
-    """Raises ConflictError when the vehicle cannot be asked to fly."""
+def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, default_gains: Gains) -> VehicleRow:
+    row = repository.one_or_none(session, vehicle_id)
+    if row is None or not row.registered:
+        raise _no_choice("id", f"there is no registered vehicle {vehicle_id}")
+    if row.kind != choice.kind:
+        raise _no_choice("kind", f"{row.name} is of kind {row.kind}")
+    if choice.options and choice.options != row.options:
+        raise _no_choice("options", f"are those that {row.name} is registered with; change them there")
+    if row.safe_gains.keys() != default_gains.keys():
+        ours, its = ", ".join(default_gains), ", ".join(row.safe_gains)
+        raise _no_choice("id", f"{row.name} has the gains {its}; this experiment tunes {ours}")
+    return row
+
+
+def _no_choice(field: str, reason: str) -> InputError:
+    return InputError(
+        "This vehicle cannot be used.",
+        problems=(Problem(f"vehicle.{field}", reason),),
+        hint="Register the vehicle on the fleet page (POST /api/vehicles), and give its id.",
+    )
+
+
+def require_ready(session: Session, row: VehicleRow, action: str) -> None:
+    """Raises ConflictError when the vehicle cannot be asked to `fly` or to `stage`, BusyError when it is asked
+    something else."""
     if not can_fly(row):
         raise ConflictError(
-            f"{row.title} cannot be flown from here.",
+            f"{row.name} cannot be flown from here.",
             hint="Fly it elsewhere, then upload the record of the flight to the planned trial.",
         )
     if row.state == VehicleState.QUARANTINED:
         raise ConflictError(
-            f"{row.title} is quarantined: {row.concern}", hint="Look at the vehicle, verify its gains, then release it."
+            f"{row.name} is quarantined: {row.concern}", hint="Look at the vehicle, verify its gains, then release it."
         )
-    check_action(ACTIONS, "fly", row.state, row.title)
+    if row.state == VehicleState.DISCONNECTED:
+        raise ConflictError(f"{row.name} is not connected.", hint="Connect it on its page, then ask again.")
+    check_action(ACTIONS, action, row.state, row.name)
+    require_idle(session, row)
+
+
+def require_idle(session: Session, row: VehicleRow) -> None:
+    """Raises BusyError while the vehicle has a flight, or is asked something else: nothing queues."""
+    if (flight := repository.flight_under_way(session, row.id)) is not None:
+        raise BusyError(
+            f"{row.name} has a flight already: trial {flight.trial.number} of campaign {flight.campaign_id}.",
+            hint="Wait until it has landed, or abort it; flights do not queue.",
+        )
+    if (act := repository.act_under_way(session, row.id)) is not None:
+        raise BusyError(f"{row.name} is busy: “{act.kind}” is under way.", hint="Wait until that is done.")
 
 
 def move_vehicle(row: VehicleRow, to: VehicleState) -> None:
     """Raises ConflictError when the states' table does not lead there."""
-    row.state = check_move(MOVES, row.state, to, row.title)
+    row.state = check_move(MOVES, row.state, to, row.name)
 
 
 def settle_vehicle(row: VehicleRow, *, concern: str = "") -> None:
@@ -63,9 +129,9 @@ def settle_vehicle(row: VehicleRow, *, concern: str = "") -> None:
         move_vehicle(row, target)
 
 
-def can_fly(row: VehicleRow) -> bool:
-    """Whether the program can fly it, rather than take records of flights made elsewhere."""
-    return row.kind in VEHICLE_KINDS and VEHICLE_KINDS[row.kind].can_fly and VEHICLE_KINDS[row.kind].served
+def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
+    """The vehicle has said which gains it holds."""
+    row.held, row.held_at = dict(held), utc_now()
 
 
 def classed_by_program(row: VehicleRow) -> bool:
@@ -73,72 +139,14 @@ def classed_by_program(row: VehicleRow) -> bool:
     return not row.is_real or not can_fly(row)
 
 
-def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
-    """A campaign's vehicle with the campaign's settings of it."""
-    vehicle = row.vehicle
-    return CampaignVehicle(
-        id=vehicle.id,
-        kind=vehicle.kind,
-        title=vehicle.title,
-        is_real=vehicle.is_real,
-        can_fly=can_fly(vehicle),
-        state=vehicle.state,
-        options=row.vehicle_options,
-    )
-
-
 def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[Vehicle]:
-    """In the order in which they were first wanted."""
+    """In the order in which they were registered or first wanted."""
     after = 0 if cursor is None else decode_cursor("id", cursor, float)[1]
     rows, total = repository.page(session, after_id=after, limit=limit)
     following = encode_cursor("id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    return Page(items=[_view(row) for row in rows[:limit]], total=total, next_cursor=following)
+    return Page(items=[vehicle_view(row) for row in rows[:limit]], total=total, next_cursor=following)
 
 
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:
-    return _view(repository.get_one(session, vehicle_id))
-
-
-def list_given_gains(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
-    """The newest first."""
-    repository.get_one(session, vehicle_id)
-    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
-    rows, total = repository.flights(session, vehicle_id, before_id=before, limit=limit)
-    items = [
-        GivenGains(
-            flight_id=row.id,
-            campaign_id=row.campaign_id,
-            trial_id=row.trial_id,
-            asked=row.gains,
-            read_back=row.read_back,
-            outcome=row.state,
-            asked_at=row.claimed_at,
-        )
-        for row in rows[:limit]
-    ]
-    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    return Page(items=items, total=total, next_cursor=following)
-
-
-def release_vehicle(session: Session, vehicle_id: int, statement: str) -> Vehicle:
-    """Out of quarantine, on a person's word. Raises ConflictError when it is in none."""
-    row = repository.get_one(session, vehicle_id)
-    check_action(ACTIONS, "release", row.state, row.title)
-    move_vehicle(row, VehicleState.READY)
-    row.concern = f"Released: {statement}"
-    session.flush()
-    return _view(row)
-
-
-def _view(row: VehicleRow) -> Vehicle:
-    return Vehicle(
-        id=row.id,
-        kind=row.kind,
-        title=row.title,
-        is_real=row.is_real,
-        can_fly=can_fly(row),
-        state=row.state,
-        concern=row.concern,
-        safe_gains=row.safe_gains,
-        actions=[action for action in allowed(ACTIONS, row.state) if action != "fly" or can_fly(row)],
-    )
+    """Raises NotFoundError."""
+    return vehicle_view(repository.get_one(session, vehicle_id))

@@ -1,4 +1,4 @@
-"""The states of a vehicle."""
+"""The states of a vehicle, and of what it is asked beside its flights."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -31,8 +31,62 @@ MOVES: Final[Mapping[VehicleState, frozenset[VehicleState]]] = {
     VehicleState.QUARANTINED: frozenset({VehicleState.READY, VehicleState.DISCONNECTED}),
 }
 
+_DOWN: Final = frozenset({VehicleState.READY, VehicleState.QUARANTINED})
+_MAYBE_UP: Final = frozenset({VehicleState.STAGED, VehicleState.FLYING, VehicleState.QUARANTINED})
+
 ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "fly": frozenset({VehicleState.READY}),
+    "stage": frozenset({VehicleState.READY}),
+    "connect": frozenset({VehicleState.DISCONNECTED}),
+    "disconnect": _DOWN,
+    "check": _DOWN,
+    "restore": _DOWN,
+    "parameters": frozenset({VehicleState.READY}),
+    "edit": frozenset({VehicleState.DISCONNECTED, VehicleState.READY}),
+    "land": _MAYBE_UP,
+    "motors off": _MAYBE_UP,
     "release": frozenset({VehicleState.QUARANTINED}),
 }
-"""What a person may do with a vehicle, and in which states."""
+"""What a person may do with a vehicle, and in which states. Only registered vehicles that the program keeps a link to
+take anything beside `fly` and `release`."""
+
+
+class ActKind(StrEnum):
+    """What a registered vehicle was asked, or what was decided about it, beside its flights."""
+
+    CONNECT = "connect"
+    DISCONNECT = "disconnect"
+    CHECK = "check"
+    RESTORE = "restore"
+    PARAMETERS = "parameters"
+    RELEASE = "release"
+    LAND = "land"
+    MOTORS_OFF = "motors off"
+    SAFE_GAINS = "safe gains"
+    CONTROL = "control"
+
+
+GIVES_GAINS: Final = frozenset({ActKind.CONNECT, ActKind.RESTORE, ActKind.RELEASE})
+"""Acts that write the safe gains to the vehicle, and so stand in its ledger."""
+
+
+class ActState(StrEnum):
+    """requested ──→ running ──→ done | failed
+    └──→ failed
+    """
+
+    REQUESTED = "requested"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+
+
+ACT_UNDER_WAY: Final = frozenset({ActState.REQUESTED, ActState.RUNNING})
+"""A vehicle has at most one act in these states."""
+
+ACT_MOVES: Final[Mapping[ActState, frozenset[ActState]]] = {
+    ActState.REQUESTED: frozenset({ActState.RUNNING, ActState.FAILED}),
+    ActState.RUNNING: frozenset({ActState.DONE, ActState.FAILED}),
+    ActState.DONE: frozenset(),
+    ActState.FAILED: frozenset(),
+}

@@ -13,17 +13,24 @@ from app.fleet import service as fleet
 from app.trials import history
 from app.trials.lifecycle import move_trial
 from app.trials.scoring import score
-from app.trials.states import TrialState
+from app.trials.states import Ending, TrialState
 
 
 def capture(
-    session: Session, campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, *, aborted: str | None = None
+    session: Session,
+    campaign: CampaignRow,
+    row: TrialRow,
+    trajectory: Trajectory,
+    *,
+    ending: Ending = "completed",
+    reason: str = "",
 ) -> None:
-    """Store a flight's record and class it: `aborted` with its reason, else by the program where it may.
+    """Store a flight's record and class it: one that was `aborted` as that, with its `reason`, else by the program
+    where it may.
 
-    A flight of a real vehicle stays captured until a person has classed it, and so does one with glitches in its record
-    that can be scored. Raises TrajectoryError when the
-    record cannot be stored.
+    A flight of a real vehicle stays captured until a person has classed it, with the reason as a suggestion where the
+    measurement is `invalid`; and so does one with glitches in its record that can be scored. Raises TrajectoryError
+    when the record cannot be stored.
     """
     stored = history.store_trajectory(session, trajectory)
     row.trajectory = stored
@@ -37,21 +44,22 @@ def capture(
     )
     row.overshoot_m, row.curve = judged.overshoot, judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
-    row.ending = "completed" if aborted is None else "aborted"
-    if aborted is not None and row.state == TrialState.FLYING:
-        move_trial(row, TrialState.ABORTED, reason=aborted)
+    row.ending = ending
+    if ending == "aborted" and row.state == TrialState.FLYING:
+        move_trial(row, TrialState.ABORTED, reason=reason or "aborted")
         return
-    move_trial(row, TrialState.CAPTURED, reason="")
-    if aborted is not None:
-        move_trial(row, TrialState.ABORTED, reason=aborted)
+    move_trial(row, TrialState.CAPTURED, reason=reason if ending == "invalid" else "")
+    if ending == "aborted":
+        move_trial(row, TrialState.ABORTED, reason=reason or "aborted")
         return
     row.error = judged.error  # told before somebody classes the flight; classing scores it again
     if fleet.classed_by_program(campaign.vehicle):
-        _classify(row, judged.refusal)
+        _classify(row, reason or "the measurement is no good" if ending == "invalid" else judged.refusal)
 
 
 def _classify(row: TrialRow, refusal: str) -> None:
-    if row.error is None:
+    if row.error is None or row.ending == "invalid":
+        row.error = None
         move_trial(row, TrialState.INVALID, reason=refusal)
     elif not row.glitches:
         move_trial(row, TrialState.VALID)

@@ -5,11 +5,14 @@
                        ├→ record_failure      (not flown: the vehicle refused, or took other gains)
                        └→ record_withdrawal   (not flown: somebody ended it before lift-off)
 
-give_up_flight serves wherever the flight stands: before lift-off it was not flown, afterwards it is lost.
+A flight of mode `stage` waits between record_staged and record_lift_off, for `take_off_wanted` or `stand_down_wanted`.
+`record_restored` says that the safe gains are back, whatever came before. `give_up_flight` serves wherever the flight
+stands: before lift-off it was not flown, afterwards it is lost.
 
 What the vehicle is asked stands in the flight row before it is sent; what it answers, as soon as it is known.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
@@ -17,7 +20,8 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.campaigns import service as campaigns
-from app.db.models import FlightRow
+from app.core.stopping import landing_battery_v, starting_battery_v
+from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.errors import ConflictError
 from app.fleet import service as fleet
@@ -25,7 +29,7 @@ from app.fleet.states import VehicleState
 from app.trials import repository
 from app.trials.capture import capture
 from app.trials.lifecycle import move_flight, move_trial
-from app.trials.states import FlightState, TrialState
+from app.trials.states import FlightMode, FlightState, TrialState
 from app.vehicles.base import FlightRecord, OptionValue
 
 BEGINS_WITHIN: Final = timedelta(seconds=10)
@@ -37,18 +41,21 @@ _NOT_VERIFIED: Final = "whoever had it ended before its safe gains were read bac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightTask:
-    """Everything that a worker needs for one flight, apart from the database."""
+    """Everything that a worker needs for one flight, apart from the database. One of mode `stage` waits, once its gains
+    are read back, until `take_off_wanted` or `stand_down_wanted`."""
 
     flight_id: int
     trial_id: int
     campaign_id: int
     experiment: str
+    vehicle_id: int
     vehicle_kind: str
     vehicle_options: dict[str, OptionValue]
     safe_gains: dict[str, float]
     gains: dict[str, float]
     seed: int
     speed: float | None
+    mode: FlightMode = "fly"
 
 
 def claim_flight(session: Session, worker: str) -> FlightTask | None:
@@ -80,17 +87,20 @@ def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightTask:
     move_flight(flight, FlightState.RUNNING)
     flight.worker, flight.claimed_at = worker, utc_now()
     trial, campaign = flight.trial, campaigns.get_row(session, flight.campaign_id)
+    flight.safe_gains = dict(flight.vehicle.safe_gains)
     return FlightTask(
         flight_id=flight.id,
         trial_id=trial.id,
         campaign_id=campaign.id,
         experiment=campaign.experiment,
+        vehicle_id=flight.vehicle_id,
         vehicle_kind=flight.vehicle.kind,
-        vehicle_options=dict(campaign.vehicle_options),
-        safe_gains=dict(flight.vehicle.safe_gains),
+        vehicle_options=fleet.options_of(campaign),
+        safe_gains=dict(flight.safe_gains),
         gains=dict(flight.gains),
         seed=trial.seed,
         speed=flight.speed,
+        mode=flight.mode,
     )
 
 
@@ -98,17 +108,51 @@ def record_staged(session: Session, flight_id: int, read_back: dict[str, float])
     """The vehicle has answered with the gains that it holds. Raises ConflictError when the trial was cancelled."""
     flight = _running(session, flight_id)
     flight.read_back = flight.trial.read_back = read_back
+    fleet.hold_gains(flight.vehicle, read_back)
     move_trial(flight.trial, TrialState.STAGED)
     fleet.move_vehicle(flight.vehicle, VehicleState.STAGED)
+
+
+def take_off_wanted(session: Session, flight_id: int) -> bool:
+    """Whether the operator of a staged flight has asked for its take-off, within the last 10 s: nothing takes off later
+    than its operator expects it. False also for a flight that is to stand down, or no longer runs."""
+    flight = repository.get_flight(session, flight_id)
+    return _may_take_off(flight) and stand_down_wanted(session, flight_id) is None
+
+
+def stand_down_wanted(session: Session, flight_id: int) -> str | None:
+    """Why a staged flight is not to take place: unstaged, its trial cancelled, or a take-off that was asked for and
+    could not be begun in time; None while it may. The worker then restores the safe gains and calls
+    `record_withdrawal` with this reason."""
+    flight = repository.get_flight(session, flight_id)
+    if flight.state != FlightState.RUNNING:
+        return f"the flight is {flight.state}"
+    if flight.stand_down:
+        return flight.stand_down
+    if flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
+        return f"the trial is {flight.trial.state}"
+    if flight.mode == "stage" and flight.take_off_at is not None and not _may_take_off(flight):
+        return f"it could not take off within {BEGINS_WITHIN.total_seconds():g} s of the operator's word"
+    return None
+
+
+def _may_take_off(flight: FlightRow) -> bool:
+    if flight.mode == "fly":
+        return not fleet.needs_staging(flight.vehicle)
+    return flight.take_off_at is not None and utc_now() - flight.take_off_at <= BEGINS_WITHIN
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:
     """The vehicle is about to be told to take off; from here on only a landing or a loss can follow.
 
-    Raises ConflictError when the trial was cancelled, or when the gains read back are not the trial's.
+    Raises ConflictError when the trial was cancelled or unstaged, when the gains read back are not the trial's, or when
+    a staged flight lacks its operator's word.
     """
     flight = _running(session, flight_id)
     trial = flight.trial
+    if not take_off_wanted(session, flight_id):
+        why = stand_down_wanted(session, flight_id) or "nobody has asked for its take-off"
+        raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still wanted.")
     if trial.read_back != trial.gains:
         raise ConflictError(
             f"Trial {trial.number} must not fly: the vehicle holds {trial.read_back}.",
@@ -128,10 +172,9 @@ def record_landing(session: Session, flight_id: int, record: FlightRecord) -> No
     flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
-    aborted = record.ending == "aborted"
     campaign = campaigns.get_row(session, flight.campaign_id)
-    capture(session, campaign, flight.trial, record.trajectory, aborted=record.reason or "aborted" if aborted else None)
-    flight.trial.settings = dict(record.settings)
+    _capture(session, campaign, flight, record)
+    aborted = record.ending == "aborted"
     _end(flight, FlightState.ABORTED if aborted else FlightState.LANDED, problem=record.reason)
     campaigns.end_flying(session, campaign)
 
@@ -169,6 +212,13 @@ def doubt_vehicle(session: Session, flight_id: int) -> None:
         quarantine_vehicle(session, flight_id, _NOT_VERIFIED)
 
 
+def record_restored(session: Session, flight_id: int, held: Mapping[str, float]) -> None:
+    """After a flight, however it ended: the vehicle was given its safe gains, and holds these."""
+    flight = repository.get_flight(session, flight_id)
+    flight.restored, flight.restored_at = dict(held), utc_now()
+    fleet.hold_gains(flight.vehicle, held)
+
+
 def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
     """Nothing more is heard of a flight: it is lost, or was not flown if it had not lifted off. Whether it is lost."""
     lifted_off = repository.get_flight(session, flight_id).trial.state == TrialState.FLYING
@@ -198,10 +248,15 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
     if flight.trial.state != TrialState.LOST:
         return
     campaign = campaigns.get_row(session, flight.campaign_id)
-    aborted = record.reason or "aborted" if record.ending == "aborted" else None
-    capture(session, campaign, flight.trial, record.trajectory, aborted=aborted)
-    flight.trial.settings = dict(record.settings)
+    _capture(session, campaign, flight, record)
     campaigns.history_changed(session, campaign)
+
+
+def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
+    capture(session, campaign, flight.trial, record.trajectory, ending=record.ending, reason=record.reason)
+    flight.trial.settings = dict(record.settings)
+    flight.battery_v_before = starting_battery_v(record.trajectory)
+    flight.battery_v_after = landing_battery_v(record.trajectory)
 
 
 def _running(session: Session, flight_id: int) -> FlightRow:

@@ -86,10 +86,6 @@ def get_flight(session: Session, flight_id: int) -> FlightRow:
     return row
 
 
-def flight_of_vehicle_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
-    return session.scalar(select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(UNDER_WAY)))
-
-
 def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRow | None:
     return session.scalar(
         select(FlightRow)
@@ -114,3 +110,10 @@ def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int,
     """The last flight of each trial that has one, by trial."""
     last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
     return {row.trial_id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(last)))}
+
+
+def flight_ids(session: Session, trial_id: int) -> Sequence[int]:
+    """The newest first."""
+    return session.scalars(
+        select(FlightRow.id).where(FlightRow.trial_id == trial_id).order_by(FlightRow.id.desc())
+    ).all()

@@ -3,12 +3,25 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response, status
+from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from app.api.deps import Act, CurrentDatabase, CursorText, Id, Limit, Live, Reader, Writer, json_only
+from app.api.deps import (
+    Act,
+    Asking,
+    CurrentDatabase,
+    CurrentSettings,
+    CursorText,
+    Id,
+    Limit,
+    Live,
+    Reader,
+    Writer,
+    json_only,
+)
 from app.api.uploads import REQUEST_BODY, Record
 from app.schemas import Page
-from app.trials import service
+from app.trials import orders, service
 from app.trials.schemas import Abort, AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial, TrialEdit
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
@@ -21,11 +34,11 @@ def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: Cur
 
 
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
-def create_trial(act: Act, campaign_id: Id, body: NewTrial) -> Trial:
+def create_trial(act: Act, asking: Asking, campaign_id: Id, body: NewTrial) -> Trial:
     """Plan a trial of the proposal or of gains of one's own, and fly it at once if asked to."""
     return act(
         Trial,
-        lambda session: service.create_trial(session, campaign_id, body),
+        lambda session: service.create_trial(session, campaign_id, body, asking),
         ahead=lambda session: service.judge_new_ahead(session, campaign_id, body),
     )
 
@@ -42,13 +55,37 @@ def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
 
 
 @router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
-def fly_trial(act: Act, trial_id: Id, body: FlightOrder | None = None) -> Trial:
-    """Ask for the flight of a planned trial. A vehicle that has a flight already refuses a second one."""
+def fly_trial(act: Act, asking: Asking, trial_id: Id, body: FlightOrder | None = None) -> Trial:
+    """Ask for the flight of a planned trial in one go. A vehicle that has a flight already refuses a second one, and a
+    real one refuses every one: it is staged."""
     return act(
         Trial,
-        lambda session: service.fly_trial(session, trial_id, body or FlightOrder()),
-        ahead=lambda session: service.judge_ahead(session, trial_id),
+        lambda session: orders.fly_trial(session, trial_id, body or FlightOrder(), asking),
+        ahead=lambda session: orders.judge_ahead(session, trial_id),
     )
+
+
+@router.post("/trials/{trial_id}/stage", status_code=status.HTTP_202_ACCEPTED)
+def stage_trial(act: Act, asking: Asking, trial_id: Id) -> Trial:
+    """Have a registered vehicle take the gains of a planned trial, read them back, and wait for its operator."""
+    return act(
+        Trial,
+        lambda session: orders.stage_trial(session, trial_id, asking),
+        ahead=lambda session: orders.judge_ahead(session, trial_id),
+    )
+
+
+@router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
+def unstage_trial(act: Act, trial_id: Id) -> Trial:
+    """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
+    return act(Trial, lambda session: orders.unstage_trial(session, trial_id))
+
+
+@router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
+def take_off_trial(act: Act, asking: Asking, trial_id: Id) -> Trial:
+    """The operator's own act: a staged vehicle takes off. For a real one it is taken only from the dashboard's own
+    page, on this computer, with the token of who is in control."""
+    return act(Trial, lambda session: orders.take_off_trial(session, trial_id, asking))
 
 
 @router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)
@@ -64,13 +101,13 @@ async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body:
 
 def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAnswer:
     with database.write() as session:
-        return service.withdraw_flight(session, trial_id, reason)
+        return orders.withdraw_flight(session, trial_id, reason)
 
 
 @router.post("/trials/{trial_id}/cancel")
 def cancel_trial(act: Act, trial_id: Id) -> Trial:
     """Give up a trial that has not flown."""
-    return act(Trial, lambda session: service.cancel_trial(session, trial_id))
+    return act(Trial, lambda session: orders.cancel_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/classify")
@@ -108,6 +145,17 @@ def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
             "X-Checksum-SHA256": export.checksum,
         },
     )
+
+
+@router.get(
+    "/trials/{trial_id}/tlog",
+    response_class=FileResponse,
+    responses={200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}},
+)
+def get_telemetry_log(session: Reader, settings: CurrentSettings, trial_id: Id) -> FileResponse:
+    """Everything that went over the link in the trial's last flight, both ways, as ground stations write it (.tlog)."""
+    log = service.find_telemetry_log(session, trial_id, settings.data_dir)
+    return FileResponse(log.file, media_type="application/octet-stream", filename=log.name)
 
 
 records = APIRouter(prefix="/api", tags=["trials"])

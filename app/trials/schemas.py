@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.core.statistics import Word
 from app.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
-from app.trials.states import Ending, FlightState, TrialKind, TrialState
+from app.trials.states import Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 
@@ -68,7 +68,8 @@ class AbortAnswer(BaseModel):
 
 
 class RecordBrief(BaseModel):
-    """The stored record of a flight, without its samples. `ending`: whether the flight was broken off."""
+    """The stored record of a flight, without its samples. `ending`: whether the flight was broken off, or its
+    measurement is no good."""
 
     samples: int
     ending: Ending
@@ -81,11 +82,18 @@ class RecordBrief(BaseModel):
 
 
 class FlightBrief(BaseModel):
-    """The last order to the vehicle for this trial. `problem` says why it failed."""
+    """The last order to the vehicle for this trial. `problem` says why it failed. One of mode `stage` waits with its
+    gains on the vehicle until its operator asks for the take-off."""
 
     id: int
     state: FlightState
+    mode: FlightMode
+    take_off_at: Annotated[datetime | None, Field(description="when the take-off was asked for")]
+    standing_down: Annotated[str, Field(description="why a staged flight does not take place; empty while it may")]
     problem: str
+    battery: Annotated[str, Field(description="label of the battery that was in; empty when nobody said")]
+    battery_v_before: float | None
+    battery_v_after: float | None
 
 
 class GroupBrief(BaseModel):

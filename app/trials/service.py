@@ -1,8 +1,8 @@
 """What people and scripts do with trials. The worker's side of a flight is in `flights`."""
 
-from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
@@ -16,11 +16,12 @@ from app.core.definition import flight_seed
 from app.core.errors import GainlineError, InputError, Problem
 from app.core.experiments import get_experiment
 from app.core.policy import Gains
-from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
+from app.db.models import CampaignRow, ProposalRow, TrialRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import BusyError, ConflictError, NotFoundError
+from app.errors import ConflictError, NotFoundError
 from app.fleet import service as fleet
+from app.fleet.control import NOBODY, Asker
 from app.logs.readers import read_takeoff
 from app.logs.takeoffs import Takeoff
 from app.moves import check_action, check_move, check_version
@@ -28,12 +29,14 @@ from app.schemas import Page
 from app.trials import history, repository
 from app.trials.capture import capture
 from app.trials.judging import Judged, judge_gains, judge_proposal
-from app.trials.lifecycle import move_flight, move_trial
+from app.trials.lifecycle import move_trial
+from app.trials.orders import request_flight, require_open
 from app.trials.records import settle_gains
-from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trial, TrialEdit
+from app.trials.schemas import Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
-from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, FlightState, TrialKind, TrialState
+from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, TrialKind, TrialState
+from app.trials.telemetry_logs import telemetry_log
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
 
@@ -52,15 +55,14 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return _seen(session, repository.get_one(session, trial_id))
 
 
-def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
+def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Asker = NOBODY) -> Trial:
     """Plan a trial and, with `fly`, ask for its flight.
 
     Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
-    ready; GainsError naming what the gate refuses, unless that is overruled; BusyError when the vehicle has a
-    flight already.
+    ready; GainsError naming what the gate refuses, unless that is overruled; and what `fly_trial` raises.
     """
     campaign = campaigns.get_row(session, campaign_id)
-    _require_open(session, campaign, IN_BUDGET)
+    require_open(session, campaign, IN_BUDGET)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
     number = repository.next_number(session, campaign_id)
@@ -81,7 +83,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial) -> Trial:
     session.add(row)
     session.flush()
     if new.fly is not None:
-        _request_flight(session, campaign, row, new.fly)
+        request_flight(session, campaign, row, asker, speed=new.fly.speed)
     return trial_view(session, campaign, row)
 
 
@@ -90,57 +92,6 @@ def judge_new_ahead(session: Session, campaign_id: int, new: NewTrial) -> None:
     wrong with the trial is said there."""
     with suppress(GainlineError):
         _chosen(session, campaigns.get_row(session, campaign_id), new)
-
-
-def judge_ahead(session: Session, trial_id: int) -> None:
-    """The same before `fly_trial`."""
-    with suppress(GainlineError):
-        row = repository.get_one(session, trial_id)
-        judge_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
-
-
-def fly_trial(session: Session, trial_id: int, order: FlightOrder) -> Trial:
-    """Ask for the flight of a planned trial; the worker carries it out. Raises as `create_trial` does."""
-    row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, "fly", row.state, f"Trial {row.number}")
-    campaign = campaigns.get_row(session, row.campaign_id)
-    _require_open(session, campaign, HISTORY)
-    judged = judge_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
-    row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
-    _request_flight(session, campaign, row, order)
-    return trial_view(session, campaign, row)
-
-
-def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer:
-    """Abort a flight that no worker has begun; one that is over needs none. Raises ConflictError when none was asked
-    for, or its worker does not answer."""
-    row = repository.get_one(session, trial_id)
-    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
-    if flight is not None and flight.state == FlightState.REQUESTED:
-        move_flight(flight, FlightState.CANCELLED, problem=reason)
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
-    if flight is not None and flight.state == FlightState.RUNNING:
-        raise ConflictError(
-            f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
-            hint="Abort again. If a vehicle is in the air, use its own remote control now.",
-        )
-    if flight is not None:
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight is over already.")
-    raise ConflictError(
-        f"Trial {row.number} is {row.state}: there is no flight to abort.",
-        hint="None was asked for; load the trial again.",
-    )
-
-
-def cancel_trial(session: Session, trial_id: int) -> Trial:
-    """Give up a trial before its lift-off. Raises ConflictError when it is too late for that."""
-    row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, "cancel", row.state, f"Trial {row.number}")
-    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
-    if flight is not None and flight.state == FlightState.REQUESTED:
-        move_flight(flight, FlightState.CANCELLED, problem="the trial was cancelled")
-    move_trial(row, TrialState.CANCELLED, reason="cancelled by the operator")
-    return _seen(session, row)
 
 
 def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
@@ -205,7 +156,7 @@ def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed:
             f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
             hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
         )
-    _require_open(session, campaign, HISTORY)
+    require_open(session, campaign, HISTORY)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
     campaigns.begin_flying(campaign)
     row.flown_at = utc_now()
@@ -272,25 +223,28 @@ def export_trajectory(session: Session, trial_id: int) -> Export:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class TelemetryLog:
+    """A flight's .tlog, and the name it is handed out under."""
+
+    file: Path
+    name: str
+
+
+def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> TelemetryLog:
+    """Of the trial's last flight that left one. Raises NotFoundError when none did."""
+    row = repository.get_one(session, trial_id)
+    for flight_id in repository.flight_ids(session, trial_id):
+        file = telemetry_log(data_dir, flight_id)
+        if file.is_file():
+            return TelemetryLog(file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog")
+    raise NotFoundError(
+        "telemetry log of trial", trial_id, hint="Only flights of vehicles that are flown over a link leave one."
+    )
+
+
 def _seen(session: Session, row: TrialRow) -> Trial:
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
-
-
-def _require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
-    """Raises ConflictError unless the campaign can take another trial now; those in `spent_by` use up its budget."""
-    check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
-    trials = history.trials_of(session, campaign.id)
-    budget = definition_of(campaign).stop.max_flights
-    if sum(row.state in spent_by for row in trials) >= budget:
-        raise ConflictError(
-            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
-            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
-        )
-    if (waiting := history.unclassed(trials)) is not None:
-        raise ConflictError(
-            f"Flight {waiting.number} waits for its class.",
-            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
-        )
 
 
 def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[Judged, ProposalRow | None]:
@@ -314,27 +268,6 @@ def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: Propo
         return proposal.kind
     flown = history.counted(history.trials_of(session, campaign.id))
     return "repeat" if any(row.gains == gains for row in flown) else "manual"
-
-
-def _request_flight(session: Session, campaign: CampaignRow, row: TrialRow, order: FlightOrder) -> None:
-    vehicle = campaign.vehicle
-    if (busy := repository.flight_of_vehicle_under_way(session, vehicle.id)) is not None:
-        raise BusyError(
-            f"{vehicle.title} has a flight already: trial {busy.trial.number} of campaign {busy.campaign_id}.",
-            hint="Wait until it has landed, or abort it; flights do not queue.",
-        )
-    fleet.require_ready(vehicle)
-    session.add(
-        FlightRow(
-            campaign_id=campaign.id,
-            trial_id=row.id,
-            vehicle_id=vehicle.id,
-            state=FlightState.REQUESTED,
-            gains=row.gains,
-            speed=order.speed,
-        )
-    )
-    session.flush()
 
 
 def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:

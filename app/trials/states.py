@@ -8,8 +8,12 @@ TrialKind = Literal["start", "step", "shorter step", "repeat", "baseline", "manu
 """Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, the first
 flight's again, a person."""
 
-Ending = Literal["completed", "aborted"]
-"""How a flight's record ends: where it should, or where the flight was broken off."""
+Ending = Literal["completed", "aborted", "invalid"]
+"""How a flight's record ends: where it should, where the flight was broken off, or with a measurement that is no
+good."""
+
+FlightMode = Literal["fly", "stage"]
+"""Take off as soon as the gains are read back, or wait for an operator's own act."""
 
 
 class TrialState(StrEnum):
@@ -60,6 +64,9 @@ IN_BUDGET: Final = HISTORY | UNFLOWN | {TrialState.FLYING, TrialState.CAPTURED}
 
 ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
     "fly": frozenset({TrialState.PLANNED}),
+    "stage": frozenset({TrialState.PLANNED}),
+    "take-off": frozenset({TrialState.STAGED}),
+    "unstage": frozenset({TrialState.STAGED}),
     "cancel": UNFLOWN,
     "abort": frozenset({TrialState.STAGED, TrialState.FLYING}),
     "upload": frozenset({TrialState.PLANNED, TrialState.LOST}),

@@ -18,7 +18,7 @@ from app.trials.comparisons import comparisons
 from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import thinned
-from app.trials.states import ACTIONS, UNDER_WAY, TrialState
+from app.trials.states import ACTIONS, UNDER_WAY, FlightState, TrialState
 
 Scored = tuple[int, float]
 """Number and error of a valid trial."""
@@ -134,7 +134,8 @@ def verdict(row: TrialRow, scored: Sequence[Scored], unit: str, again: Sequence[
         case TrialState.LOST:
             return f"Lost: {row.reason}"
         case TrialState.CAPTURED:
-            return f"Landed and recorded{_glitches(row)}; somebody has to say whether it counts."
+            doubt = f"; the measurement is in doubt: {row.reason}" if row.reason else ""
+            return f"Landed and recorded{_glitches(row)}{doubt}; somebody has to say whether it counts."
         case _:
             return ""
 
@@ -188,17 +189,37 @@ def _units(channels: Iterable[str]) -> dict[str, str]:
 
 
 def _flight(row: FlightRow | None) -> FlightBrief | None:
-    return None if row is None else FlightBrief(id=row.id, state=row.state, problem=row.problem)
+    if row is None:
+        return None
+    return FlightBrief(
+        id=row.id,
+        state=row.state,
+        mode=row.mode,
+        take_off_at=row.take_off_at,
+        standing_down=row.stand_down,
+        problem=row.problem,
+        battery=row.battery,
+        battery_v_before=row.battery_v_before,
+        battery_v_after=row.battery_v_after,
+    )
 
 
 def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None) -> list[str]:
     """The states' table, narrowed by what the vehicle can do and by a flight that is under way."""
-    can_fly = fleet.can_fly(campaign.vehicle)
+    vehicle = campaign.vehicle
     under_way = flight is not None and flight.state in UNDER_WAY
     impossible = set()
-    if under_way or not can_fly:
+    if under_way or not fleet.can_fly(vehicle):
+        impossible |= {"fly", "stage"}
+    if fleet.needs_staging(vehicle):
         impossible.add("fly")
-    if can_fly and row.state == TrialState.PLANNED:
+    if not vehicle.registered:
+        impossible.add("stage")
+    if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING or flight.stand_down:
+        impossible |= {"take-off", "unstage"}
+    elif flight.take_off_at is not None:
+        impossible.add("take-off")
+    if fleet.can_fly(vehicle) and row.state == TrialState.PLANNED:
         impossible.add("upload")
     if campaign.state not in CAMPAIGN_ACTIONS["judge"]:
         impossible |= {"classify", "upload"}

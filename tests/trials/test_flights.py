@@ -79,6 +79,7 @@ def claim_task(database: Database) -> flights.FlightTask:
         trial_id=1,
         campaign_id=1,
         experiment="takeoff",
+        vehicle_id=1,
         vehicle_kind="twin",
         vehicle_options={},
         safe_gains={},

@@ -2,7 +2,7 @@
 
 import { type Client, type ClientMeta, formDataBodySerializer, type Options as Options2, type RequestResult, type ServerSentEventsResult, type TDataShape } from './client';
 import { client } from './client.gen';
-import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
+import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
 
 export type Options<TData extends TDataShape = TDataShape, ThrowOnError extends boolean = boolean, TResponse = unknown> = Options2<TData, ThrowOnError, TResponse> & {
     /**
@@ -178,7 +178,8 @@ export const editTrial = <ThrowOnError extends boolean = false>(options: Options
 /**
  * Fly Trial
  *
- * Ask for the flight of a planned trial. A vehicle that has a flight already refuses a second one.
+ * Ask for the flight of a planned trial in one go. A vehicle that has a flight already refuses a second one, and a
+ * real one refuses every one: it is staged.
  */
 export const flyTrial = <ThrowOnError extends boolean = false>(options: Options<FlyTrialData, ThrowOnError>): RequestResult<FlyTrialResponses, FlyTrialErrors, ThrowOnError> => (options.client ?? client).post<FlyTrialResponses, FlyTrialErrors, ThrowOnError>({
     url: '/api/trials/{trial_id}/fly',
@@ -188,6 +189,28 @@ export const flyTrial = <ThrowOnError extends boolean = false>(options: Options<
         ...options.headers
     }
 });
+
+/**
+ * Stage Trial
+ *
+ * Have a registered vehicle take the gains of a planned trial, read them back, and wait for its operator.
+ */
+export const stageTrial = <ThrowOnError extends boolean = false>(options: Options<StageTrialData, ThrowOnError>): RequestResult<StageTrialResponses, StageTrialErrors, ThrowOnError> => (options.client ?? client).post<StageTrialResponses, StageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/stage', ...options });
+
+/**
+ * Unstage Trial
+ *
+ * Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again.
+ */
+export const unstageTrial = <ThrowOnError extends boolean = false>(options: Options<UnstageTrialData, ThrowOnError>): RequestResult<UnstageTrialResponses, UnstageTrialErrors, ThrowOnError> => (options.client ?? client).post<UnstageTrialResponses, UnstageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/unstage', ...options });
+
+/**
+ * Take Off Trial
+ *
+ * The operator's own act: a staged vehicle takes off. For a real one it is taken only from the dashboard's own
+ * page, on this computer, with the token of who is in control.
+ */
+export const takeOffTrial = <ThrowOnError extends boolean = false>(options: Options<TakeOffTrialData, ThrowOnError>): RequestResult<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError> => (options.client ?? client).post<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/take-off', ...options });
 
 /**
  * Abort Trial
@@ -258,11 +281,32 @@ export const uploadTrajectory = <ThrowOnError extends boolean = false>(options: 
 export const getTrajectoryCsv = <ThrowOnError extends boolean = false>(options: Options<GetTrajectoryCsvData, ThrowOnError>): RequestResult<GetTrajectoryCsvResponses, GetTrajectoryCsvErrors, ThrowOnError> => (options.client ?? client).get<GetTrajectoryCsvResponses, GetTrajectoryCsvErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/trajectory.csv', ...options });
 
 /**
+ * Get Telemetry Log
+ *
+ * Everything that went over the link in the trial's last flight, both ways, as ground stations write it (.tlog).
+ */
+export const getTelemetryLog = <ThrowOnError extends boolean = false>(options: Options<GetTelemetryLogData, ThrowOnError>): RequestResult<GetTelemetryLogResponses, GetTelemetryLogErrors, ThrowOnError> => (options.client ?? client).get<GetTelemetryLogResponses, GetTelemetryLogErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/tlog', ...options });
+
+/**
  * List Vehicles
  *
- * Every vehicle that a campaign has used.
+ * Every registered vehicle, and every shared simulation that a campaign has used.
  */
 export const listVehicles = <ThrowOnError extends boolean = false>(options?: Options<ListVehiclesData, ThrowOnError>): RequestResult<ListVehiclesResponses, ListVehiclesErrors, ThrowOnError> => (options?.client ?? client).get<ListVehiclesResponses, ListVehiclesErrors, ThrowOnError>({ url: '/api/vehicles', ...options });
+
+/**
+ * Register Vehicle
+ *
+ * Register a vehicle that the program keeps a link to. Whether it is REAL follows from its settings.
+ */
+export const registerVehicle = <ThrowOnError extends boolean = false>(options: Options<RegisterVehicleData, ThrowOnError>): RequestResult<RegisterVehicleResponses, RegisterVehicleErrors, ThrowOnError> => (options.client ?? client).post<RegisterVehicleResponses, RegisterVehicleErrors, ThrowOnError>({
+    url: '/api/vehicles',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
 
 /**
  * Get Vehicle
@@ -270,19 +314,125 @@ export const listVehicles = <ThrowOnError extends boolean = false>(options?: Opt
 export const getVehicle = <ThrowOnError extends boolean = false>(options: Options<GetVehicleData, ThrowOnError>): RequestResult<GetVehicleResponses, GetVehicleErrors, ThrowOnError> => (options.client ?? client).get<GetVehicleResponses, GetVehicleErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}', ...options });
 
 /**
+ * Edit Vehicle
+ *
+ * Change a registered vehicle's name, settings, battery or safe gains, while it is at rest.
+ */
+export const editVehicle = <ThrowOnError extends boolean = false>(options: Options<EditVehicleData, ThrowOnError>): RequestResult<EditVehicleResponses, EditVehicleErrors, ThrowOnError> => (options.client ?? client).patch<EditVehicleResponses, EditVehicleErrors, ThrowOnError>({
+    url: '/api/vehicles/{vehicle_id}',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Connect Vehicle
+ *
+ * Open the link, and keep it open; the vehicle's safe gains are written and read back, unless it is armed.
+ */
+export const connectVehicle = <ThrowOnError extends boolean = false>(options: Options<ConnectVehicleData, ThrowOnError>): RequestResult<ConnectVehicleResponses, ConnectVehicleErrors, ThrowOnError> => (options.client ?? client).post<ConnectVehicleResponses, ConnectVehicleErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/connect', ...options });
+
+/**
+ * Disconnect Vehicle
+ *
+ * Close the link.
+ */
+export const disconnectVehicle = <ThrowOnError extends boolean = false>(options: Options<DisconnectVehicleData, ThrowOnError>): RequestResult<DisconnectVehicleResponses, DisconnectVehicleErrors, ThrowOnError> => (options.client ?? client).post<DisconnectVehicleResponses, DisconnectVehicleErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/disconnect', ...options });
+
+/**
+ * Check Vehicle
+ *
+ * Look at everything that has to be so before a flight.
+ */
+export const checkVehicle = <ThrowOnError extends boolean = false>(options: Options<CheckVehicleData, ThrowOnError>): RequestResult<CheckVehicleResponses, CheckVehicleErrors, ThrowOnError> => (options.client ?? client).post<CheckVehicleResponses, CheckVehicleErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/check', ...options });
+
+/**
+ * Restore Safe Gains
+ *
+ * Write the safe gains and read them back.
+ */
+export const restoreSafeGains = <ThrowOnError extends boolean = false>(options: Options<RestoreSafeGainsData, ThrowOnError>): RequestResult<RestoreSafeGainsResponses, RestoreSafeGainsErrors, ThrowOnError> => (options.client ?? client).post<RestoreSafeGainsResponses, RestoreSafeGainsErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/restore', ...options });
+
+/**
+ * Read Parameters
+ *
+ * Read every parameter of the vehicle; they are in the act's result.
+ */
+export const readParameters = <ThrowOnError extends boolean = false>(options: Options<ReadParametersData, ThrowOnError>): RequestResult<ReadParametersResponses, ReadParametersErrors, ThrowOnError> => (options.client ?? client).post<ReadParametersResponses, ReadParametersErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/parameters', ...options });
+
+/**
+ * List Acts
+ *
+ * What the vehicle was asked beside its flights, the newest first.
+ */
+export const listActs = <ThrowOnError extends boolean = false>(options: Options<ListActsData, ThrowOnError>): RequestResult<ListActsResponses, ListActsErrors, ThrowOnError> => (options.client ?? client).get<ListActsResponses, ListActsErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/acts', ...options });
+
+/**
  * List Given Gains
  *
- * Every gain set that the vehicle was given, the newest first.
+ * Every gain set that the vehicle was given, the newest first: in flights, restored after them, and beside them.
  */
 export const listGivenGains = <ThrowOnError extends boolean = false>(options: Options<ListGivenGainsData, ThrowOnError>): RequestResult<ListGivenGainsResponses, ListGivenGainsErrors, ThrowOnError> => (options.client ?? client).get<ListGivenGainsResponses, ListGivenGainsErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/ledger', ...options });
 
 /**
+ * Land Vehicle
+ *
+ * Have the vehicle land now, whatever it does. Goes straight to the worker and waits for no storage.
+ */
+export const landVehicle = <ThrowOnError extends boolean = false>(options: Options<LandVehicleData, ThrowOnError>): RequestResult<LandVehicleResponses, LandVehicleErrors, ThrowOnError> => (options.client ?? client).post<LandVehicleResponses, LandVehicleErrors, ThrowOnError>({
+    url: '/api/vehicles/{vehicle_id}/land',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Stop Motors
+ *
+ * Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage.
+ */
+export const stopMotors = <ThrowOnError extends boolean = false>(options: Options<StopMotorsData, ThrowOnError>): RequestResult<StopMotorsResponses, StopMotorsErrors, ThrowOnError> => (options.client ?? client).post<StopMotorsResponses, StopMotorsErrors, ThrowOnError>({
+    url: '/api/vehicles/{vehicle_id}/motors-off',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
  * Release Vehicle
  *
- * Take a vehicle out of quarantine, on the word of a person who has looked at it.
+ * Take a vehicle out of quarantine, on the word of a person who has looked at it. One with a link is released once
+ * it is seen to be disarmed and to hold its safe gains; the act says what came of that.
  */
 export const releaseVehicle = <ThrowOnError extends boolean = false>(options: Options<ReleaseVehicleData, ThrowOnError>): RequestResult<ReleaseVehicleResponses, ReleaseVehicleErrors, ThrowOnError> => (options.client ?? client).post<ReleaseVehicleResponses, ReleaseVehicleErrors, ThrowOnError>({
     url: '/api/vehicles/{vehicle_id}/release',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Give Up Control
+ *
+ * Hand over: nobody is in control afterwards.
+ */
+export const giveUpControl = <ThrowOnError extends boolean = false>(options: Options<GiveUpControlData, ThrowOnError>): RequestResult<GiveUpControlResponses, GiveUpControlErrors, ThrowOnError> => (options.client ?? client).delete<GiveUpControlResponses, GiveUpControlErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/control', ...options });
+
+/**
+ * Take Control
+ *
+ * Take control for 15 s, or renew it with one's token; a take-over from somebody else is recorded as an act.
+ */
+export const takeControl = <ThrowOnError extends boolean = false>(options: Options<TakeControlData, ThrowOnError>): RequestResult<TakeControlResponses, TakeControlErrors, ThrowOnError> => (options.client ?? client).put<TakeControlResponses, TakeControlErrors, ThrowOnError>({
+    url: '/api/vehicles/{vehicle_id}/control',
     ...options,
     headers: {
         'Content-Type': 'application/json',
@@ -373,6 +523,7 @@ export const getFlightFigure = <ThrowOnError extends boolean = false>(options: O
  * `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
  * entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
  * server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
- * flight and `worker` tells when the worker comes or goes; these carry no id and may be dropped for a slow client.
+ * flight, `vehicle` five times a second from a connected vehicle, and `worker` tells when the worker comes or goes;
+ * these carry no id and may be dropped for a slow client.
  */
 export const events = <ThrowOnError extends boolean = false>(options?: Options<EventsData, ThrowOnError, unknown>): Promise<ServerSentEventsResult<EventsResponses>> => (options?.client ?? client).sse.get<EventsResponses, EventsErrors, ThrowOnError>({ url: '/api/events', ...options });

@@ -38,6 +38,21 @@ export type AbortAnswer = {
 };
 
 /**
+ * ActKind
+ *
+ * What a registered vehicle was asked, or what was decided about it, beside its flights.
+ */
+export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control';
+
+/**
+ * ActState
+ *
+ * requested ──→ running ──→ done | failed
+ * └──→ failed
+ */
+export type ActState = 'requested' | 'running' | 'done' | 'failed';
+
+/**
  * Advice
  *
  * The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
@@ -303,7 +318,7 @@ export type CampaignSummary = {
 /**
  * CampaignVehicle
  *
- * A campaign's vehicle with the campaign's settings of it.
+ * A campaign's vehicle with its settings: the campaign's own, or those it is registered with.
  */
 export type CampaignVehicle = {
     /**
@@ -315,6 +330,10 @@ export type CampaignVehicle = {
      */
     kind: string;
     /**
+     * Name
+     */
+    name: string;
+    /**
      * Title
      */
     title: string;
@@ -323,11 +342,21 @@ export type CampaignVehicle = {
      */
     is_real: boolean;
     /**
+     * Registered
+     */
+    registered: boolean;
+    /**
      * Can Fly
      *
      * false when flights are made elsewhere and uploaded
      */
     can_fly: boolean;
+    /**
+     * Needs Staging
+     *
+     * true when a flight is staged first, and taken off by a person
+     */
+    needs_staging: boolean;
     state: VehicleState;
     /**
      * Options
@@ -470,6 +499,22 @@ export type Comparison = {
      * Sentence
      */
     sentence: string;
+};
+
+/**
+ * Control
+ *
+ * Who is in control. Renewals are not announced: load it again after `until` to see whether it is over.
+ */
+export type Control = {
+    /**
+     * Operator
+     */
+    operator: string;
+    /**
+     * Until
+     */
+    until: string;
 };
 
 /**
@@ -888,7 +933,8 @@ export type FittedParameter = {
 /**
  * FlightBrief
  *
- * The last order to the vehicle for this trial. `problem` says why it failed.
+ * The last order to the vehicle for this trial. `problem` says why it failed. One of mode `stage` waits with its
+ * gains on the vehicle until its operator asks for the take-off.
  */
 export type FlightBrief = {
     /**
@@ -897,9 +943,39 @@ export type FlightBrief = {
     id: number;
     state: FlightState;
     /**
+     * Mode
+     */
+    mode: 'fly' | 'stage';
+    /**
+     * Take Off At
+     *
+     * when the take-off was asked for
+     */
+    take_off_at: string | null;
+    /**
+     * Standing Down
+     *
+     * why a staged flight does not take place; empty while it may
+     */
+    standing_down: string;
+    /**
      * Problem
      */
     problem: string;
+    /**
+     * Battery
+     *
+     * label of the battery that was in; empty when nobody said
+     */
+    battery: string;
+    /**
+     * Battery V Before
+     */
+    battery_v_before: number | null;
+    /**
+     * Battery V After
+     */
+    battery_v_after: number | null;
 };
 
 /**
@@ -1033,21 +1109,29 @@ export type Gate = {
 /**
  * GivenGains
  *
- * One line of a vehicle's ledger: the gains it was asked to take, and those it said it had.
+ * One line of a vehicle's ledger: the gains it was asked to take, for what, and those it said it had.
  */
 export type GivenGains = {
     /**
+     * Purpose
+     */
+    purpose: 'flight' | 'restore after flight' | 'connect' | 'restore' | 'release';
+    /**
      * Flight Id
      */
-    flight_id: number;
+    flight_id: number | null;
     /**
      * Campaign Id
      */
-    campaign_id: number;
+    campaign_id: number | null;
     /**
      * Trial Id
      */
-    trial_id: number;
+    trial_id: number | null;
+    /**
+     * Act Id
+     */
+    act_id: number | null;
     /**
      * Asked
      */
@@ -1131,6 +1215,28 @@ export type Health = {
      * Worker
      */
     worker: 'running' | 'absent';
+};
+
+/**
+ * Identity
+ *
+ * Who answers at the other end of the link; pinned at the first connection.
+ */
+export type Identity = {
+    /**
+     * System Id
+     */
+    system_id: number;
+    /**
+     * Autopilot
+     */
+    autopilot: string;
+    /**
+     * Version
+     *
+     * empty where the autopilot does not tell
+     */
+    version: string;
 };
 
 /**
@@ -1286,6 +1392,46 @@ export type LatestRun = {
 };
 
 /**
+ * Lease
+ *
+ * Control of a vehicle until then. The token goes into the header X-Gainline-Control of what needs it.
+ */
+export type Lease = {
+    /**
+     * Operator
+     */
+    operator: string;
+    /**
+     * Token
+     */
+    token: string;
+    /**
+     * Until
+     */
+    until: string;
+};
+
+/**
+ * LeaseRequest
+ *
+ * Take control, renew it with the token of the lease that one has, or take over from somebody else.
+ */
+export type LeaseRequest = {
+    /**
+     * Operator
+     */
+    operator: string;
+    /**
+     * Take Over
+     */
+    take_over?: boolean;
+    /**
+     * Token
+     */
+    token?: string | null;
+};
+
+/**
  * NewCampaign
  *
  * A campaign to be created; what is left out has a working default.
@@ -1349,6 +1495,43 @@ export type NewTrial = {
 };
 
 /**
+ * NewVehicle
+ *
+ * A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real one a person
+ * has looked at them (`safe_gains_confirmed`), and says so in `statement`.
+ */
+export type NewVehicle = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Kind
+     */
+    kind: string;
+    /**
+     * Options
+     */
+    options?: {
+        [key: string]: boolean | number | number | string;
+    };
+    /**
+     * Safe Gains
+     */
+    safe_gains?: {
+        [key: string]: number;
+    } | null;
+    /**
+     * Safe Gains Confirmed
+     */
+    safe_gains_confirmed?: boolean;
+    /**
+     * Statement
+     */
+    statement?: string;
+};
+
+/**
  * NextFlight
  *
  * Where the next proposal stands. While a new one is computed, `proposal` may be the stale one before it.
@@ -1397,6 +1580,22 @@ export type OptionInfo = {
      * Upper
      */
     upper?: number | null;
+};
+
+/**
+ * OrderAnswer
+ *
+ * `accepted` is false when the worker has no link to the vehicle; what comes of it is seen in its status.
+ */
+export type OrderAnswer = {
+    /**
+     * Accepted
+     */
+    accepted: boolean;
+    /**
+     * Sentence
+     */
+    sentence: string;
 };
 
 /**
@@ -1486,6 +1685,24 @@ export type PageTrial = {
      * Items
      */
     items: Array<Trial>;
+    /**
+     * Total
+     */
+    total: number;
+    /**
+     * Next Cursor
+     */
+    next_cursor: string | null;
+};
+
+/**
+ * Page[VehicleAct]
+ */
+export type PageVehicleAct = {
+    /**
+     * Items
+     */
+    items: Array<VehicleAct>;
     /**
      * Total
      */
@@ -1596,7 +1813,8 @@ export type Proposal = {
 /**
  * RecordBrief
  *
- * The stored record of a flight, without its samples. `ending`: whether the flight was broken off.
+ * The stored record of a flight, without its samples. `ending`: whether the flight was broken off, or its
+ * measurement is no good.
  */
 export type RecordBrief = {
     /**
@@ -1606,7 +1824,7 @@ export type RecordBrief = {
     /**
      * Ending
      */
-    ending: 'completed' | 'aborted';
+    ending: 'completed' | 'aborted' | 'invalid';
     /**
      * Duration S
      */
@@ -2427,7 +2645,8 @@ export type Trouble = {
 /**
  * Vehicle
  *
- * Something that can fly a trial. `concern` says why it is quarantined.
+ * Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it said it has,
+ * at `held_at`. A simulation that is shared by campaigns is not `registered`, and keeps no link.
  */
 export type Vehicle = {
     /**
@@ -2435,9 +2654,17 @@ export type Vehicle = {
      */
     id: number;
     /**
+     * Version
+     */
+    version: number;
+    /**
      * Kind
      */
     kind: string;
+    /**
+     * Name
+     */
+    name: string;
     /**
      * Title
      */
@@ -2450,11 +2677,22 @@ export type Vehicle = {
      * Can Fly
      */
     can_fly: boolean;
+    /**
+     * Registered
+     */
+    registered: boolean;
     state: VehicleState;
     /**
      * Concern
      */
     concern: string;
+    /**
+     * Options
+     */
+    options: {
+        [key: string]: boolean | number | number | string;
+    };
+    identity: Identity | null;
     /**
      * Safe Gains
      */
@@ -2462,17 +2700,139 @@ export type Vehicle = {
         [key: string]: number | number;
     };
     /**
+     * Held
+     */
+    held: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Held At
+     */
+    held_at: string | null;
+    /**
+     * Checks
+     */
+    checks: Array<VehicleCheck> | null;
+    /**
+     * Checked At
+     */
+    checked_at: string | null;
+    /**
+     * Battery
+     *
+     * label of the battery that is in; empty when nobody said
+     */
+    battery: string;
+    /**
+     * null while nobody is in control
+     */
+    control: Control | null;
+    /**
      * Actions
      *
-     * what may be done with it now: fly, release
+     * what may be done with it now: fly, stage, connect, release, …
      */
     actions: Array<string>;
 };
 
 /**
+ * VehicleAct
+ *
+ * What a vehicle was asked beside its flights, by whom and why, and what came of it. `result` of a check holds its
+ * items, of `parameters` every parameter of the vehicle.
+ */
+export type VehicleAct = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * Vehicle Id
+     */
+    vehicle_id: number;
+    kind: ActKind;
+    state: ActState;
+    /**
+     * By
+     *
+     * the operator in control; empty when nobody was
+     */
+    by: string;
+    /**
+     * Reason
+     */
+    reason: string;
+    /**
+     * Asked
+     */
+    asked: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Read Back
+     */
+    read_back: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Result
+     */
+    result: {
+        [key: string]: unknown;
+    } | null;
+    /**
+     * Problem
+     *
+     * why it failed; empty when it did not
+     */
+    problem: string;
+    /**
+     * Requested At
+     */
+    requested_at: string;
+    /**
+     * Finished At
+     */
+    finished_at: string | null;
+};
+
+/**
+ * VehicleCheck
+ *
+ * One item of the preflight check.
+ */
+export type VehicleCheck = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Passed
+     */
+    passed: boolean;
+    /**
+     * Found
+     */
+    found: string;
+    /**
+     * Needed
+     */
+    needed: string;
+    /**
+     * Hint
+     */
+    hint?: string;
+};
+
+/**
  * VehicleChoice
  *
- * Which vehicle flies, and its settings; a setting left out has its default.
+ * Which vehicle flies: a simulation by its kind with its settings, where one left out has its default, or a
+ * registered vehicle by its id, which has settings of its own.
  */
 export type VehicleChoiceInput = {
     /**
@@ -2485,12 +2845,17 @@ export type VehicleChoiceInput = {
     options?: {
         [key: string]: boolean | number | number | string;
     };
+    /**
+     * Id
+     */
+    id?: number | null;
 };
 
 /**
  * VehicleChoice
  *
- * Which vehicle flies, and its settings; a setting left out has its default.
+ * Which vehicle flies: a simulation by its kind with its settings, where one left out has its default, or a
+ * registered vehicle by its id, which has settings of its own.
  */
 export type VehicleChoiceOutput = {
     /**
@@ -2503,6 +2868,49 @@ export type VehicleChoiceOutput = {
     options: {
         [key: string]: boolean | number | number | string;
     };
+    /**
+     * Id
+     */
+    id: number | null;
+};
+
+/**
+ * VehicleEdit
+ *
+ * Changes of a registered vehicle; what is left out stays. Options change only while it is disconnected, and let
+ * the next connection pin the identity anew; safe gains need a statement by whom and why.
+ */
+export type VehicleEdit = {
+    /**
+     * Version
+     *
+     * the version that was edited, as last read
+     */
+    version: number;
+    /**
+     * Name
+     */
+    name?: string | null;
+    /**
+     * Options
+     */
+    options?: {
+        [key: string]: boolean | number | number | string;
+    } | null;
+    /**
+     * Battery
+     */
+    battery?: string | null;
+    /**
+     * Safe Gains
+     */
+    safe_gains?: {
+        [key: string]: number;
+    } | null;
+    /**
+     * Statement
+     */
+    statement?: string | null;
 };
 
 /**
@@ -2539,6 +2947,18 @@ export type VehicleKindInfo = {
      * Options
      */
     options: Array<OptionInfo>;
+};
+
+/**
+ * VehicleOrder
+ *
+ * Why the vehicle is to land, or its motors are to stop, now.
+ */
+export type VehicleOrder = {
+    /**
+     * Reason
+     */
+    reason?: string;
 };
 
 /**
@@ -3115,6 +3535,12 @@ export type CreateTrialData = {
          * a text of the caller's own, new for each act: the same request sent again with it is harmless
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -3216,6 +3642,12 @@ export type FlyTrialData = {
          * a text of the caller's own, new for each act: the same request sent again with it is harmless
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -3244,6 +3676,132 @@ export type FlyTrialResponses = {
 };
 
 export type FlyTrialResponse = FlyTrialResponses[keyof FlyTrialResponses];
+
+export type StageTrialData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/stage';
+};
+
+export type StageTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type StageTrialError = StageTrialErrors[keyof StageTrialErrors];
+
+export type StageTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type StageTrialResponse = StageTrialResponses[keyof StageTrialResponses];
+
+export type UnstageTrialData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/unstage';
+};
+
+export type UnstageTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type UnstageTrialError = UnstageTrialErrors[keyof UnstageTrialErrors];
+
+export type UnstageTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type UnstageTrialResponse = UnstageTrialResponses[keyof UnstageTrialResponses];
+
+export type TakeOffTrialData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/take-off';
+};
+
+export type TakeOffTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type TakeOffTrialError = TakeOffTrialErrors[keyof TakeOffTrialErrors];
+
+export type TakeOffTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type TakeOffTrialResponse = TakeOffTrialResponses[keyof TakeOffTrialResponses];
 
 export type AbortTrialData = {
     /**
@@ -3476,6 +4034,36 @@ export type GetTrajectoryCsvResponses = {
 
 export type GetTrajectoryCsvResponse = GetTrajectoryCsvResponses[keyof GetTrajectoryCsvResponses];
 
+export type GetTelemetryLogData = {
+    body?: never;
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/tlog';
+};
+
+export type GetTelemetryLogErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetTelemetryLogError = GetTelemetryLogErrors[keyof GetTelemetryLogErrors];
+
+export type GetTelemetryLogResponses = {
+    /**
+     * Successful Response
+     */
+    200: Blob | File;
+};
+
+export type GetTelemetryLogResponse = GetTelemetryLogResponses[keyof GetTelemetryLogResponses];
+
 export type ListVehiclesData = {
     body?: never;
     path?: never;
@@ -3514,6 +4102,45 @@ export type ListVehiclesResponses = {
 
 export type ListVehiclesResponse = ListVehiclesResponses[keyof ListVehiclesResponses];
 
+export type RegisterVehicleData = {
+    body: NewVehicle;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path?: never;
+    query?: never;
+    url: '/api/vehicles';
+};
+
+export type RegisterVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type RegisterVehicleError = RegisterVehicleErrors[keyof RegisterVehicleErrors];
+
+export type RegisterVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    201: Vehicle;
+};
+
+export type RegisterVehicleResponse = RegisterVehicleResponses[keyof RegisterVehicleResponses];
+
 export type GetVehicleData = {
     body?: never;
     path: {
@@ -3543,6 +4170,307 @@ export type GetVehicleResponses = {
 };
 
 export type GetVehicleResponse = GetVehicleResponses[keyof GetVehicleResponses];
+
+export type EditVehicleData = {
+    body: VehicleEdit;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}';
+};
+
+export type EditVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type EditVehicleError = EditVehicleErrors[keyof EditVehicleErrors];
+
+export type EditVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    200: Vehicle;
+};
+
+export type EditVehicleResponse = EditVehicleResponses[keyof EditVehicleResponses];
+
+export type ConnectVehicleData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/connect';
+};
+
+export type ConnectVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type ConnectVehicleError = ConnectVehicleErrors[keyof ConnectVehicleErrors];
+
+export type ConnectVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    202: VehicleAct;
+};
+
+export type ConnectVehicleResponse = ConnectVehicleResponses[keyof ConnectVehicleResponses];
+
+export type DisconnectVehicleData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/disconnect';
+};
+
+export type DisconnectVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type DisconnectVehicleError = DisconnectVehicleErrors[keyof DisconnectVehicleErrors];
+
+export type DisconnectVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    202: VehicleAct;
+};
+
+export type DisconnectVehicleResponse = DisconnectVehicleResponses[keyof DisconnectVehicleResponses];
+
+export type CheckVehicleData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/check';
+};
+
+export type CheckVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type CheckVehicleError = CheckVehicleErrors[keyof CheckVehicleErrors];
+
+export type CheckVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    202: VehicleAct;
+};
+
+export type CheckVehicleResponse = CheckVehicleResponses[keyof CheckVehicleResponses];
+
+export type RestoreSafeGainsData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/restore';
+};
+
+export type RestoreSafeGainsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type RestoreSafeGainsError = RestoreSafeGainsErrors[keyof RestoreSafeGainsErrors];
+
+export type RestoreSafeGainsResponses = {
+    /**
+     * Successful Response
+     */
+    202: VehicleAct;
+};
+
+export type RestoreSafeGainsResponse = RestoreSafeGainsResponses[keyof RestoreSafeGainsResponses];
+
+export type ReadParametersData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/parameters';
+};
+
+export type ReadParametersErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type ReadParametersError = ReadParametersErrors[keyof ReadParametersErrors];
+
+export type ReadParametersResponses = {
+    /**
+     * Successful Response
+     */
+    202: VehicleAct;
+};
+
+export type ReadParametersResponse = ReadParametersResponses[keyof ReadParametersResponses];
+
+export type ListActsData = {
+    body?: never;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: {
+        /**
+         * Limit
+         *
+         * how many items the page may hold
+         */
+        limit?: number;
+        /**
+         * Cursor
+         *
+         * `next_cursor` of the page before
+         */
+        cursor?: string | null;
+    };
+    url: '/api/vehicles/{vehicle_id}/acts';
+};
+
+export type ListActsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type ListActsError = ListActsErrors[keyof ListActsErrors];
+
+export type ListActsResponses = {
+    /**
+     * Successful Response
+     */
+    200: PageVehicleAct;
+};
+
+export type ListActsResponse = ListActsResponses[keyof ListActsResponses];
 
 export type ListGivenGainsData = {
     body?: never;
@@ -3587,6 +4515,72 @@ export type ListGivenGainsResponses = {
 
 export type ListGivenGainsResponse = ListGivenGainsResponses[keyof ListGivenGainsResponses];
 
+export type LandVehicleData = {
+    /**
+     * Body
+     */
+    body?: VehicleOrder | null;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/land';
+};
+
+export type LandVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type LandVehicleError = LandVehicleErrors[keyof LandVehicleErrors];
+
+export type LandVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    202: OrderAnswer;
+};
+
+export type LandVehicleResponse = LandVehicleResponses[keyof LandVehicleResponses];
+
+export type StopMotorsData = {
+    /**
+     * Body
+     */
+    body?: VehicleOrder | null;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/motors-off';
+};
+
+export type StopMotorsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type StopMotorsError = StopMotorsErrors[keyof StopMotorsErrors];
+
+export type StopMotorsResponses = {
+    /**
+     * Successful Response
+     */
+    202: OrderAnswer;
+};
+
+export type StopMotorsResponse = StopMotorsResponses[keyof StopMotorsResponses];
+
 export type ReleaseVehicleData = {
     body: Release;
     headers?: {
@@ -3596,6 +4590,12 @@ export type ReleaseVehicleData = {
          * a text of the caller's own, new for each act: the same request sent again with it is harmless
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -3624,6 +4624,74 @@ export type ReleaseVehicleResponses = {
 };
 
 export type ReleaseVehicleResponse = ReleaseVehicleResponses[keyof ReleaseVehicleResponses];
+
+export type GiveUpControlData = {
+    body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/control';
+};
+
+export type GiveUpControlErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GiveUpControlError = GiveUpControlErrors[keyof GiveUpControlErrors];
+
+export type GiveUpControlResponses = {
+    /**
+     * Successful Response
+     */
+    204: void;
+};
+
+export type GiveUpControlResponse = GiveUpControlResponses[keyof GiveUpControlResponses];
+
+export type TakeControlData = {
+    body: LeaseRequest;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/control';
+};
+
+export type TakeControlErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type TakeControlError = TakeControlErrors[keyof TakeControlErrors];
+
+export type TakeControlResponses = {
+    /**
+     * Successful Response
+     */
+    200: Lease;
+};
+
+export type TakeControlResponse = TakeControlResponses[keyof TakeControlResponses];
 
 export type ListJobsData = {
     body?: never;

@@ -1,0 +1,260 @@
+"""What a registered vehicle is asked beside its flights: a person asks, the worker that has its link carries it out.
+
+    request_act → claim_act → finish_act
+                     └ in the same transaction what came of it: vehicle_connected, vehicle_gone, quarantine_vehicle,
+                       vehicle_released, record_held, record_checks
+
+Landing and motors off go another way, past the database; `record_order` writes them down afterwards. At a worker's
+start: `withdraw_acts`, then `forget_connections`, then `request_reconnections`.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from datetime import timedelta
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.core.policy import Gains
+from app.db.models import JsonObject, VehicleActRow, VehicleRow
+from app.db.types import utc_now
+from app.errors import ConflictError
+from app.fleet import repository
+from app.fleet.control import Asker, record_act, require_near, require_no_other
+from app.fleet.schemas import Vehicle, VehicleAct
+from app.fleet.service import hold_gains, move_vehicle, require_idle
+from app.fleet.states import ACT_MOVES, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
+from app.fleet.views import act_view, vehicle_view
+from app.moves import check_action, check_move
+from app.vehicles.base import CheckItem, Identity, OptionValue
+
+BEGINS_WITHIN: Final = timedelta(seconds=10)
+"""How old a request may be when a worker takes it."""
+BY_WORKER: Final = "the worker"
+
+_LOOKS_ONLY: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
+"""Acts that change nothing on the vehicle, and so are open to everybody."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkedVehicle:
+    """What a worker needs to open the link to a vehicle; `identity` is the pinned one, None before the first time."""
+
+    vehicle_id: int
+    name: str
+    kind: str
+    is_real: bool
+    options: dict[str, OptionValue]
+    safe_gains: dict[str, float]
+    identity: Identity | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActTask:
+    """One act, for the worker that carries it out."""
+
+    act_id: int
+    kind: ActKind
+    reason: str
+    vehicle: LinkedVehicle
+
+
+def ask_vehicle(session: Session, vehicle_id: int, kind: ActKind, asker: Asker) -> VehicleAct:
+    """What a person asks. Raises ConflictError in states in which it is not possible or while somebody else is in
+    control, BusyError while something else is under way, NotAllowedError for a real vehicle on an exposed server."""
+    row = repository.get_one(session, vehicle_id)
+    if not row.registered:
+        raise ConflictError(
+            f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, in one go."
+        )
+    return act_view(_requested(session, row, kind, asker))
+
+
+def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: Asker) -> Vehicle:
+    """Out of quarantine, on a person's word; a registered vehicle once the worker has seen it disarmed and holding its
+    safe gains. Raises as `ask_vehicle` does."""
+    row = repository.get_one(session, vehicle_id)
+    if row.registered:
+        _requested(session, row, ActKind.RELEASE, asker, reason=statement)
+        return vehicle_view(row)
+    check_action(ACTIONS, "release", row.state, row.name)
+    by = require_no_other(row, asker)
+    record_act(session, row, ActKind.RELEASE, by=by, reason=statement)
+    vehicle_released(session, row.id)
+    session.flush()
+    return vehicle_view(row)
+
+
+def _requested(session: Session, row: VehicleRow, kind: ActKind, asker: Asker, *, reason: str = "") -> VehicleActRow:
+    check_action(ACTIONS, kind, row.state, row.name)
+    if kind == ActKind.CONNECT:
+        require_near(row, asker)
+    by = "" if kind in _LOOKS_ONLY else require_no_other(row, asker)
+    require_idle(session, row)
+    if kind in {ActKind.CONNECT, ActKind.DISCONNECT}:
+        row.wanted_connected = kind == ActKind.CONNECT
+    return _add(session, row, kind, by=by, reason=reason)
+
+
+def _add(session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: str = "") -> VehicleActRow:
+    act = VehicleActRow(
+        vehicle_id=row.id,
+        kind=kind,
+        state=ActState.REQUESTED,
+        by=by,
+        reason=reason,
+        asked=dict(row.safe_gains) if kind in GIVES_GAINS else None,
+    )
+    session.add(act)
+    session.flush()
+    return act
+
+
+def claim_act(session: Session, worker: str) -> ActTask | None:
+    """The act that has waited longest, now this worker's; None when none waits. One that could not be begun within
+    10 s is given up: nothing happens later than its operator expects it."""
+    while (act := repository.first_requested_act(session)) is not None:
+        if utc_now() - act.requested_at <= BEGINS_WITHIN:
+            _move(act, ActState.RUNNING)
+            act.worker, act.claimed_at = worker, utc_now()
+            return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(act.vehicle))
+        _end(act, problem=f"It could not be begun within {BEGINS_WITHIN.total_seconds():g} s. Ask again.")
+    return None
+
+
+def finish_act(
+    session: Session,
+    act_id: int,
+    *,
+    read_back: Mapping[str, float] | None = None,
+    result: JsonObject | None = None,
+    problem: str = "",
+) -> None:
+    """What came of it; `problem` when it failed. Doing it twice is harmless."""
+    act = repository.get_act(session, act_id)
+    if act.state != ActState.RUNNING:
+        return
+    act.result = result
+    if read_back is not None:
+        act.read_back = dict(read_back)
+        hold_gains(act.vehicle, read_back)
+    _end(act, problem=problem)
+
+
+def withdraw_acts(session: Session, reason: str) -> list[int]:
+    """At a worker's start: what was asked for or under way before is over, and not done by itself later. Gives their
+    ids."""
+    found = repository.acts_under_way(session)
+    for act in found:
+        _end(act, problem=f"It was not finished: {reason}. Ask again if it is still wanted.")
+    return [act.id for act in found]
+
+
+def forget_connections(session: Session) -> None:
+    """At a worker's start: nobody has a link to any vehicle. One that is quarantined stays so."""
+    for row in repository.registered_in(session, VehicleState.READY):
+        move_vehicle(row, VehicleState.DISCONNECTED)
+
+
+def request_reconnections(session: Session) -> list[int]:
+    """At a worker's start: the acts that connect again those vehicles that were wanted connected. Gives their ids."""
+    rows = repository.registered_in(session, VehicleState.DISCONNECTED, VehicleState.QUARANTINED)
+    return [
+        _add(session, row, ActKind.CONNECT, by=BY_WORKER).id
+        for row in rows
+        if row.wanted_connected and repository.act_under_way(session, row.id) is None
+    ]
+
+
+def vehicle_connected(
+    session: Session,
+    vehicle_id: int,
+    identity: Identity,
+    *,
+    concern: str = "",
+    held: Mapping[str, float] | None = None,
+) -> None:
+    """The link is open. The vehicle is ready, or quarantined when there is a `concern`, be it one from before; its
+    identity is pinned the first time. `held`: its gains, where it said them."""
+    row = repository.get_one(session, vehicle_id)
+    row.concern = concern or row.concern
+    if row.identity is None:
+        row.identity = asdict(identity)
+    if held is not None:
+        hold_gains(row, held)
+    _move_to(row, VehicleState.QUARANTINED if row.concern else VehicleState.READY)
+
+
+def vehicle_gone(session: Session, vehicle_id: int, *, concern: str = "") -> None:
+    """The link is closed. A concern outlives that: when it is connected again, the vehicle is quarantined."""
+    row = repository.get_one(session, vehicle_id)
+    row.concern = concern or row.concern
+    _move_to(row, VehicleState.DISCONNECTED)
+
+
+def quarantine_vehicle(session: Session, vehicle_id: int, concern: str) -> None:
+    """Something could not be verified; `concern` says what."""
+    row = repository.get_one(session, vehicle_id)
+    row.concern = concern
+    _move_to(row, VehicleState.QUARANTINED)
+
+
+def vehicle_released(session: Session, vehicle_id: int, *, identity: Identity | None = None) -> None:
+    """A person's word is carried out. `identity`: who answers now, which that person has accepted."""
+    row = repository.get_one(session, vehicle_id)
+    row.concern = ""
+    if identity is not None:
+        row.identity = asdict(identity)
+    _move_to(row, VehicleState.READY)
+
+
+def record_held(session: Session, vehicle_id: int, held: Gains) -> None:
+    """The vehicle has said which gains it holds."""
+    hold_gains(repository.get_one(session, vehicle_id), held)
+
+
+def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]) -> None:
+    """What the preflight check found."""
+    row = repository.get_one(session, vehicle_id)
+    row.checks, row.checked_at = [asdict(check) for check in checks], utc_now()
+
+
+def record_order(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:
+    """After the fact: the vehicle was told to land, or its motors to stop."""
+    row = repository.get_one(session, vehicle_id)
+    act = record_act(session, row, kind, by="", reason=reason)
+    if problem:
+        act.state, act.problem = ActState.FAILED, problem
+
+
+def linked_vehicle(session: Session, vehicle_id: int) -> LinkedVehicle:
+    """Raises NotFoundError."""
+    return _linked(repository.get_one(session, vehicle_id))
+
+
+def _linked(row: VehicleRow) -> LinkedVehicle:
+    return LinkedVehicle(
+        vehicle_id=row.id,
+        name=row.name,
+        kind=row.kind,
+        is_real=row.is_real,
+        options=dict(row.options),
+        safe_gains=dict(row.safe_gains),
+        identity=None if row.identity is None else Identity(**row.identity),
+    )
+
+
+def _move_to(row: VehicleRow, state: VehicleState) -> None:
+    if row.state != state:
+        move_vehicle(row, state)
+
+
+def _move(act: VehicleActRow, to: ActState) -> None:
+    act.state = check_move(ACT_MOVES, act.state, to, f"Act {act.id}")
+
+
+def _end(act: VehicleActRow, *, problem: str) -> None:
+    _move(act, ActState.FAILED if problem else ActState.DONE)
+    act.problem, act.finished_at = problem, utc_now()
+    if problem and act.kind == ActKind.CONNECT and act.by != BY_WORKER:
+        act.vehicle.wanted_connected = False

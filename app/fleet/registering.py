@@ -1,0 +1,167 @@
+"""Registering vehicles one by one, and editing what they are registered with."""
+
+from collections.abc import Mapping
+
+from sqlalchemy.orm import Session
+
+from app.core.experiments import get_experiment
+from app.core.policy import PolicySpace
+from app.db.models import VehicleRow
+from app.errors import ConflictError, InputError, Problem, UnconfirmedError
+from app.fleet import repository
+from app.fleet.control import Asker, record_act, refuse_real, require_near, require_no_other
+from app.fleet.kinds import is_registered_one_by_one
+from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
+from app.fleet.service import require_idle
+from app.fleet.states import ACTIONS, ActKind, VehicleState
+from app.fleet.views import vehicle_view
+from app.moves import check_action, check_version
+from app.schemas import OptionValue
+from app.vehicles.kinds import VehicleKind
+from app.vehicles.open import VEHICLE_KINDS, get_kind
+
+
+def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle:
+    """A vehicle of its own, not connected yet.
+
+    Raises InputError naming what cannot be used, ConflictError when the name is taken, UnconfirmedError when nobody has
+    looked at a real vehicle's safe gains, NotAllowedError for a real one on an exposed server.
+    """
+    kind = get_kind(new.kind, field="kind")
+    if not is_registered_one_by_one(kind):
+        raise InputError(
+            f"Vehicles of kind {kind.name} are not registered: they are there for every campaign.",
+            hint=f"Create a campaign with the vehicle {kind.name}.",
+            problems=(Problem("kind", "has no vehicles of its own"),),
+        )
+    options = kind.check(new.options, field="options", simulation_hosts=asker.simulation_hosts)
+    is_real = kind.is_real_with(options, asker.simulation_hosts)
+    space = _space(kind, options, new.safe_gains)
+    gains = space.check(new.safe_gains, field="safe_gains") if new.safe_gains else space.mapping(space.default)
+    _require_free(session, new.name)
+    if is_real:
+        refuse_real(new.name, asker)
+        _require_confirmed(new, gains)
+    row = VehicleRow(
+        kind=kind.name,
+        name=new.name,
+        title=kind.title,
+        is_real=is_real,
+        registered=True,
+        options=options,
+        safe_gains=gains,
+        state=VehicleState.DISCONNECTED,
+    )
+    session.add(row)
+    session.flush()
+    record_act(session, row, ActKind.SAFE_GAINS, by="", reason=new.statement or "registered", asked=gains)
+    return vehicle_view(row)
+
+
+def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: Asker) -> Vehicle:
+    """Raises ConflictError when somebody else was faster or is in control, or the vehicle is not at rest; InputError
+    naming what cannot be used."""
+    row = repository.get_one(session, vehicle_id)
+    check_version(edit.version, row.version, row.name, _differences(row, edit))
+    if not row.registered:
+        raise ConflictError(
+            f"{row.name} is shared by all campaigns; its settings stand in each of them.", hint="Edit the campaign."
+        )
+    check_action(ACTIONS, "edit", row.state, row.name)
+    require_idle(session, row)
+    by = require_no_other(row, asker)
+    if edit.options is not None:
+        _set_options(row, edit.options, asker)
+    if edit.safe_gains is not None:
+        _set_safe_gains(session, row, edit.safe_gains, statement=edit.statement, by=by)
+    if edit.name is not None and edit.name != row.name:
+        _require_free(session, edit.name, unless=row.id)
+        row.name = edit.name
+    if edit.battery is not None:
+        row.battery = edit.battery.strip()
+    if edit.model_fields_set > {"version"}:
+        row.version += 1
+    session.flush()
+    return vehicle_view(row)
+
+
+def promote_gains(session: Session, row: VehicleRow, gains: Mapping[str, float], *, reason: str, asker: Asker) -> None:
+    """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
+    check_action(ACTIONS, "edit", row.state, row.name)
+    require_idle(session, row)
+    _set_safe_gains(session, row, gains, statement=reason, by=require_no_other(row, asker))
+    row.version += 1
+
+
+def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, object]]:
+    sent = edit.model_dump(exclude={"version", "statement"}, exclude_none=True)
+    return {field: (getattr(row, field), value) for field, value in sent.items()}
+
+
+def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: Asker) -> None:
+    kind = VEHICLE_KINDS[row.kind]
+    options = kind.check({**row.options, **asked}, field="options", simulation_hosts=asker.simulation_hosts)
+    if options == row.options:
+        return
+    if row.state != VehicleState.DISCONNECTED:
+        raise ConflictError(
+            f"{row.name} is connected; its link's settings cannot change under it.",
+            hint="Disconnect it, change them, and connect it again.",
+        )
+    require_near(row, asker)
+    if kind.is_real_with(options, asker.simulation_hosts) != row.is_real:
+        raise InputError(
+            f"{row.name} is {'REAL' if row.is_real else 'simulated'} and stays so: that tells its flights apart.",
+            hint="Register the other one as a vehicle of its own.",
+            problems=(Problem("options", "would make another vehicle of it"),),
+        )
+    _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has others
+    row.options, row.identity, row.checks, row.checked_at = options, None, None, None
+
+
+def _set_safe_gains(
+    session: Session, row: VehicleRow, asked: Mapping[str, float], *, statement: str | None, by: str
+) -> None:
+    gains = _space(VEHICLE_KINDS[row.kind], row.options, asked).check(asked, field="safe_gains")
+    if gains == row.safe_gains:
+        return
+    if statement is None:
+        raise InputError(
+            f"The safe gains of {row.name} are what every flight ends with; who changes them says why.",
+            hint="Say in a sentence who decided that, and from which flights.",
+            problems=(Problem("statement", "is missing"),),
+        )
+    row.safe_gains = gains
+    record_act(session, row, ActKind.SAFE_GAINS, by=by, reason=statement, asked=gains)
+
+
+def _space(kind: VehicleKind, options: Mapping[str, OptionValue], gains: Mapping[str, object] | None) -> PolicySpace:
+    """Of the experiments that such a vehicle flies, the gains of the one that these belong to, or of its usual one."""
+    spaces = [get_experiment(name).space for name in kind.experiments_with(options)]
+    return next((space for space in spaces if set(space.names) == set(gains or ())), spaces[0])
+
+
+def _require_free(session: Session, name: str, *, unless: int | None = None) -> None:
+    taken = repository.of_name_or_none(session, name)
+    if (taken is not None and taken.id != unless) or any(kind.title == name for kind in VEHICLE_KINDS.values()):
+        raise ConflictError(
+            f"Another vehicle is called {name}.",
+            hint="Give this one a name of its own: it stands on every page that shows the vehicle.",
+            problems=(Problem("name", "is taken"),),
+        )
+
+
+def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
+    problems = []
+    if not new.safe_gains_confirmed:
+        problems.append(Problem("safe_gains_confirmed", "must be true once a person has looked at the safe gains"))
+    if not new.statement.strip():
+        problems.append(Problem("statement", "must say who has looked"))
+    if problems:
+        spoken = ", ".join(f"{name} {value:g}" for name, value in gains.items())
+        raise UnconfirmedError(
+            f"{new.name} is a real vehicle, and every flight of it would end with {spoken}: a person has to look at "
+            "these gains first.",
+            hint="Compare them with what flies well on this vehicle, then confirm them and say who did.",
+            problems=tuple(problems),
+        )

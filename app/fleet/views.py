@@ -1,0 +1,154 @@
+"""How vehicles, their acts and their ledger look from outside."""
+
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
+from app.db.paging import decode_cursor, encode_cursor
+from app.fleet import repository
+from app.fleet.control import control_of
+from app.fleet.kinds import can_fly, needs_staging
+from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
+from app.fleet.states import ACTIONS
+from app.moves import allowed
+from app.schemas import OptionValue, Page
+
+_OF_SHARED: Final = frozenset({"fly", "release"})
+_NEWEST_FIRST: Final = "-at"
+
+
+def vehicle_view(row: VehicleRow) -> Vehicle:
+    return Vehicle(
+        id=row.id,
+        version=row.version,
+        kind=row.kind,
+        name=row.name,
+        title=row.title,
+        is_real=row.is_real,
+        can_fly=can_fly(row),
+        registered=row.registered,
+        state=row.state,
+        concern=row.concern,
+        options=row.options,
+        identity=None if row.identity is None else Identity.model_validate(row.identity),
+        safe_gains=row.safe_gains,
+        held=row.held,
+        held_at=row.held_at,
+        checks=None if row.checks is None else [VehicleCheck.model_validate(check) for check in row.checks],
+        checked_at=row.checked_at,
+        battery=row.battery,
+        control=control_of(row),
+        actions=_actions(row),
+    )
+
+
+def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
+    """A campaign's vehicle with its settings."""
+    vehicle = row.vehicle
+    return CampaignVehicle(
+        id=vehicle.id,
+        kind=vehicle.kind,
+        name=vehicle.name,
+        title=vehicle.title,
+        is_real=vehicle.is_real,
+        registered=vehicle.registered,
+        can_fly=can_fly(vehicle),
+        needs_staging=needs_staging(vehicle),
+        state=vehicle.state,
+        options=options_of(row),
+    )
+
+
+def options_of(row: CampaignRow) -> dict[str, OptionValue]:
+    """The settings that a campaign flies with: a registered vehicle's own, else the campaign's."""
+    return dict(row.vehicle.options if row.vehicle.registered else row.vehicle_options)
+
+
+def act_view(row: VehicleActRow) -> VehicleAct:
+    return VehicleAct.model_validate(row, from_attributes=True)
+
+
+def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
+    """The newest first. Raises NotFoundError."""
+    repository.get_one(session, vehicle_id)
+    before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
+    rows, total = repository.acts(session, vehicle_id, before_id=before, limit=limit)
+    following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
+    return Page(items=[act_view(row) for row in rows[:limit]], total=total, next_cursor=following)
+
+
+def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
+    """Every gain set that the vehicle was given, the newest first. Raises NotFoundError."""
+    vehicle = repository.get_one(session, vehicle_id)
+    before = None if cursor is None else decode_cursor(_NEWEST_FIRST, cursor, str)
+    found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
+    shown = [line for line, _ in found[:limit]]
+    of_flights = {"flight", repository.RESTORE_AFTER_FLIGHT}
+    flights = repository.flights_by_id(session, [identity for why, identity in shown if why in of_flights])
+    acts = repository.acts_by_id(session, [identity for why, identity in shown if why not in of_flights])
+    items = []
+    for why, identity in shown:
+        if why == "flight":
+            items.append(_of_flight(flights[identity]))
+        elif why == repository.RESTORE_AFTER_FLIGHT:
+            items.append(_of_restoring(vehicle, flights[identity]))
+        else:
+            items.append(_of_act(acts[identity]))
+    following = encode_cursor(_NEWEST_FIRST, found[limit - 1][1]) if len(found) > limit else None
+    return Page(items=items, total=total, next_cursor=following)
+
+
+def _actions(row: VehicleRow) -> list[str]:
+    possible = allowed(ACTIONS, row.state)
+    if not row.registered:
+        possible = [action for action in possible if action in _OF_SHARED]
+    impossible = set() if can_fly(row) else {"fly", "stage"}
+    if needs_staging(row):
+        impossible.add("fly")
+    return [action for action in possible if action not in impossible]
+
+
+def _of_flight(row: FlightRow) -> GivenGains:
+    return GivenGains(
+        purpose="flight",
+        flight_id=row.id,
+        campaign_id=row.campaign_id,
+        trial_id=row.trial_id,
+        act_id=None,
+        asked=row.gains,
+        read_back=row.read_back,
+        outcome=row.state,
+        asked_at=row.claimed_at,
+    )
+
+
+def _of_restoring(vehicle: VehicleRow, row: FlightRow) -> GivenGains:
+    asked = row.safe_gains if row.safe_gains is not None else vehicle.safe_gains
+    return GivenGains(
+        purpose="restore after flight",
+        flight_id=row.id,
+        campaign_id=row.campaign_id,
+        trial_id=row.trial_id,
+        act_id=None,
+        asked=asked,
+        read_back=row.restored,
+        outcome="done" if row.restored == asked else "failed",
+        asked_at=row.restored_at,
+    )
+
+
+def _of_act(row: VehicleActRow) -> GivenGains:
+    return GivenGains.model_validate(
+        {
+            "purpose": row.kind.value,
+            "flight_id": None,
+            "campaign_id": None,
+            "trial_id": None,
+            "act_id": row.id,
+            "asked": row.asked or {},
+            "read_back": row.read_back,
+            "outcome": row.state.value,
+            "asked_at": row.claimed_at,
+        }
+    )

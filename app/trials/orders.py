@@ -1,0 +1,188 @@
+"""Asking for flights, from their request to the operator's last word before the take-off. The worker's side is in
+`flights`."""
+
+from collections.abc import Collection
+from contextlib import suppress
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import service as campaigns
+from app.campaigns.definitions import definition_of
+from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
+from app.core.errors import GainlineError
+from app.db.models import CampaignRow, FlightRow, TrialRow
+from app.db.types import utc_now
+from app.errors import ConflictError, NotAllowedError
+from app.fleet import service as fleet
+from app.fleet.control import Asker, require_control, require_near, require_no_other
+from app.moves import check_action
+from app.trials import history, repository
+from app.trials.judging import judge_gains
+from app.trials.lifecycle import move_flight, move_trial
+from app.trials.schemas import AbortAnswer, FlightOrder, Trial
+from app.trials.states import ACTIONS, HISTORY, FlightMode, FlightState, TrialState
+from app.trials.views import trial_view
+
+
+def judge_ahead(session: Session, trial_id: int) -> None:
+    """Let the gate simulate before `fly_trial` and `stage_trial` ask it within their transaction."""
+    with suppress(GainlineError):
+        row = repository.get_one(session, trial_id)
+        judge_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
+
+
+def fly_trial(session: Session, trial_id: int, order: FlightOrder, asker: Asker) -> Trial:
+    """Ask for the flight of a planned trial in one go; the worker carries it out.
+
+    Raises ConflictError for an unclassed flight, a spent budget, a campaign that is over or not ready, a vehicle that
+    is not ready or in somebody else's control; GainsError naming what the gate refuses, unless that was overruled;
+    BusyError when the vehicle has a flight already; NotAllowedError for a real vehicle.
+    """
+    return _asked_for(session, trial_id, "fly", order.speed, asker)
+
+
+def stage_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
+    """Have a registered vehicle take the gains of a planned trial, and wait with them for its operator's word.
+
+    Raises as `fly_trial` does; NotAllowedError for a real vehicle on a server that others can reach."""
+    return _asked_for(session, trial_id, "stage", None, asker)
+
+
+def _asked_for(session: Session, trial_id: int, mode: FlightMode, speed: float | None, asker: Asker) -> Trial:
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, mode, row.state, f"Trial {row.number}")
+    campaign = campaigns.get_row(session, row.campaign_id)
+    require_open(session, campaign, HISTORY)
+    judged = judge_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
+    row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
+    request_flight(session, campaign, row, asker, mode=mode, speed=speed)
+    return trial_view(session, campaign, row)
+
+
+def request_flight(
+    session: Session,
+    campaign: CampaignRow,
+    row: TrialRow,
+    asker: Asker,
+    *,
+    mode: FlightMode = "fly",
+    speed: float | None = None,
+) -> None:
+    """The order to the vehicle, for the worker to find. Raises as `fly_trial` does."""
+    vehicle = campaign.vehicle
+    if mode == "stage" and not vehicle.registered:
+        raise ConflictError(f"{vehicle.name} is flown in one go.", hint="Fly it; only registered vehicles are staged.")
+    require_near(vehicle, asker)
+    if mode == "fly" and fleet.needs_staging(vehicle):
+        raise NotAllowedError(
+            f"{vehicle.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
+            hint="Stage the trial; its operator then takes off on the fly page.",
+        )
+    fleet.require_ready(session, vehicle, mode)
+    require_no_other(vehicle, asker)
+    now = utc_now()
+    session.add(
+        FlightRow(
+            campaign_id=campaign.id,
+            trial_id=row.id,
+            vehicle_id=vehicle.id,
+            state=FlightState.REQUESTED,
+            mode=mode,
+            gains=row.gains,
+            speed=speed,
+            battery=vehicle.battery,
+            requested_at=now,
+            take_off_at=now if mode == "fly" else None,
+        )
+    )
+    session.flush()
+
+
+def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
+    """The operator's own act, after which a staged vehicle takes off. For a real one it has to come from a page of
+    ours, with the token of who is in control, on a server that nobody else reaches.
+
+    Raises ConflictError when nothing is staged, the word was given already, or somebody else is in control;
+    NotAllowedError otherwise.
+    """
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, "take-off", row.state, f"Trial {row.number}")
+    campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
+    if flight.take_off_at is not None:
+        raise ConflictError(f"The take-off of trial {row.number} was asked for already.", hint="Watch the flight.")
+    vehicle = campaign.vehicle
+    if fleet.needs_staging(vehicle):
+        require_control(vehicle, asker)
+    else:
+        require_no_other(vehicle, asker)
+    flight.take_off_at = utc_now()
+    return trial_view(session, campaign, row)
+
+
+def unstage_trial(session: Session, trial_id: int) -> Trial:
+    """Have a staged vehicle's safe gains restored; its trial is planned again once they are. Raises ConflictError when
+    nothing is staged."""
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, "unstage", row.state, f"Trial {row.number}")
+    _staged(session, row).stand_down = "unstaged by the operator"
+    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+
+
+def _staged(session: Session, row: TrialRow) -> FlightRow:
+    flight = repository.latest_flights(session, [row.id]).get(row.id)
+    if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING:
+        raise ConflictError(f"Trial {row.number} flies in one go.", hint="Watch it, or abort it.")
+    if flight.stand_down:
+        raise ConflictError(
+            f"Trial {row.number} is being unstaged: {flight.stand_down}.", hint="Wait until it is planned again."
+        )
+    return flight
+
+
+def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer:
+    """Abort a flight that no worker has begun; one that is over needs none. Raises ConflictError when none was asked
+    for, or its worker does not answer."""
+    row = repository.get_one(session, trial_id)
+    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    if flight is not None and flight.state == FlightState.REQUESTED:
+        move_flight(flight, FlightState.CANCELLED, problem=reason)
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
+    if flight is not None and flight.state == FlightState.RUNNING:
+        raise ConflictError(
+            f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
+            hint="Abort again. If a vehicle is in the air, use its own remote control now.",
+        )
+    if flight is not None:
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight is over already.")
+    raise ConflictError(
+        f"Trial {row.number} is {row.state}: there is no flight to abort.",
+        hint="None was asked for; load the trial again.",
+    )
+
+
+def cancel_trial(session: Session, trial_id: int) -> Trial:
+    """Give up a trial before its lift-off. Raises ConflictError when it is too late for that."""
+    row = repository.get_one(session, trial_id)
+    check_action(ACTIONS, "cancel", row.state, f"Trial {row.number}")
+    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    if flight is not None and flight.state == FlightState.REQUESTED:
+        move_flight(flight, FlightState.CANCELLED, problem="the trial was cancelled")
+    move_trial(row, TrialState.CANCELLED, reason="cancelled by the operator")
+    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+
+
+def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
+    """Raises ConflictError unless the campaign can take another trial now; those in `spent_by` use up its budget."""
+    check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
+    trials = history.trials_of(session, campaign.id)
+    budget = definition_of(campaign).stop.max_flights
+    if sum(row.state in spent_by for row in trials) >= budget:
+        raise ConflictError(
+            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
+            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
+        )
+    if (waiting := history.unclassed(trials)) is not None:
+        raise ConflictError(
+            f"Flight {waiting.number} waits for its class.",
+            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
+        )
