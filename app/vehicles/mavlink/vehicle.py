@@ -100,7 +100,11 @@ class MavlinkVehicle:
         self._staged = False
         self._radio.listen(0.0)
         preflight.require_disarmed(self._radio)
-        held = parameters.write_gains(self._radio, self._gain_set, wanted)
+        try:
+            held = parameters.write_gains(self._radio, self._gain_set, wanted)
+        except VehicleError:
+            self._unstage()
+            raise
         self._staged = held == wanted
         return held
 
@@ -127,8 +131,19 @@ class MavlinkVehicle:
                 "No gains were staged for this flight, so it was not started.",
                 hint="Stage the gains, compare what is read back, then fly.",
             )
-        ground = preflight.stand(self._radio, min_battery_v=float(self._options["min_battery_v"]), watched_s=STAND_S)
-        if (stop := should_stop()) is not None:
+        try:
+            ground = preflight.stand(
+                self._radio, min_battery_v=float(self._options["min_battery_v"]), watched_s=STAND_S
+            )
+            stop = should_stop()
+        except SafeGainsError as error:
+            self._state, self._why = State.QUARANTINE, str(error)
+            raise
+        except BaseException:
+            self._unstage()
+            raise
+        if stop is not None:
+            self._unstage()
             return self._not_begun(ground, stop.reason)
         flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
@@ -174,6 +189,17 @@ class MavlinkVehicle:
                 landing_modes=profile.landing_modes,
             ).stretched(self._patience),
         )
+
+    def _unstage(self) -> None:
+        """Back to the safe gains, for what was staged will not fly; in quarantine where they cannot be verified."""
+        self._staged = False
+        try:
+            problem = self._restore()
+        except VehicleError as error:
+            problem = str(error)
+        if problem:
+            self._enter(State.QUARANTINE)
+            self._why = f"Its safe gains could not be verified: {problem}"
 
     def _restore(self) -> str:
         """Write the safe gains; what is wrong with those read back, or nothing. Raises VehicleError for silence."""
