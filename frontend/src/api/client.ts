@@ -2,12 +2,19 @@
 
 import { randomKey } from "../lib/ids";
 import { ApiError, problemFrom } from "../lib/problems";
+import { controlHeader } from "../live/leases";
 import { client } from "./generated/client.gen";
 
 client.setConfig({ baseUrl: "" });
 
+const OF_VEHICLE = /\/api\/vehicles\/(\d+)(\/|$)/;
+
 client.interceptors.request.use((request) => {
   if (request.method === "POST") request.headers.set("Idempotency-Key", randomKey());
+  const vehicleId = OF_VEHICLE.exec(new URL(request.url).pathname)?.[1];
+  for (const [name, value] of Object.entries(vehicleId === undefined ? {} : controlHeader(Number(vehicleId)))) {
+    request.headers.set(name, value);
+  }
   return request;
 });
 

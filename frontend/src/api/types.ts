@@ -28,5 +28,7 @@ export type {
   Trial,
   TrialState,
   Trouble,
+  Vehicle,
+  VehicleCheck,
   VehicleKindInfo,
 } from "./generated";

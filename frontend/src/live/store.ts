@@ -11,7 +11,7 @@ export interface Connection {
 
 type Listener = () => void;
 
-class Store<Value> {
+export class Store<Value> {
   private value: Value;
   private readonly listeners = new Set<Listener>();
 

@@ -1,0 +1,76 @@
+/** Being in control of a vehicle: taken, renewed while the tab lives, handed over. */
+
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useEffect } from "react";
+import { problemOf } from "../lib/problems";
+import { dropLease, holdLease, leasesNow, type OwnLease } from "../live/leases";
+import { answer } from "./client";
+import { giveUpControl, takeControl } from "./generated";
+
+const RENEW_MS = 5000;
+
+async function ask(vehicleId: number, operator: string, takeOver: boolean): Promise<OwnLease> {
+  const own = leasesNow().get(vehicleId);
+  const body = { operator, take_over: takeOver, ...(own === undefined ? {} : { token: own.token }) };
+  const lease = await answer(takeControl({ path: { vehicle_id: vehicleId }, body }));
+  return { operator: lease.operator, token: lease.token };
+}
+
+/** A refusal ends one's control: somebody else has it. A server that is away may come back within the lease. */
+async function renew(vehicleId: number, { operator }: OwnLease): Promise<boolean> {
+  try {
+    holdLease(vehicleId, await ask(vehicleId, operator, false));
+    return true;
+  } catch (error) {
+    const status = problemOf(error)?.status ?? 0;
+    if (status < 400 || status >= 500) return true;
+    dropLease(vehicleId);
+    return false;
+  }
+}
+
+/** Keeps what this tab is in control of, as long as the tab is open. */
+export function useRenewedControl(): void {
+  const queries = useQueryClient();
+  useEffect(() => {
+    async function renewAll(): Promise<void> {
+      const kept = await Promise.all([...leasesNow()].map(([vehicleId, lease]) => renew(vehicleId, lease)));
+      if (kept.includes(false)) await queries.invalidateQueries({ queryKey: ["vehicles"] });
+    }
+    const renewAgain = (): void => void renewAll();
+    renewAgain();
+    const renewing = setInterval(renewAgain, RENEW_MS);
+    document.addEventListener("visibilitychange", renewAgain);
+    return () => {
+      clearInterval(renewing);
+      document.removeEventListener("visibilitychange", renewAgain);
+    };
+  }, [queries]);
+}
+
+function useVehicleChanged(vehicleId: number): () => Promise<unknown> {
+  const queries = useQueryClient();
+  return () =>
+    Promise.all([
+      queries.invalidateQueries({ queryKey: ["vehicles"] }),
+      queries.invalidateQueries({ queryKey: ["vehicle", vehicleId] }),
+    ]);
+}
+
+export function useTakeControl(vehicleId: number) {
+  const changed = useVehicleChanged(vehicleId);
+  return useMutation({
+    mutationFn: ({ operator, takeOver }: { operator: string; takeOver: boolean }) => ask(vehicleId, operator, takeOver),
+    onSuccess: (lease) => holdLease(vehicleId, lease),
+    onSettled: changed,
+  });
+}
+
+export function useHandOver(vehicleId: number) {
+  const changed = useVehicleChanged(vehicleId);
+  return useMutation({
+    mutationFn: () => answer(giveUpControl({ path: { vehicle_id: vehicleId } })),
+    onSuccess: () => dropLease(vehicleId),
+    onSettled: changed,
+  });
+}
