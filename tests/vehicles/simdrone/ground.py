@@ -188,3 +188,11 @@ def free_port() -> int:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
+
+
+def eventually(holds: Callable[[], bool], within_s: float = 20.0) -> None:
+    """Raises AssertionError when it did not come to hold in so many seconds of this computer's clock."""
+    until_s = time.monotonic() + within_s
+    while not holds():
+        assert time.monotonic() < until_s
+        time.sleep(0.05)

@@ -3,8 +3,7 @@
 Its time-outs are seconds of this computer's clock; the drones live faster.
 """
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -16,11 +15,10 @@ from mavsdk.plugins.info.info import Info, InfoError
 from mavsdk.plugins.param.param import Param
 from mavsdk.plugins.telemetry.telemetry import Telemetry
 
-from tests.vehicles.simdrone.ground import free_port, served
+from tests.vehicles.simdrone.ground import eventually, free_port, served
 
 SPEED = 5.0
 FOUND_WITHIN_S = 15.0
-DONE_WITHIN_S = 20.0
 
 
 @dataclass
@@ -62,14 +60,6 @@ def knows(info: Any) -> bool:
     except InfoError:
         return False
     return True
-
-
-def eventually(holds: Callable[[], bool], within_s: float = DONE_WITHIN_S) -> None:
-    """Raises AssertionError when it did not come to hold in so many seconds."""
-    until_s = time.monotonic() + within_s
-    while not holds():
-        assert time.monotonic() < until_s
-        time.sleep(0.05)
 
 
 @pytest.mark.parametrize(
