@@ -51,6 +51,15 @@ GivenSettings = Annotated[
         ),
     ),
 ]
+GivenGains = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--gains",
+        metavar="NAME=NUMBER,…",
+        show_default=False,
+        help="A gain set to be flown under the strategy manual. Repeatable: they are flown in this order.",
+    ),
+]
 Overrule = Annotated[
     str,
     typer.Option(metavar="REASON", show_default=False, help="Fly gains that the gate refuses all the same; say why."),
@@ -122,6 +131,7 @@ def run(
     ] = None,
     strategy: Annotated[str | None, typer.Option(help="How the next gains are found.", show_default=False)] = None,
     start: StartGains = None,
+    gains: GivenGains = None,
     settings: GivenSettings = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random.", show_default=False)] = None,
     max_flights: Annotated[
@@ -140,6 +150,7 @@ def run(
         start=start,
         seed=seed,
         max_flights=max_flights,
+        gains=gains or [],
         settings=settings or [],
         json_out=json_out,
         overrule=overrule,

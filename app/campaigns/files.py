@@ -2,27 +2,33 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
+from app.core.checking import MAX_FLIGHTS
+from app.core.definition import Definition
+from app.core.experiments import experiment_of
 from app.core.policy import shortened
+from app.core.strategies.manual import MANUAL
 from app.errors import InputError, NotFoundError, Problem
-from app.schemas import Text
+from app.schemas import Number, Text
 
 PRESETS_DIR: Final = Path(__file__).parent / "presets"
 MAX_FILE_BYTES: Final = 2**20
 
 
 class CampaignFile(NewCampaign):
-    """What a campaign file holds; what is left out has the same working default as over REST."""
+    """What a campaign file holds; what is left out has the same working default as over REST. `gains` are the sets that
+    `gainline run` flies one after the other under the strategy `manual`."""
 
     description: Text = ""
+    gains: Annotated[list[dict[str, Number]], Field(max_length=MAX_FLIGHTS)] = Field(default_factory=list)
 
 
 def preset_names() -> tuple[str, ...]:
@@ -49,11 +55,28 @@ def read_campaign_file(path: Path) -> CampaignFile:
         reason = "'campaign' needs the database that holds the other one: create it over the API or in the dashboard"
         raise _no_campaign(path, (_located(document, ("definition", "start", "kind"), reason),))
     try:
-        check_campaign(file.definition, file.vehicle)
+        definition, _ = check_campaign(file.definition, file.vehicle)
+        gains_by_hand(file, definition)
     except InputError as error:
-        problems = tuple(_located(document, problem.field.split("."), problem.reason) for problem in error.problems)
+        problems = tuple(_located(document, _steps(problem.field), problem.reason) for problem in error.problems)
         raise _no_campaign(path, problems) from error
     return file
+
+
+def gains_by_hand(
+    file: CampaignFile, definition: Definition, *, within_bounds: bool = False
+) -> tuple[dict[str, float], ...]:
+    """The sets to be flown, each complete and in the experiment's order. Raises InputError naming what is wrong in
+    which (`gains.0.kp`), and for sets that the strategy would not look at."""
+    if file.gains and definition.strategy != MANUAL.name:
+        raise InputError(
+            "These gains would not be flown.",
+            problems=(Problem("gains", f"are chosen by the strategy {definition.strategy!r} itself"),),
+            hint=f"Leave them out, or choose the strategy {MANUAL.name!r}.",
+        )
+    space = experiment_of(definition).space.narrowed(definition.bounds)
+    accept = space.check if within_bounds else space.complete
+    return tuple(accept(gains, field=f"gains.{place}") for place, gains in enumerate(file.gains))
 
 
 def _no_campaign(path: Path, problems: tuple[Problem, ...]) -> InputError:
@@ -90,6 +113,11 @@ def _load(path: Path) -> CommentedMap:
             problems=(Problem("line 1", "must hold fields, `name: …` and so on"),),
         )
     return document
+
+
+def _steps(field: str) -> list[str | int]:
+    """The way to a field, as in `gains.0.kp`."""
+    return [int(part) if part.isdecimal() else part for part in field.split(".")]
 
 
 def _located(document: CommentedMap, where: Sequence[str | int], reason: str) -> Problem:

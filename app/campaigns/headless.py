@@ -11,10 +11,12 @@ from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.gate import check_policy, require_flyable
 from app.core.glitches import find_glitches
+from app.core.policy import Gains
 from app.core.predictions import prediction_of
 from app.core.proposing import next_proposal
 from app.core.stopping import judge, landing_battery_v
-from app.core.strategies.base import Interval, Kind, Proposal
+from app.core.strategies.base import Explanation, Interval, Kind, Proposal
+from app.core.strategies.history import was_flown
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import get_kind, open_vehicle
@@ -66,9 +68,11 @@ def fly_campaign(
     options: Mapping[str, OptionValue],
     watcher: Watcher,
     *,
+    gains: Sequence[Gains] = (),
     overrule: str = "",
 ) -> HeadlessCampaign:
-    """Fly proposals as fast as possible until the campaign's own rule ends it.
+    """Fly proposals as fast as possible until the campaign's own rule ends it; in their place `gains`, complete sets of
+    one's own, until all are flown.
 
     `overrule` is the reason why gains that the gate refuses shall fly all the same, on a simulated vehicle. There is
     nobody here to look at glitches: a flight with any does not count.
@@ -87,6 +91,12 @@ def fly_campaign(
         proposal = next_proposal(definition, history)
         if why := _ended_because(definition, trials, history, proposal, battery_v):
             return HeadlessCampaign(trials=tuple(trials), stopped_because=why)
+        if gains:
+            if number > len(gains):
+                return HeadlessCampaign(
+                    trials=tuple(trials), stopped_because=f"All {len(gains)} gain sets that were given are flown."
+                )
+            proposal = _by_hand(gains[number - 1], history)
         overruled = _require_flyable(definition, experiment, proposal, history, overrule, is_real)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
@@ -95,6 +105,17 @@ def fly_campaign(
         trials.append(trial)
         watcher.landed(trial)
         history.extend(_remembered(trial, proposal, record))
+
+
+def _by_hand(gains: Gains, history: Sequence[Flight]) -> Proposal:
+    """What a person or a script has chosen promises nothing."""
+    return Proposal(
+        kind="repeat" if was_flown(gains, history) else "manual",
+        gains=dict(gains),
+        predicted=None,
+        predicted_error=None,
+        explanation=Explanation(summary="Given on the command line or in the campaign's file."),
+    )
 
 
 def _ended_because(

@@ -22,21 +22,27 @@ def override(
     start: str | None = None,
     seed: int | None = None,
     max_flights: int | None = None,
+    gains: Sequence[str] = (),
     settings: Sequence[str] = (),
 ) -> CampaignFile:
     """The file with what was given on the command line in place of its own.
 
     Another vehicle or strategy starts from its default options; `vehicle` may name an address too, as in
-    mavlink:udp:127.0.0.1:4245. Raises InputError naming what cannot be used.
+    mavlink:udp:127.0.0.1:4245. Each of `gains` is a set to be flown by hand. Raises InputError naming what cannot be
+    used.
     """
     chosen: dict[Path, object] = {}
-    if vehicle is not None and vehicle != file.vehicle.kind:
+    if vehicle is not None:
         kind, _, address = vehicle.partition(":")
-        chosen |= {("vehicle", "kind"): kind, ("vehicle", "options"): {"address": address} if address else {}}
+        options = file.vehicle.options if kind == file.vehicle.kind else {}
+        chosen[("vehicle", "kind")] = kind
+        chosen[("vehicle", "options")] = options | ({"address": address} if address else {})
     if strategy is not None and strategy != file.definition.strategy:
         chosen |= {("definition", "strategy"): strategy, ("definition", "options"): {}}
     if start is not None:
         chosen[("definition", "start")] = _start(start, file.definition.experiment)
+    if gains:
+        chosen[("gains",)] = [_gains(text, file.definition.experiment, "--gains") for text in gains]
     if seed is not None:
         chosen[("definition", "seed")] = seed
     if max_flights is not None:
@@ -48,18 +54,28 @@ def override(
 def _start(text: str, experiment: str) -> Mapping[str, object]:
     if text in ("default", "simplex"):
         return {"kind": text}
-    names = get_experiment(experiment).space.names
+    return {"kind": "given", "gains": _gains(text, experiment, "--start", "default, simplex, or ")}
+
+
+def _gains(text: str, experiment: str, option: str, others: str = "") -> dict[str, float]:
+    """A set as NAME=NUMBER,… in any order, or as numbers in the experiment's own."""
+    space = get_experiment(experiment).space
+    parts = text.split(",")
+    pairs = [part.partition("=") for part in parts]
+    named = all(separator for _, separator, _ in pairs)
+    names = [name.strip() for name, _, _ in pairs] if named else list(space.names)
     try:
-        values = [float(part) for part in text.split(",")]
+        values = [float(number if named else part) for part, (_, _, number) in zip(parts, pairs, strict=True)]
     except ValueError:
         values = []
-    if len(values) != len(names):
+    if len(values) != len(names) or len(set(names)) != len(names):
+        example = ",".join(f"{name}={value:g}" for name, value in space.mapping(space.default).items())
         raise InputError(
-            "The start cannot be used.",
-            problems=(Problem("--start", f"cannot be {text!r}"),),
-            hint=f"Give default, simplex, or the gains {','.join(names)} as numbers: 283,13,82.",
+            "These gains cannot be used.",
+            problems=(Problem(option, f"cannot be {text!r}"),),
+            hint=f"Give {others}every gain by its name, {example}, or the numbers alone in this order.",
         )
-    return {"kind": "given", "gains": dict(zip(names, values, strict=True))}
+    return dict(zip(names, values, strict=True))
 
 
 def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[Path, object]:

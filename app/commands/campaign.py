@@ -9,11 +9,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 from app.campaigns.definitions import check_campaign, stored
-from app.campaigns.files import CampaignFile, preset_names, read_campaign_file, read_preset
+from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
 from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly_campaign
 from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
 from app.core.definition import Definition
+from app.core.envelope import envelope_of
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.strategies.base import Proposal
@@ -31,6 +32,7 @@ def run_campaign(
     start: str | None,
     seed: int | None,
     max_flights: int | None,
+    gains: Sequence[str],
     settings: Sequence[str],
     json_out: Path | None,
     overrule: str = "",
@@ -43,15 +45,20 @@ def run_campaign(
         start=start,
         seed=seed,
         max_flights=max_flights,
+        gains=gains,
         settings=settings,
     )
     definition, options = check_campaign(file.definition, file.vehicle)
     _require_wings(file.vehicle.kind, options)
     experiment = experiment_of(definition)
+    given = gains_by_hand(file, definition, within_bounds=not overrule)
     out = console(json_out)
     with _Display(definition, experiment) as display:
-        campaign = fly_campaign(definition, file.vehicle.kind, options, display.watcher, overrule=overrule)
+        campaign = fly_campaign(definition, file.vehicle.kind, options, display.watcher, gains=given, overrule=overrule)
     _print(out, file, experiment, campaign)
+    if get_kind(file.vehicle.kind).is_real:  # a simulation of a real one; fly_campaign has raised if this is not so
+        safe_gains = envelope_of(definition, experiment).safe_gains
+        out.print(f"The vehicle holds its safe gains again, read back: {_gains(safe_gains)}.")
     write_json(json_out, _document(file, definition, options, campaign))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from app.campaigns.definitions import check_campaign
-from app.campaigns.files import CampaignFile, preset_names, read_campaign_file, read_preset
+from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
 from app.core.definition import Definition
 from app.errors import InputError, NotFoundError
 
@@ -23,8 +23,19 @@ def checked(file: CampaignFile) -> Definition:
 
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_is_a_campaign_that_can_be_created(name: str) -> None:
-    definition = checked(read_preset(name))
-    assert definition.experiment == ("pitch-tracking" if name.startswith("f16") else "takeoff")
+    file = read_preset(name)
+    definition = checked(file)
+    of_its_own = {"f16": "pitch-tracking", "ardupilot": "takeoff-ardupilot", "px4": "takeoff-px4"}
+    assert definition.experiment == of_its_own.get(name.split("-", maxsplit=1)[0], "takeoff")
+    assert len(file.gains) == (definition.stop.max_flights if definition.strategy == "manual" else 0)
+
+
+def test_the_gain_sets_of_a_file_are_complete_and_in_the_experiments_order(tmp_path: Path) -> None:
+    text = "name: x\ndefinition: {strategy: manual}\ngains:\n  - {kd: 82, kp: 283, ki: 13}\n"
+    file = read_campaign_file(written(tmp_path, text))
+    assert [list(gains.items()) for gains in gains_by_hand(file, checked(file))] == [
+        [("kp", 283), ("ki", 13), ("kd", 82)]
+    ]
 
 
 def test_a_name_is_all_that_a_campaign_file_needs(tmp_path: Path) -> None:
@@ -42,6 +53,13 @@ def test_a_name_is_all_that_a_campaign_file_needs(tmp_path: Path) -> None:
         ("name: x\n\ndefinition:\n  strategy: prayer\n", "line 4, definition.strategy"),
         ("name: x\ndefinition:\n  stop: {max_flights: 0}\n", "line 3, definition.stop.max_flights"),
         ("name: x\nvehicle:\n  kind: twin\n  options: {wind: 3}\n", "line 4, vehicle.options.wind"),
+        ("name: x\ndefinition: {strategy: manual}\ngains:\n  - {kp: 283, ki: 13}\n", "line 4, gains.0.kd"),
+        ("name: x\ndefinition: {strategy: gradient}\ngains:\n  - {kp: 1, ki: 1, kd: 1}\n", "line 3, gains"),
+        ("name: x\nvehicle: {kind: mavlink}\ndefinition: {experiment: takeoff-px4}\n", "line 3, definition.strategy"),
+        (
+            "name: x\nvehicle:\n  kind: mavlink\n  options: {autopilot: px4}\n",
+            "line 1, definition.experiment",
+        ),
         ("vehicle: {kind: twin}\n", "line 1, name"),
         ("name: x\nname: y\n", "line 2"),
         ("name: [x\n", "line 2"),

@@ -74,6 +74,21 @@ def test_given_gains_start_the_campaign_and_the_budget_ends_it(tmp_path: Path) -
     assert campaign["stopped_because"] == "All 1 flights of the budget are flown."
 
 
+def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Path) -> None:
+    by_hand = ("--strategy", "manual", "--gains", "283,13,82", "--gains", "kd=81,kp=286,ki=60", "--gains", "283,13,82")
+    campaign = flown(tmp_path, *RUN_ON_TWIN, *by_hand)
+    assert [tuple(trial["gains"].values()) for trial in campaign["trials"]] == [
+        (283, 13, 82),
+        (286, 60, 81),
+        (283, 13, 82),
+    ]
+    assert [trial["kind"] for trial in campaign["trials"]] == ["manual", "manual", "repeat"]
+    assert [trial["predicted_error"] for trial in campaign["trials"]] == [None, None, None]
+    assert errors(campaign)[1] == pytest.approx(0.2341, rel=0.01)
+    assert errors(campaign)[2] == errors(campaign)[0]
+    assert campaign["stopped_because"] == "All 3 gain sets that were given are flown."
+
+
 def test_the_table_has_a_row_for_each_run(tmp_path: Path) -> None:
     result = gainline(*RUN_ON_TWIN, "--max-flights", "2")
     assert result.exit_code == 0
@@ -104,6 +119,11 @@ def test_json_can_go_to_standard_output_alone() -> None:
         (("--start", "283,13.5,82"), "definition.start.gains.ki"),
         (("--start", "283,13,410"), "definition.start.gains.kd"),
         (("--start", "nan,13,82"), "definition.start.gains.kp"),
+        (("--gains", "283,13,82"), "gains"),
+        (("--strategy", "manual", "--gains", "283,13"), "--gains"),
+        (("--strategy", "manual", "--gains", "kp=283,ki=13,82"), "--gains"),
+        (("--strategy", "manual", "--gains", "kp=283,ki=13,kx=82"), "gains.0.kd"),
+        (("--strategy", "manual", "--gains", "283,13,82", "--gains", "283,13,500"), "gains.1.kd"),
         (("--json", "/nowhere/out.json", "--max-flights", "1"), "--json"),
     ],
 )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import FittedParameter, ModelledExperiment
+from app.core.experiments.base import Experiment, FittedParameter, ModelledExperiment
 from app.core.options import Option
 from app.core.policy import PolicySpace
 from app.core.spread import Spread
@@ -94,6 +94,11 @@ class Strategy:
     experiments: tuple[str, ...] = ()
     learns: bool = True
     needs_model: bool = True
+
+    def works_with(self, experiment: Experiment) -> bool:
+        """Whether a campaign may combine the two."""
+        named = not self.experiments or experiment.name in self.experiments
+        return named and not (self.needs_model and experiment.modelled is None)
 
 
 def band_channels(output: str) -> tuple[str, str]:

@@ -1,0 +1,124 @@
+"""Three trials by hand on each copter: `gainline run` and `gainline sim-drone` as processes, over a real link."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Final
+
+import pytest
+from typer.testing import CliRunner
+
+from app.campaigns.files import read_preset
+from app.cli import app
+from app.vehicles.mavlink.addresses import UdpAddress, parse
+from app.vehicles.mavlink.clock import ScaledClock
+from app.vehicles.mavlink.dialects import number, text
+from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.profiles import PROFILES
+from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
+
+GAINLINE = Path(sys.executable).parent / "gainline"
+SPEED: Final = 6
+CLOCK_SPEED: Final = "clock_speed=2"
+"""The ground's clock runs slower than the drone's, so that a busy machine does not make time-outs pass."""
+HELD: Final[Mapping[str, Mapping[str, float]]] = {
+    "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 1.0, "PSC_ACCZ_D": 0.0},
+    "ardupilot-4.7": {"PSC_D_POS_P": 1.0, "PSC_D_VEL_P": 5.0, "PSC_D_ACC_P": 0.05, "PSC_D_ACC_I": 0.1},
+    "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 2.0, "MPC_Z_VEL_D_ACC": 0.0},
+}
+"""By the vehicle's own names."""
+
+
+def said(stream: IO[str] | None, words: str) -> None:
+    assert stream is not None
+    for line in stream:
+        if words in line:
+            return
+    raise AssertionError(f"it ended before it said {words!r}")
+
+
+@contextmanager
+def drone(autopilot: str, *options: str) -> Iterator[str]:
+    """A simulated one; gives the address at which a ground station reaches it."""
+    address = UdpAddress(LOOPBACK, free_port(), free_port())
+    link = f"udp:{LOOPBACK}:{address.local_port}@{address.port}"
+    body = ("--vehicle", "twin", "--speed", str(SPEED))
+    command = [str(GAINLINE), "sim-drone", "--autopilot", autopilot, "--link", link, *body, *options]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    ) as process:
+        try:
+            said(process.stdout, f"Its time runs {SPEED} times")
+            yield str(address)
+        finally:
+            process.send_signal(signal.SIGTERM)
+
+
+def held_by(address: str, profile: str, names: Mapping[str, float]) -> dict[str, float]:
+    """What the vehicle says it holds, asked as any ground station asks."""
+    found: dict[str, float] = {}
+    until_s = time.monotonic() + 20.0
+    with Link(parse(address), PROFILES[profile].dialect, clock=ScaledClock(1.0)) as link:
+        while len(found) < len(names) and time.monotonic() < until_s:
+            for name in names.keys() - found.keys():
+                whom = {"target_system": 1, "target_component": 1}
+                link.send("PARAM_REQUEST_READ", **whom, param_id=name, param_index=-1)
+            for received in link.receive(0.2):
+                message = received.message
+                if message.get_type() == "PARAM_VALUE" and text(message, "param_id") in names:
+                    found[text(message, "param_id")] = number(message, "param_value")
+    return found
+
+
+@pytest.mark.parametrize("autopilot", HELD)
+def test_three_sets_are_flown_by_hand_and_the_safe_gains_are_back(tmp_path: Path, autopilot: str) -> None:
+    profile = autopilot.split("-", maxsplit=1)[0]
+    out = tmp_path / "campaign.json"
+    with drone(autopilot) as address:
+        named = ("--vehicle", f"mavlink:{address}", "--set", CLOCK_SPEED, "--json", out)
+        result = subprocess.run(
+            [GAINLINE, "run", f"{profile}-takeoff", *named], capture_output=True, text=True, timeout=300.0, check=False
+        )
+        assert result.returncode == 0, result.stderr
+        held = held_by(address, profile, HELD[autopilot])
+    trials = json.loads(out.read_text())["trials"]
+    assert [trial["outcome"] for trial in trials] == ["valid"] * 3, [trial["reason"] for trial in trials]
+    assert [trial["gains"] for trial in trials] == read_preset(f"{profile}-takeoff").gains
+    assert all(0.05 < trial["error"] < 0.6 for trial in trials)
+    assert [(trial["kind"], trial["predicted_error"]) for trial in trials] == [("manual", None)] * 3
+    assert held == pytest.approx(HELD[autopilot])
+    assert "The vehicle holds its safe gains again, read back:" in result.stdout
+
+
+def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> None:
+    with drone("px4", "--no-failsafes") as address:
+        named = ("--vehicle", f"mavlink:{address}", "--set", CLOCK_SPEED)
+        result = CliRunner().invoke(app, ["run", "px4-takeoff", *named])
+    assert result.exit_code == 1
+    assert "failsafes are off" in " ".join(result.stderr.split())
+    assert "NAV_DLL_ACT" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said_of_it"),
+    [
+        (("px4-takeoff", "--set", "autopilot=ardupilot"), "definition.experiment: 'takeoff-px4' has other gains than"),
+        (("px4-takeoff", "--strategy", "gradient"), "there is no model of what the gains of 'takeoff-px4' do"),
+        (
+            ("ardrone-takeoff", "--vehicle", "mavlink:udpin:127.0.0.1:14550", "--set", "autopilot=px4"),
+            "definition.experiment: 'takeoff' has other gains than this vehicle, which flies takeoff-px4",
+        ),
+    ],
+)
+def test_gains_of_another_autopilot_are_refused_before_anything_is_opened(
+    arguments: tuple[str, ...], said_of_it: str
+) -> None:
+    result = CliRunner().invoke(app, ["run", *arguments])
+    assert result.exit_code == 1
+    assert said_of_it in " ".join(result.stderr.split())
