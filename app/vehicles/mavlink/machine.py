@@ -171,7 +171,9 @@ def _landing(trial: Trial, event: Event) -> Step:
 
 def _resting(trial: Trial, now_s: float) -> Trial:
     """Note since when it has been at rest: on the ground by height and speed, or by speed alone once its motors are
-    off, for some autopilots' altitude drifts."""
+    off, for some autopilots' altitude drifts. A lone sample that jumps says nothing either way."""
+    if trial.watch.doubted is not None:
+        return trial
     if trial.watch.armed:
         rests = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
     else:
