@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from app.core.errors import TrajectoryError
 from app.core.metrics import MAX_GAP_S
 from app.core.trajectory import Samples, Trajectory
 from app.vehicles.base import OptionValue
-from app.vehicles.mavlink.sources import SourceSample
+
+Scored = Literal["vehicle", "mocap"]
+"""Whose altitude is scored."""
 
 APART_M: Final = 0.3
 """Further apart than this, the sources are said to disagree."""
@@ -30,12 +32,13 @@ class Recorded:
 
 
 def with_second(
-    trajectory: Trajectory, seen: Sequence[SourceSample], *, name: str, zero_s: float, scored: bool
+    trajectory: Trajectory, seen: Sequence[tuple[float, float]], *, name: str, zero_s: float, scored: Scored
 ) -> Recorded:
-    """The vehicle's own record with what the second source, `name`, saw; `zero_s`: the record's time 0 on the clock of
-    its receipts. Where the second source is `scored` the record runs on its times and the vehicle's own altitude is
-    `altitude_2_m`; else the other way round. One that saw too little leaves the record as it is."""
-    other_s, other_m = _clean(seen, zero_s)
+    """The vehicle's own record with what the second source, `name`, saw of the flight: when each sighting was received,
+    s, and the altitude, m, on any datum; `zero_s` is the record's time 0 on the clock of the receipts. Where `mocap` is
+    scored the record runs on its times, and the vehicle's own altitude is `altitude_2_m`; else the other way round. A
+    source that saw too little leaves the record as it is."""
+    other_s, other_m = _rising(seen, zero_s)
     inside = (other_s >= trajectory.time_s[0]) & (other_s <= trajectory.time_s[-1])
     if np.count_nonzero(inside) < 2:
         return Recorded(trajectory=trajectory, remark=f"Nothing was seen by {name}, the second source of altitude.")
@@ -54,7 +57,7 @@ def with_second(
         remarks.append(f"{name.capitalize()} saw nothing for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
     both = (
         _on_the_second_s_times(trajectory, other_s - alignment.delay_s, other_m - alignment.datum_m)
-        if scored
+        if scored == "mocap"
         else replace(trajectory, channels={**trajectory.channels, "altitude_2_m": second_m})
     )
     settings = {
@@ -65,12 +68,11 @@ def with_second(
     return Recorded(trajectory=both, settings=settings, remark=" ".join(remarks))
 
 
-def _clean(seen: Sequence[SourceSample], zero_s: float) -> tuple[Samples, Samples]:
-    """Times and altitudes of what was really seen, each of shape (k,), the times rising strictly."""
-    real = [sample for sample in seen if sample.tracking_valid and sample.advances]
-    time_s = np.array([sample.received_s - zero_s for sample in real])
-    later = np.diff(np.maximum.accumulate(time_s), prepend=-np.inf) > 0.0
-    return time_s[later], np.array([sample.altitude_m for sample in real])[later]
+def _rising(seen: Sequence[tuple[float, float]], zero_s: float) -> tuple[Samples, Samples]:
+    """Times and altitudes, each of shape (k,), without those that came later than they should."""
+    received_s, altitude_m = np.array(seen, dtype=np.float64).reshape(-1, 2).T
+    later = np.diff(np.maximum.accumulate(received_s), prepend=-np.inf) > 0.0
+    return received_s[later] - zero_s, altitude_m[later]
 
 
 def _aligned(trajectory: Trajectory, other_s: Samples, other_m: Samples) -> tuple[Alignment, list[str]]:

@@ -8,7 +8,6 @@ import pytest
 from app.core.experiments.takeoff import Takeoff
 from app.core.glitches import find_glitches
 from app.core.trajectory import Samples, Trajectory
-from app.vehicles.mavlink.sources import SourceSample
 from app.vehicles.mocap.recording import with_second
 
 ZERO_S = 700.0
@@ -32,30 +31,22 @@ def own_record(top_m: float = 3.0) -> Trajectory:
     return Trajectory(TIME_S, channels, "mavlink", "vehicle")
 
 
-def sightings(apart_m: Samples | float = 0.0, *, top_m: float = 3.0) -> list[SourceSample]:
+def sightings(apart_m: Samples | float = 0.0, *, top_m: float = 3.0) -> list[tuple[float, float]]:
     """A hundred a second, 0.11 m too high, seen late; `apart_m` away from the truth besides."""
     seen_s = np.arange(-2.5, 35.0, 0.01)
     noise_m = 0.001 * np.random.default_rng(3).standard_normal(len(seen_s))
     altitude_m = climb_m(seen_s) * top_m / 3.0 + 0.11 + noise_m + apart_m
-    return [
-        SourceSample(received_s=ZERO_S + at_s + LATE_S, altitude_m=float(up_m), tracking_valid=True, advances=True)
-        for at_s, up_m in zip(seen_s, altitude_m, strict=True)
-    ]
+    return list(zip((ZERO_S + seen_s + LATE_S).tolist(), altitude_m.tolist(), strict=True))
 
 
-def unseen(samples: Sequence[SourceSample], from_s: float, until_s: float) -> list[SourceSample]:
-    """The cameras lose sight of the vehicle for a while, and repeat where it was."""
-    return [
-        SourceSample(received_s=each.received_s, altitude_m=9.9, tracking_valid=False, advances=False)
-        if from_s <= each.received_s - ZERO_S < until_s
-        else each
-        for each in samples
-    ]
+def unseen(seen: Sequence[tuple[float, float]], from_s: float, until_s: float) -> list[tuple[float, float]]:
+    """The cameras lose sight of the vehicle for a while."""
+    return [each for each in seen if not from_s <= each[0] - ZERO_S < until_s]
 
 
 def test_the_vehicle_s_altitude_is_scored_and_the_cameras_are_beside_it() -> None:
     own = own_record()
-    both = with_second(own, sightings(), name="motion capture", zero_s=ZERO_S, scored=False)
+    both = with_second(own, sightings(), name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert both.remark == ""
     assert both.trajectory["altitude_m"] is own["altitude_m"]
     np.testing.assert_allclose(both.trajectory["altitude_2_m"], own["altitude_m"], atol=0.02)
@@ -65,7 +56,7 @@ def test_the_vehicle_s_altitude_is_scored_and_the_cameras_are_beside_it() -> Non
 
 
 def test_the_cameras_altitude_is_scored_on_their_own_times_and_the_vehicle_is_beside_it() -> None:
-    both = with_second(own_record(), sightings(), name="motion capture", zero_s=ZERO_S, scored=True).trajectory
+    both = with_second(own_record(), sightings(), name="motion capture", zero_s=ZERO_S, scored="mocap").trajectory
     np.testing.assert_allclose(np.diff(both.time_s), 0.01, atol=2e-6)
     assert both.time_s[0] == pytest.approx(-1.0, abs=0.01)
     assert both.time_s[-1] == pytest.approx(33.0, abs=0.04)
@@ -77,7 +68,7 @@ def test_the_cameras_altitude_is_scored_on_their_own_times_and_the_vehicle_is_be
 
 def test_a_source_that_drifts_away_is_told_in_words_and_numbers_and_shown_as_a_glitch() -> None:
     drift_m = np.interp(np.arange(-2.5, 35.0, 0.01), (10.0, 14.0, 14.1), (0.0, 0.5, 0.0))
-    both = with_second(own_record(), sightings(drift_m), name="motion capture", zero_s=ZERO_S, scored=False)
+    both = with_second(own_record(), sightings(drift_m), name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert "The vehicle and motion capture disagree: up to 0.5" in both.remark
     assert "at 14.0 s" in both.remark
     assert both.settings["second_largest_m"] == pytest.approx(0.5, abs=0.02)
@@ -86,24 +77,26 @@ def test_a_source_that_drifts_away_is_told_in_words_and_numbers_and_shown_as_a_g
 
 def test_what_the_cameras_did_not_see_is_missing_where_they_are_scored_and_told_where_they_are_not() -> None:
     seen = unseen(sightings(), 20.0, 21.2)
-    beside = with_second(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored=False)
+    beside = with_second(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert beside.remark == "Motion capture saw nothing for 1.2 s from 20.0 s on."
     np.testing.assert_allclose(beside.trajectory["altitude_2_m"], climb_m(TIME_S), atol=0.02)
-    scored = with_second(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored=True)
+    scored = with_second(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert [glitch.kind for glitch in find_glitches(Takeoff(), scored.trajectory)] == ["gap"]
 
 
 def test_a_flight_that_hardly_moved_is_aligned_by_receipt_and_says_so() -> None:
     low = sightings(top_m=0.1)
-    both = with_second(own_record(0.1), low, name="motion capture", zero_s=ZERO_S, scored=False)
+    both = with_second(own_record(0.1), low, name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert "aligned by its receipt alone: the two moved by less than 0.3 m" in both.remark
     assert both.settings["second_delay_s"] == 0.0
     np.testing.assert_allclose(both.trajectory["altitude_2_m"], climb_m(TIME_S) / 30.0, atol=0.02)
 
 
-@pytest.mark.parametrize("seen", [[], unseen(sightings(), -10.0, 100.0)], ids=["silent", "blind"])
-def test_a_source_that_saw_nothing_leaves_the_record_as_it_is(seen: list[SourceSample]) -> None:
+@pytest.mark.parametrize(
+    "seen", [[], unseen(sightings(), -10.0, 100.0), sightings()[:1]], ids=["silent", "blind", "one glance"]
+)
+def test_a_source_that_saw_nothing_leaves_the_record_as_it_is(seen: list[tuple[float, float]]) -> None:
     own = own_record()
-    both = with_second(own, seen, name="motion capture", zero_s=ZERO_S, scored=True)
+    both = with_second(own, seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert both.trajectory is own
     assert both.remark == "Nothing was seen by motion capture, the second source of altitude."
