@@ -1,0 +1,254 @@
+"""A vehicle's telemetry recorded for as long as asked: is every sample kept, and what does it cost.
+
+    ./dev exec python -m bench.recording [--minutes 10] [--autopilot px4]
+
+A process of its own is a simulated drone in real time; this one flies a whole trial with it whose record lasts that
+long, telemetry log and all. Positions are told apart by the vehicle's own time stamps: each that was sent between the
+first and the last of the record must be in the record, and in the log, once. Processor time is that of this process
+from the take-off command to the end of the record. Prints the figures; exits 1 when a sample is missing or recording
+takes more than a tenth of a core.
+"""
+
+import argparse
+import multiprocessing
+import resource
+import socket
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Final
+
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
+from app.vehicles.mavlink.addresses import UdpAddress
+from app.vehicles.mavlink.clock import ScaledClock
+from app.vehicles.mavlink.dialects import Message, number
+from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink.moves import Plan
+from app.vehicles.mavlink.preflight import Ground
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.transports import Peer, Transport, open_transport
+from app.vehicles.mavlink.trial import Flown
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.simdrone.autopilots.registry import get_autopilot
+from app.vehicles.simdrone.body import new_body
+from app.vehicles.simdrone.drone import Drone
+from app.vehicles.simdrone.server import Server
+
+CORE_SHARE_LIMIT: Final = 0.1
+DEFAULT_S: Final = 30.0
+LOOPBACK: Final = "127.0.0.1"
+POSITION: Final = "LOCAL_POSITION_NED"
+BOOT_S: Final = 4.0
+"""Until the drone knows where it is."""
+GAINS: Final[Mapping[str, Mapping[str, float]]] = {
+    "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_D": 0.0, "PSC_ACCZ_I": 1.0},
+    "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 2.0},
+}
+"""Of those autopilots that hover for as long as they are let."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a drone sent in the `on_s` that it was on, and by how much the computer made its clock late."""
+
+    sent_ms: list[int]
+    packets: int
+    on_s: float
+    late_s: float
+
+
+class Counting:
+    """A transport that keeps the time stamp of every position that leaves by it."""
+
+    def __init__(self, transport: Transport, autopilot: str) -> None:
+        self._transport = transport
+        self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
+        self.sent_ms: list[int] = []
+        self.packets = 0
+
+    @property
+    def remote(self) -> Peer | None:
+        return self._transport.remote
+
+    @property
+    def foreign(self) -> int:
+        return self._transport.foreign
+
+    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        return self._transport.read(timeout_s)
+
+    def write(self, data: bytes) -> bool:
+        self.packets += 1
+        self.sent_ms += stamps(self._codec.parse(data))
+        return self._transport.write(data)
+
+    def adopt(self, peer: Peer) -> None:
+        self._transport.adopt(peer)
+
+    def wake(self) -> None:
+        self._transport.wake()
+
+    def close(self) -> None:
+        self._transport.close()
+
+
+def stamps(messages: list[Message]) -> list[int]:
+    """The vehicle's own time, ms, of every position among these."""
+    return [int(number(message, "time_boot_ms")) for message in messages if message.get_type() == POSITION]
+
+
+def be_vehicle(pipe: Connection, autopilot: str, address: UdpAddress) -> None:
+    """The drone's process, until told to end; then it says what it sent."""
+    kind = get_autopilot(autopilot)
+    transport = Counting(open_transport(address), autopilot)
+    drone = Drone(new_body("twin", {"scatter": 0.0}, seed=1), lambda body: kind.set_up(body, kind.system))
+    server = Server(drone, transport, ScaledClock())
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    pipe.send("on")
+    pipe.recv()
+    server.stop()
+    thread.join()
+    pipe.send(Said(transport.sent_ms, transport.packets, drone.time_s, server.lost_s))
+
+
+class LongRecord(MavlinkVehicle):
+    """The vehicle as ever, but for the length of its record; `kept_ms` are the time stamps of its samples."""
+
+    record_s = DEFAULT_S
+    kept_ms: tuple[int, ...] = ()
+
+    def _plan(self, ground: Ground) -> Plan:
+        return replace(super()._plan(ground), record_s=self.record_s)
+
+    def _record(self, flown: Flown, ground: Ground) -> FlightRecord:
+        self.kept_ms = tuple(round(kept.position.time_boot_s * 1000.0) for kept in flown.samples)
+        return super()._record(flown, ground)
+
+
+@dataclass(slots=True)
+class Meter:
+    """Processor time of this process, from the command to the end of a record of `until_s`."""
+
+    until_s: float
+    begun_s: float = 0.0
+    used_s: float = 0.0
+    lasted_s: float = 0.0
+    _used_before_s: float = 0.0
+
+    def see(self, sample: Sample) -> None:
+        if not self.begun_s:
+            self.begun_s, self._used_before_s = time.monotonic(), processor_s()
+        if sample.time_s <= self.until_s:
+            self.lasted_s = time.monotonic() - self.begun_s
+            self.used_s = processor_s() - self._used_before_s
+
+    @property
+    def share(self) -> float:
+        return self.used_s / self.lasted_s if self.lasted_s else float("inf")
+
+
+def processor_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[FlightRecord, Counter[int]]:
+    """A whole trial; its record, and how often each time stamp is in it."""
+    vehicle = LongRecord(options, GAINS[autopilot], is_real=False)
+    try:
+        vehicle.record_s = meter.until_s
+        vehicle.stage(GAINS[autopilot])
+        record = vehicle.fly(FlightOrder(seed=1), on_sample=meter.see, should_stop=lambda: None)
+    finally:
+        vehicle.close()
+    if len(vehicle.kept_ms) != len(record.trajectory.time_s):
+        raise AssertionError("The record is not made of the samples that were kept.")
+    return record, Counter(vehicle.kept_ms)
+
+
+def logged(folder: Path, autopilot: str) -> Counter[int]:
+    """Every position in the one telemetry log, by its time stamp."""
+    [log] = folder.glob("*.tlog")
+    codec, data = PROFILES[autopilot].dialect.codec(system=1, component=1), log.read_bytes()
+    found: list[int] = []
+    place = 0
+    while place < len(data):
+        frame_at = place + 8
+        size = 12 + data[frame_at + 1] if data[frame_at] == 0xFD else 8 + data[frame_at + 1]
+        found += stamps(codec.parse(data[frame_at : frame_at + size]))
+        place = frame_at + size
+    return Counter(found)
+
+
+@contextmanager
+def vehicle_process(autopilot: str, address: UdpAddress) -> Iterator[Connection]:
+    """The drone in a process of its own, on and ready to fly."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=be_vehicle, args=(theirs, autopilot, address), daemon=True)
+    process.start()
+    ours.recv()
+    time.sleep(BOOT_S)
+    try:
+        yield ours
+    finally:
+        process.terminate()
+        process.join()
+
+
+def measure(autopilot: str, seconds: float) -> bool:
+    """Fly, count, print; whether everything is within its limit."""
+    here, there = free_port(), free_port()
+    meter = Meter(seconds)
+    chosen: dict[str, OptionValue] = {"autopilot": autopilot, "simulated": True}
+    address = str(UdpAddress(LOOPBACK, there, here))
+    with tempfile.TemporaryDirectory() as folder, vehicle_process(autopilot, UdpAddress(LOOPBACK, here, there)) as pipe:
+        options = MAVLINK.check({**chosen, "address": address, "log_folder": folder}, field="options")
+        record, kept = fly(autopilot, options, meter)
+        in_log = logged(Path(folder), autopilot)
+        pipe.send("end")
+        said: Said = pipe.recv()
+    return report(record, meter, kept, in_log, said)
+
+
+def report(record: FlightRecord, meter: Meter, kept: Counter[int], in_log: Counter[int], said: Said) -> bool:
+    sent = [each for each in said.sent_ms if min(kept) <= each <= max(kept)]
+    missing = sum(kept[each] != 1 for each in sent) + len(set(kept) - set(sent))
+    unlogged = sum(in_log[each] != 1 for each in sent)
+    time_s = record.trajectory.time_s
+    print(
+        f"{record.ending} after {time_s[-1]:.0f} s{f' ({record.reason})' if record.reason else ''}: "
+        f"{len(sent)} positions sent, {len(sent) / (time_s[-1] - time_s[0]):.1f} a second "
+        f"({said.packets / said.on_s:.0f} packets of all kinds), {missing} not once in the record, "
+        f"{unlogged} not once in the log; {meter.share:.1%} of a core (limit {CORE_SHARE_LIMIT:.0%})"
+    )
+    if said.late_s > 0.0:
+        print(f"this computer was too slow for the drone: its clock is {said.late_s:.1f} s late")
+    return record.ending == "completed" and not missing and not unlogged and meter.share <= CORE_SHARE_LIMIT
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="bench.recording")
+    parser.add_argument("--minutes", type=float, default=DEFAULT_S / 60.0, help="how long the record is to be")
+    parser.add_argument("--autopilot", choices=tuple(GAINS), default="ardupilot")
+    options = parser.parse_args()
+    return 0 if measure(options.autopilot, options.minutes * 60.0) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
