@@ -11,9 +11,11 @@ from app.campaigns.files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.core.experiments import EXPERIMENTS
 from app.core.strategies import STRATEGIES
+from app.core.strategies.base import Strategy
 from app.core.trajectory import CHANNEL_UNITS
+from app.fleet.kinds import is_registered_one_by_one
 from app.schemas import OptionValue
-from app.vehicles.open import VEHICLE_KINDS
+from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 
@@ -49,19 +51,20 @@ class OptionInfo(BaseModel):
 
 
 class ExperimentInfo(BaseModel):
-    """`output` is the channel that is scored."""
+    """`output` is the channel that is scored. Without a model nothing is foretold, and gains are chosen by hand."""
 
     name: str
     title: str
     output: str
     output_unit: str
     error_unit: str
+    has_model: bool
     gains: list[GainInfo]
     options: list[OptionInfo]
 
 
 class StrategyInfo(BaseModel):
-    """`experiments` names those that it works with; empty: with all."""
+    """`experiments` names those that it works with."""
 
     name: str
     title: str
@@ -116,17 +119,33 @@ def get_catalogue() -> Catalogue:
                     "output": each.output,
                     "output_unit": CHANNEL_UNITS[each.output],
                     "error_unit": each.error_unit,
+                    "has_model": each.modelled is not None,
                     "gains": each.space.gains,
                     "options": each.options,
                 }
                 for each in EXPERIMENTS.values()
             ],
-            "strategies": list(STRATEGIES.values()),
+            "strategies": [_strategy(each) for each in STRATEGIES.values()],
             "vehicle_kinds": [kind for kind in VEHICLE_KINDS.values() if kind.served],
-            "presets": [_preset(name) for name in preset_names()],
+            "presets": [preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
         },
         from_attributes=True,
     )
+
+
+def _strategy(strategy: Strategy) -> StrategyInfo:
+    return StrategyInfo(
+        name=strategy.name,
+        title=strategy.title,
+        line=strategy.line,
+        experiments=[each.name for each in EXPERIMENTS.values() if strategy.works_with(each)],
+        options=[OptionInfo.model_validate(option, from_attributes=True) for option in strategy.options],
+    )
+
+
+def _is_ready(preset: PresetInfo) -> bool:
+    """Whether its vehicle is there for everybody, rather than one that somebody has to register first."""
+    return not is_registered_one_by_one(get_kind(preset.campaign.vehicle.kind))
 
 
 def _preset(name: str) -> PresetInfo:
@@ -135,5 +154,5 @@ def _preset(name: str) -> PresetInfo:
         name=name,
         title=file.name,
         line=file.description,
-        campaign=NewCampaign.model_validate(file.model_dump(exclude={"description"})),
+        campaign=NewCampaign.model_validate(file.model_dump(exclude={"description", "gains"})),
     )

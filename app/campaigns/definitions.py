@@ -31,7 +31,9 @@ def definition_of(row: CampaignRow) -> Definition:
     where they are not the experiment's own."""
     space = get_experiment(row.experiment).space
     own = dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains)
-    safe_gains = None if own == space.mapping(space.default) else own
+    default = space.mapping(space.default)
+    are_others = own.keys() != default.keys()  # a vehicle that is flown elsewhere stands for several
+    safe_gains = None if are_others or own == default else own
     return replace(_ADAPTER.validate_python(row.definition), safe_gains=safe_gains)
 
 
@@ -55,13 +57,15 @@ def stored(definition: Definition) -> JsonObject:
 
 
 def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definition, dict[str, OptionValue]]:
-    """Definition and complete vehicle options. Raises InputError naming everything that cannot be used in either."""
+    """Definition and complete vehicle options: none for a registered vehicle, which has its own, and whose gains the
+    fleet compares with the experiment's. Raises InputError naming everything that cannot be used in either."""
     _require_whole(asked)
     definition = core_definition(asked)
     options: dict[str, OptionValue] = {}
 
     def take_options() -> None:
-        options.update(check_options(vehicle.kind, vehicle.options, field="vehicle"))
+        if vehicle.id is None:
+            options.update(check_options(vehicle.kind, vehicle.options, field="vehicle"))
 
     problems = [
         *_refusals(lambda: check_definition(definition), "definition."),
@@ -88,7 +92,7 @@ def _require_whole(asked: DefinitionIn) -> None:
 
 
 def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionValue]) -> Iterator[Problem]:
-    """`options` are empty where they could not be used."""
+    """`options` are empty where they could not be used, and for a registered vehicle."""
     if kind not in VEHICLE_KINDS:
         return
     described = VEHICLE_KINDS[kind]

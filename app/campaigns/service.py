@@ -240,11 +240,10 @@ def _checked(
     session: Session, asked: Definition, choice: VehicleChoice
 ) -> tuple[CoreDefinition, dict[str, OptionValue], VehicleRow]:
     """The definition, the campaign's own settings of its vehicle, none for a registered one, and the vehicle."""
-    own = choice if choice.id is None else VehicleChoice(kind=choice.kind)
-    definition, options = check_campaign(with_donor(session, asked), own)
+    definition, options = check_campaign(with_donor(session, asked), choice)
     space = get_experiment(definition.experiment).space
     vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
-    return definition, {} if vehicle.registered else options, vehicle
+    return definition, options, vehicle
 
 
 def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:

@@ -20,6 +20,7 @@ from app.core.experiments.base import Experiment
 from app.core.strategies.base import Proposal
 from app.core.trajectory import CHANNEL_UNITS
 from app.errors import InputError, Problem
+from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue, Sample
 from app.vehicles.open import get_kind
 
@@ -49,7 +50,7 @@ def run_campaign(
         settings=settings,
     )
     definition, options = check_campaign(file.definition, file.vehicle)
-    _require_wings(file.vehicle.kind, options)
+    _require_wings(file.vehicle, options)
     experiment = experiment_of(definition)
     given = gains_by_hand(file, definition, within_bounds=not overrule)
     out = console(json_out)
@@ -66,8 +67,14 @@ def _read(source: str) -> CampaignFile:
     return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
 
 
-def _require_wings(kind: str, options: Mapping[str, OptionValue]) -> None:
-    described = get_kind(kind)
+def _require_wings(vehicle: VehicleChoice, options: Mapping[str, OptionValue]) -> None:
+    if vehicle.id is not None:
+        raise InputError(
+            "A registered vehicle cannot be flown from the command line.",
+            problems=(Problem("vehicle.id", "names a vehicle that only the dashboard's database knows"),),
+            hint="Fly it in the dashboard, or give the address of a simulated one.",
+        )
+    kind, described = vehicle.kind, get_kind(vehicle.kind)
     if not described.can_fly or described.is_real_with(options):
         raise InputError(
             f"{described.title} cannot be flown from the command line.",

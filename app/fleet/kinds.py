@@ -11,6 +11,14 @@ def can_fly(row: VehicleRow) -> bool:
     return kind is not None and kind.can_fly and (kind.served or row.registered)
 
 
+def experiments_of(row: VehicleRow) -> list[str]:
+    """Those whose gains the vehicle has; of a shared one, all that its kind can fly."""
+    kind = VEHICLE_KINDS.get(row.kind)
+    if kind is None:
+        return []
+    return list(kind.experiments_with(row.options) if row.registered else kind.experiments)
+
+
 def is_registered_one_by_one(kind: VehicleKind) -> bool:
     """Whether each vehicle of the kind has a row, settings and a link of its own, rather than one shared by all
     campaigns: there are real ones among them, and the program flies them."""

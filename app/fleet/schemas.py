@@ -116,6 +116,7 @@ class Vehicle(BaseModel):
     registered: bool
     state: VehicleState
     concern: str
+    experiments: Annotated[list[str], Field(description="those that it can fly: whose gains it has")]
     options: dict[str, OptionValue]
     identity: Identity | None
     safe_gains: Gains

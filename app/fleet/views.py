@@ -8,7 +8,7 @@ from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.fleet import repository
 from app.fleet.control import control_of
-from app.fleet.kinds import can_fly, needs_staging
+from app.fleet.kinds import can_fly, experiments_of, needs_staging
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
 from app.fleet.states import ACTIONS
 from app.moves import allowed
@@ -30,6 +30,7 @@ def vehicle_view(row: VehicleRow) -> Vehicle:
         registered=row.registered,
         state=row.state,
         concern=row.concern,
+        experiments=experiments_of(row),
         options=row.options,
         identity=None if row.identity is None else Identity.model_validate(row.identity),
         safe_gains=row.safe_gains,

@@ -712,7 +712,7 @@ export type Drift = {
 /**
  * ExperimentInfo
  *
- * `output` is the channel that is scored.
+ * `output` is the channel that is scored. Without a model nothing is foretold, and gains are chosen by hand.
  */
 export type ExperimentInfo = {
     /**
@@ -735,6 +735,10 @@ export type ExperimentInfo = {
      * Error Unit
      */
     error_unit: string;
+    /**
+     * Has Model
+     */
+    has_model: boolean;
     /**
      * Gains
      */
@@ -2244,7 +2248,7 @@ export type StopVerdict = {
 /**
  * StrategyInfo
  *
- * `experiments` names those that it works with; empty: with all.
+ * `experiments` names those that it works with.
  */
 export type StrategyInfo = {
     /**
@@ -2686,6 +2690,12 @@ export type Vehicle = {
      * Concern
      */
     concern: string;
+    /**
+     * Experiments
+     *
+     * those that it can fly: whose gains it has
+     */
+    experiments: Array<string>;
     /**
      * Options
      */

@@ -1,0 +1,106 @@
+"""Campaigns of other autopilots over HTTP: asked and told by hand, scored and drawn, and nothing foretold."""
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.session import Database
+from tests.builders import (
+    Json,
+    climb_error,
+    create_campaign,
+    create_csv,
+    create_imported_trial,
+    create_ready_campaign,
+    create_trial,
+    get,
+    problems_of,
+    run_jobs,
+    upload,
+)
+
+PX4: Json = {"experiment": "takeoff-px4", "strategy": "manual", "step_fraction": 0.25}
+DEFAULT: Json = {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 2.0, "MPC_Z_VEL_D_ACC": 0.0}
+FIRMER: Json = {**DEFAULT, "MPC_Z_P": 1.3}
+SETTLED_S = (1.5, 0.8, 1.0)
+
+
+def flown_by_hand(client: TestClient, database: Database) -> tuple[Json, list[Json]]:
+    """A campaign of three flights made elsewhere: the defaults as proposed, then two sets of a script's."""
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=PX4)
+    trials = [create_imported_trial(client, campaign["id"], create_csv(SETTLED_S[0]))]
+    for gains, settling_s in zip((FIRMER, {**FIRMER, "MPC_Z_VEL_P_ACC": 6.0}), SETTLED_S[1:], strict=True):
+        run_jobs(database)
+        trial = create_trial(client, campaign["id"], gains=gains)
+        trials.append(upload(client, trial["id"], create_csv(settling_s)).json())
+    run_jobs(database)
+    return get(client, f"/api/campaigns/{campaign['id']}"), trials
+
+
+def test_a_script_gives_the_gains_and_is_told_their_errors(client: TestClient, database: Database) -> None:
+    campaign, trials = flown_by_hand(client, database)
+    assert [trial["error"] for trial in trials] == pytest.approx([climb_error(each) for each in SETTLED_S], abs=1e-4)
+    assert [trial["kind"] for trial in trials] == ["start", "manual", "manual"]
+    assert [trial["predicted_error"] for trial in trials] == [None, None, None]
+    assert campaign["best"]["gains"] == FIRMER
+    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
+    assert (proposal["kind"], proposal["gains"]) == ("manual", FIRMER)
+    assert (proposal["predicted_error"], proposal["interval"]) == (None, None)
+    assert {check["name"] for check in proposal["gate"]["checks"]} == {"bounds", "step"}
+
+
+def test_its_figures_and_statistics_stand_without_predictions(client: TestClient, database: Database) -> None:
+    campaign, trials = flown_by_hand(client, database)
+    cards = [get(client, f"/api/campaigns/{campaign['id']}/figures/{name}") for name in ("takeoffs", "errors", "gains")]
+    cards.append(get(client, f"/api/trials/{trials[-1]['id']}/figure"))
+    assert [card["state"] for card in cards] == ["ready"] * 4, [card["reason"] for card in cards]
+    drawn = [trace["name"] for card in cards for trace in card["figure"]["data"] if "name" in trace]
+    assert not [name for name in drawn if "predict" in name.lower()]
+    said = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    assert said["track_record"]["of"] == 0
+    assert said["comparison"]["verdict"] == "unresolved", "nobody knows their scatter before a set is repeated"
+
+
+def test_a_step_beyond_the_limit_or_the_bounds_is_refused_with_what_would_pass(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=PX4)
+    path = f"/api/campaigns/{campaign['id']}/trials"
+    refused = problems_of(client.post(path, json={"gains": {**DEFAULT, "MPC_Z_VEL_P_ACC": 9.0}}))
+    assert "only 25% is allowed from the start gains" in refused["gains.MPC_Z_VEL_P_ACC"]
+    refused = problems_of(client.post(path, json={"gains": {"MPC_Z_P": 1.0}}))
+    assert refused["gains.MPC_Z_VEL_I_ACC"] == "is missing"
+
+
+def test_a_strategy_that_needs_a_model_is_refused_with_the_reason(client: TestClient) -> None:
+    wanted = {"name": "Test", "vehicle": {"kind": "import"}, "definition": {**PX4, "strategy": "gradient"}}
+    answer = client.post("/api/campaigns", json=wanted)
+    assert answer.status_code == 422
+    assert "there is no model of what the gains of 'takeoff-px4' do" in problems_of(answer)["definition.strategy"]
+
+
+def test_flights_made_elsewhere_with_different_gains_do_not_get_in_each_others_way(
+    client: TestClient, database: Database
+) -> None:
+    """Both campaigns have the one vehicle that stands for all that fly elsewhere."""
+    create_ready_campaign(client, database, vehicle="import", definition=PX4)
+    paper = create_ready_campaign(client, database, vehicle="import")
+    assert create_imported_trial(client, paper["id"])["gains"] == {"kp": 283, "ki": 13, "kd": 82}
+
+
+def test_a_registered_copter_flies_the_takeoff_of_its_own_gains(client: TestClient) -> None:
+    options = {"simulated": True, "autopilot": "px4"}
+    vehicle = client.post("/api/vehicles", json={"name": "Copter", "kind": "mavlink", "options": options}).json()
+    assert vehicle["experiments"] == ["takeoff-px4"]
+    choice = {"kind": "mavlink", "id": vehicle["id"]}
+    answer = client.post("/api/campaigns", json={"name": "Test", "vehicle": choice, "definition": PX4})
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["vehicle"]["options"]["autopilot"] == "px4"
+
+
+def test_the_catalogue_says_which_experiments_have_no_model_and_what_they_can_be_flown_with(client: TestClient) -> None:
+    catalogue = get(client, "/api/catalogue")
+    without = [each["name"] for each in catalogue["experiments"] if not each["has_model"]]
+    assert without == ["takeoff-ardupilot", "takeoff-px4"]
+    usable = [each["name"] for each in catalogue["strategies"] if "takeoff-px4" in each["experiments"]]
+    assert usable == ["manual"]
+    assert create_campaign(client, vehicle="import", definition=PX4)["state"] == "draft"
