@@ -57,6 +57,12 @@ staged: flying, ready, quarantined
 flying: ready, quarantined
 quarantined: ready, disconnected
 """
+ACT = """
+requested: running, failed
+running: done, failed
+done:
+failed:
+"""
 
 Moves = Mapping[Any, frozenset[Any]]
 MACHINES: dict[str, tuple[Moves, str]] = {
@@ -65,6 +71,7 @@ MACHINES: dict[str, tuple[Moves, str]] = {
     "job": (jobs.MOVES, JOB),
     "flight": (trials.FLIGHT_MOVES, FLIGHT),
     "vehicle": (fleet.MOVES, VEHICLE),
+    "act": (fleet.ACT_MOVES, ACT),
 }
 
 
@@ -94,7 +101,15 @@ def test_every_state_has_its_line_in_the_table(machine: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "states", [trials.TrialState, trials.FlightState, campaigns.CampaignState, jobs.JobState, fleet.VehicleState]
+    "states",
+    [
+        trials.TrialState,
+        trials.FlightState,
+        campaigns.CampaignState,
+        jobs.JobState,
+        fleet.VehicleState,
+        fleet.ActState,
+    ],
 )
 def test_every_lifecycle_is_drawn_in_its_docstring(states: type[StrEnum]) -> None:
     assert states.__doc__ is not None

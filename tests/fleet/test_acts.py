@@ -1,0 +1,291 @@
+"""What a registered vehicle is asked beside its flights: when it may be, once at a time, and what comes of it."""
+
+from datetime import timedelta
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.models import VehicleActRow
+from app.db.session import Database
+from app.db.types import utc_now
+from app.fleet import acts
+from app.fleet.states import ActKind, VehicleState
+from app.main import create_app
+from app.settings import Settings
+from app.vehicles.base import CheckItem, Identity
+from tests.builders import WORKER, Json, create_campaign, create_trial, get
+from tests.fleet.vehicles import (
+    DEFAULT_GAINS,
+    IDENTITY,
+    connect,
+    control_header,
+    create_campaign_on,
+    create_connected,
+    finish_act,
+    put_into,
+    register,
+    seen,
+)
+
+# What the domain allows, written apart from the program's table.
+POSSIBLE = {
+    "connect": {"disconnected"},
+    "disconnect": {"ready", "quarantined"},
+    "check": {"ready", "quarantined"},
+    "restore": {"ready", "quarantined"},
+    "parameters": {"ready"},
+    "release": {"quarantined"},
+    "stage": {"ready"},
+    "fly": {"ready"},
+    "edit": {"disconnected", "ready"},
+    "land": {"staged", "flying", "quarantined"},
+    "motors off": {"staged", "flying", "quarantined"},
+}
+
+
+def ask(client: TestClient, vehicle: Json, act: str) -> int:
+    body = {"statement": "Ada looked at it"} if act == "release" else None
+    return client.post(f"/api/vehicles/{vehicle['id']}/{act}", json=body).status_code
+
+
+def newest(client: TestClient, vehicle: Json) -> Json:
+    act: Json = get(client, f"/api/vehicles/{vehicle['id']}/acts")["items"][0]
+    return act
+
+
+@pytest.mark.parametrize("state", VehicleState)
+@pytest.mark.parametrize(
+    "act", ["connect", "disconnect", "check", "restore", "parameters", "release", "stage", "fly", "edit"]
+)
+def test_a_vehicle_is_asked_what_its_state_allows_and_nothing_else(
+    client: TestClient, database: Database, act: str, state: VehicleState
+) -> None:
+    vehicle = register(client)
+    campaign = create_campaign_on(client, database, vehicle)
+    trial = create_trial(client, campaign["id"])
+    put_into(state, database, vehicle)
+    match act:
+        case "stage" | "fly":
+            status = client.post(f"/api/trials/{trial['id']}/{act}").status_code
+        case "edit":
+            status = client.patch(f"/api/vehicles/{vehicle['id']}", json={"version": 1, "battery": "4"}).status_code
+        case _:
+            status = ask(client, vehicle, act)
+    assert (status < 300) == (state in POSSIBLE[act])
+    assert status in {200, 202, 409}
+    assert seen(client, vehicle)["state"] == state
+
+
+@pytest.mark.parametrize("real", [False, True])
+@pytest.mark.parametrize("state", VehicleState)
+def test_the_offered_actions_are_the_possible_ones(
+    client: TestClient, database: Database, state: VehicleState, real: bool
+) -> None:
+    vehicle = register(client, real=real)
+    put_into(state, database, vehicle)
+    possible = {act for act, states in POSSIBLE.items() if state in states}
+    assert set(seen(client, vehicle)["actions"]) == possible - ({"fly"} if real else set())
+
+
+def test_a_connection_pins_the_identity_and_tells_the_gains(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    assert (vehicle["state"], vehicle["held"], vehicle["concern"]) == ("ready", DEFAULT_GAINS, "")
+    act = newest(client, vehicle)
+    assert (act["kind"], act["state"], act["asked"], act["read_back"]) == (
+        "connect",
+        "done",
+        DEFAULT_GAINS,
+        DEFAULT_GAINS,
+    )
+    with database.write() as session:
+        acts.vehicle_connected(session, vehicle["id"], Identity(system_id=9, autopilot="px4", version=""))
+    assert seen(client, vehicle)["identity"]["system_id"] == 1
+
+
+def test_a_second_request_is_refused_and_the_same_one_sent_again_is_harmless(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    path = f"/api/vehicles/{vehicle['id']}/check"
+    first = client.post(path, headers={"Idempotency-Key": "once"})
+    again = client.post(path, headers={"Idempotency-Key": "once"})
+    assert (again.status_code, again.json()) == (202, first.json())
+    other = client.post(f"/api/vehicles/{vehicle['id']}/restore")
+    assert other.status_code == 409
+    assert other.json()["detail"] == "Drone is busy: “check” is under way."
+    finish_act(database)
+    assert client.post(f"/api/vehicles/{vehicle['id']}/restore").status_code == 202
+
+
+def test_nothing_is_asked_beside_a_flight_and_no_flight_beside_an_act(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    campaign = create_campaign_on(client, database, vehicle)
+    trial = create_trial(client, campaign["id"])
+    client.post(f"/api/vehicles/{vehicle['id']}/check")
+    refused = client.post(f"/api/trials/{trial['id']}/stage")
+    assert (refused.status_code, refused.json()["detail"]) == (409, "Drone is busy: “check” is under way.")
+    finish_act(database)
+    assert client.post(f"/api/trials/{trial['id']}/stage").status_code == 202
+    beside = client.post(f"/api/vehicles/{vehicle['id']}/check")
+    assert (beside.status_code, beside.json()["title"]) == (409, "Vehicle busy")
+    assert "has a flight already" in beside.json()["detail"]
+
+
+def test_what_nobody_begins_in_time_is_given_up(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    ask(client, vehicle, "restore")
+    with database.write() as session:
+        row = session.get_one(VehicleActRow, newest(client, vehicle)["id"])
+        row.requested_at = utc_now() - timedelta(seconds=11)
+    with database.write() as session:
+        assert acts.claim_act(session, WORKER) is None
+    act = newest(client, vehicle)
+    assert (act["state"], act["problem"]) == ("failed", "It could not be begun within 10 s. Ask again.")
+
+
+def test_a_check_keeps_every_item_it_found(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    ask(client, vehicle, "check")
+    item = CheckItem(name="rate", title="Positions a second", passed=False, found="12 Hz", needed="40 Hz", hint="Look")
+    with database.write() as session:
+        task = acts.claim_act(session, WORKER)
+        assert task is not None
+        acts.record_checks(session, vehicle["id"], [item])
+        acts.finish_act(session, task.act_id, result={"passed": False})
+        acts.finish_act(session, task.act_id, problem="twice is harmless")
+    (check,) = seen(client, vehicle)["checks"]
+    assert check == {
+        "name": "rate",
+        "title": "Positions a second",
+        "passed": False,
+        "found": "12 Hz",
+        "needed": "40 Hz",
+        "hint": "Look",
+    }
+    assert newest(client, vehicle)["result"] == {"passed": False}
+
+
+def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: TestClient, database: Database) -> None:
+    vehicle = connect(client, database, register(client), concern="it was met armed")
+    assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "it was met armed")
+    campaign = create_campaign_on(client, database, vehicle)
+    refused = client.post(f"/api/trials/{create_trial(client, campaign['id'])['id']}/stage")
+    assert refused.json()["detail"] == "Drone is quarantined: it was met armed"
+    header = control_header(client, vehicle)
+    statement = {"statement": "disarmed, on the ground"}
+    path = f"/api/vehicles/{vehicle['id']}/release"
+    assert client.post(path, json=statement, headers=header).json()["state"] == "quarantined"
+    accepted = Identity(system_id=1, autopilot="paparazzi", version="6.0")
+    with database.write() as session:
+        task = acts.claim_act(session, WORKER)
+        assert task is not None
+        assert (task.kind, task.vehicle.identity) == (ActKind.RELEASE, IDENTITY)
+        acts.finish_act(session, task.act_id, read_back=DEFAULT_GAINS)
+        acts.vehicle_released(session, vehicle["id"], identity=accepted)
+    free = seen(client, vehicle)
+    assert (free["state"], free["concern"], free["identity"]["version"]) == ("ready", "", "6.0")
+    act = newest(client, vehicle)
+    assert (act["by"], act["reason"]) == ("Ada", "disarmed, on the ground")
+
+
+def test_a_quarantine_outlives_the_link(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    with database.write() as session:
+        acts.quarantine_vehicle(session, vehicle["id"], "its gains are not verified")
+    ask(client, vehicle, "disconnect")
+    finish_act(database)
+    with database.write() as session:
+        acts.vehicle_gone(session, vehicle["id"])
+    assert seen(client, vehicle)["state"] == "disconnected"
+    again = connect(client, database, vehicle)
+    assert (again["state"], again["concern"]) == ("quarantined", "its gains are not verified")
+
+
+def test_a_released_simulation_is_ready_at_once_and_its_acts_say_who_looked(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_campaign(client)["vehicle"]
+    put_into(VehicleState.QUARANTINED, database, vehicle)
+    released = client.post(f"/api/vehicles/{vehicle['id']}/release", json={"statement": "Ada: it is fine"}).json()
+    assert (released["state"], released["concern"]) == ("ready", "")
+    assert newest(client, vehicle)["reason"] == "Ada: it is fine"
+
+
+def test_a_shared_simulation_takes_no_acts(client: TestClient) -> None:
+    vehicle = create_campaign(client)["vehicle"]
+    refused = client.post(f"/api/vehicles/{vehicle['id']}/connect")
+    assert refused.status_code == 409
+    assert "is shared by all campaigns" in refused.json()["detail"]
+
+
+def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else(
+    client: TestClient, database: Database
+) -> None:
+    wanted, closed, doubted = (create_connected(client, database, name) for name in ("A", "B", "C"))
+    ask(client, closed, "disconnect")
+    finish_act(database)
+    with database.write() as session:
+        acts.quarantine_vehicle(session, doubted["id"], "not verified")
+    ask(client, wanted, "restore")
+    with database.write() as session:
+        assert len(acts.withdraw_acts(session, "the worker ended")) == 1
+        acts.forget_connections(session)
+        acts.request_reconnections(session)
+    assert (
+        "It was not finished: the worker ended."
+        in get(client, f"/api/vehicles/{wanted['id']}/acts")["items"][1]["problem"]
+    )
+    states = [seen(client, vehicle)["state"] for vehicle in (wanted, closed, doubted)]
+    assert states == ["disconnected", "disconnected", "quarantined"]
+    tasks = [finish_act(database, problem="nobody answers") for _ in range(2)]
+    assert [(task.kind, task.vehicle.name) for task in tasks] == [("connect", "A"), ("connect", "C")]
+    assert newest(client, wanted)["by"] == "the worker"
+    with database.write() as session:
+        assert acts.claim_act(session, WORKER) is None
+        assert len(acts.request_reconnections(session)) == 2  # wanted still: a person asked for it
+
+
+def test_a_connection_that_a_person_asked_for_and_that_failed_is_not_tried_again_by_itself(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = register(client)
+    ask(client, vehicle, "connect")
+    finish_act(database, problem="nobody answered within 5 s")
+    assert newest(client, vehicle)["problem"] == "nobody answered within 5 s"
+    with database.write() as session:
+        assert acts.request_reconnections(session) == []
+
+
+def test_a_real_vehicle_is_not_connected_over_a_server_that_others_reach(
+    settings: Settings, client: TestClient, database: Database
+) -> None:
+    real, simulated = register(client, "Real", real=True), register(client, "Simulated")
+    exposed = settings.model_copy(update={"host": "0.0.0.0"})
+    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000") as network:
+        refused = network.post(f"/api/vehicles/{real['id']}/connect")
+        assert refused.status_code == 403
+        assert "Real is a real vehicle, and this server can be reached over the network" in refused.json()["detail"]
+        assert network.post(f"/api/vehicles/{simulated['id']}/connect").status_code == 202
+
+
+def test_an_order_past_the_database_is_written_down_afterwards(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    with database.write() as session:
+        acts.record_order(session, vehicle["id"], ActKind.LAND, "it drifts")
+        acts.record_order(session, vehicle["id"], ActKind.MOTORS_OFF, "fire", problem="the link was closed")
+    stopped, landed = get(client, f"/api/vehicles/{vehicle['id']}/acts?limit=2")["items"]
+    assert (landed["kind"], landed["state"], landed["reason"]) == ("land", "done", "it drifts")
+    assert (stopped["kind"], stopped["state"], stopped["problem"]) == ("motors off", "failed", "the link was closed")
+
+
+def test_acts_come_in_pages_the_newest_first(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    for _ in range(3):
+        ask(client, vehicle, "restore")
+        finish_act(database)
+    path = f"/api/vehicles/{vehicle['id']}/acts"
+    first = get(client, f"{path}?limit=3")
+    rest = get(client, f"{path}?limit=3&cursor={first['next_cursor']}")
+    ids = [act["id"] for act in (*first["items"], *rest["items"])]
+    assert ids == sorted(ids, reverse=True)
+    assert (len(ids), first["total"], rest["next_cursor"]) == (5, 5, None)

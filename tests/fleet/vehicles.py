@@ -1,0 +1,89 @@
+"""Registered vehicles over HTTP, and the steps of the worker that has their link, done by hand."""
+
+from typing import Any
+
+import httpx2
+
+from app.db.models import VehicleRow
+from app.db.session import Database
+from app.fleet import acts
+from app.fleet.states import VehicleState
+from app.vehicles.base import Identity
+from tests.builders import WORKER, Json, get, run_jobs
+
+DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
+SEEN = {"safe_gains_confirmed": True, "statement": "Ada compared them with the airframe file"}
+IDENTITY = Identity(system_id=1, autopilot="paparazzi", version="5.18")
+OUR_PAGE = {"Sec-Fetch-Site": "same-origin"}
+
+
+def register(client: httpx2.Client, name: str = "Drone", *, real: bool = False, **fields: object) -> Json:
+    """One that is not connected yet."""
+    asked: dict[str, Any] = {"name": name, "kind": "mavlink", "options": {"simulated": not real}, **fields}
+    answer = client.post("/api/vehicles", json={**(SEEN if real else {}), **asked})
+    assert answer.status_code == 201, answer.text
+    vehicle: Json = answer.json()
+    return vehicle
+
+
+def connect(client: httpx2.Client, database: Database, vehicle: Json, *, concern: str = "") -> Json:
+    """As the worker does it; the vehicle as it is then."""
+    answer = client.post(f"/api/vehicles/{vehicle['id']}/connect")
+    assert answer.status_code == 202, answer.text
+    with database.write() as session:
+        task = acts.claim_act(session, WORKER)
+        assert task is not None
+        held = None if concern else task.vehicle.safe_gains
+        acts.vehicle_connected(session, vehicle["id"], IDENTITY, concern=concern)
+        acts.finish_act(session, task.act_id, read_back=held)
+    return seen(client, vehicle)
+
+
+def create_connected(client: httpx2.Client, database: Database, name: str = "Drone", *, real: bool = False) -> Json:
+    return connect(client, database, register(client, name, real=real))
+
+
+def create_campaign_on(client: httpx2.Client, database: Database, vehicle: Json) -> Json:
+    """One whose first gains are known."""
+    answer = client.post(
+        "/api/campaigns", json={"name": "Real", "vehicle": {"kind": vehicle["kind"], "id": vehicle["id"]}}
+    )
+    assert answer.status_code == 201, answer.text
+    run_jobs(database)
+    campaign: Json = get(client, f"/api/campaigns/{answer.json()['id']}")
+    assert campaign["state"] == "ready"
+    return campaign
+
+
+def seen(client: httpx2.Client, vehicle: Json) -> Json:
+    found: Json = get(client, f"/api/vehicles/{vehicle['id']}")
+    return found
+
+
+def put_into(state: VehicleState, database: Database, vehicle: Json) -> None:
+    """Past the table, for tests of what is possible there."""
+    with database.write() as session:
+        row = session.get(VehicleRow, vehicle["id"])
+        assert row is not None
+        row.state = state
+        row.concern = "its gains are not verified" if state == VehicleState.QUARANTINED else ""
+
+
+def take_control(client: httpx2.Client, vehicle: Json, operator: str = "Ada", **fields: object) -> httpx2.Response:
+    return client.put(f"/api/vehicles/{vehicle['id']}/control", json={"operator": operator, **fields})
+
+
+def control_header(client: httpx2.Client, vehicle: Json, operator: str = "Ada") -> dict[str, str]:
+    """Of a new lease, whoever had one."""
+    answer = take_control(client, vehicle, operator, take_over=True)
+    assert answer.status_code == 200, answer.text
+    return {"X-Gainline-Control": answer.json()["token"]}
+
+
+def finish_act(database: Database, *, problem: str = "", read_back: dict[str, float] | None = None) -> acts.ActTask:
+    """Carry out the act that waits, as the worker does."""
+    with database.write() as session:
+        task = acts.claim_act(session, WORKER)
+        assert task is not None
+        acts.finish_act(session, task.act_id, problem=problem, read_back=read_back)
+    return task

@@ -1,0 +1,370 @@
+"""A real vehicle flies in two steps: its gains staged and read back, then its operator's own act in the browser."""
+
+from datetime import timedelta
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.core.trajectory import Trajectory
+from app.db.models import FlightRow
+from app.db.session import Database
+from app.db.types import utc_now
+from app.errors import ConflictError
+from app.fleet import acts
+from app.main import create_app
+from app.settings import Settings
+from app.trials import flights
+from app.trials.telemetry_logs import telemetry_log
+from app.vehicles.base import FlightRecord
+from tests.builders import (
+    WORKER,
+    Json,
+    claim,
+    create_climb,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    run_jobs,
+)
+from tests.builders import stage as stage_claimed
+from tests.fleet.vehicles import (
+    DEFAULT_GAINS,
+    OUR_PAGE,
+    control_header,
+    create_campaign_on,
+    create_connected,
+    seen,
+    take_control,
+)
+
+
+@pytest.fixture
+def real(client: TestClient, database: Database) -> Json:
+    """A real vehicle, connected."""
+    return create_connected(client, database, real=True)
+
+
+@pytest.fixture
+def planned(client: TestClient, database: Database, real: Json) -> Json:
+    """A trial on it."""
+    return create_trial(client, create_campaign_on(client, database, real)["id"])
+
+
+@pytest.fixture
+def staged(client: TestClient, database: Database, planned: Json) -> Json:
+    """The same, with its gains on the vehicle."""
+    assert client.post(f"/api/trials/{planned['id']}/stage").status_code == 202
+    stage_claimed(database)
+    return trial(client, planned)
+
+
+def trial(client: TestClient, known: Json) -> Json:
+    found: Json = get(client, f"/api/trials/{known['id']}")
+    return found
+
+
+def take_off(client: TestClient, staged: Json, headers: dict[str, str]) -> tuple[int, str]:
+    answer = client.post(f"/api/trials/{staged['id']}/take-off", headers=headers)
+    return answer.status_code, answer.json().get("detail", "")
+
+
+def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
+    """Whether its worker may take off, and why it is to stand down."""
+    with database.read() as session:
+        flight_id = staged["flight"]["id"]
+        return flights.take_off_wanted(session, flight_id), flights.stand_down_wanted(session, flight_id)
+
+
+def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    assert staged["actions"] == ["take-off", "unstage", "cancel", "abort", "note"]
+    assert is_wanted(database, staged) == (False, None)
+    with pytest.raises(ConflictError, match="nobody has asked for its take-off"), database.write() as session:
+        flights.record_lift_off(session, staged["flight"]["id"])
+
+    status, sentence = take_off(client, staged, {})
+    assert (status, sentence) == (
+        403,
+        "Drone is a real vehicle: it takes off only on its operator's own act in the browser.",
+    )
+    script = control_header(client, real)
+    assert take_off(client, staged, script)[0] == 403
+    assert take_off(client, staged, {**script, "Sec-Fetch-Site": "none"})[0] == 403
+    assert take_off(client, staged, OUR_PAGE) == (409, "Ada is in control of Drone.")
+    assert take_off(client, staged, {**OUR_PAGE, "X-Gainline-Control": "guessed"})[0] == 409
+    assert trial(client, staged)["flight"]["take_off_at"] is None
+
+    assert take_off(client, staged, {**OUR_PAGE, **script}) == (202, "")
+    assert is_wanted(database, staged) == (True, None)
+    assert take_off(client, staged, {**OUR_PAGE, **script}) == (
+        409,
+        f"The take-off of trial {staged['number']} was asked for already.",
+    )
+    with database.write() as session:
+        flights.record_lift_off(session, staged["flight"]["id"])
+    assert trial(client, staged)["state"] == "flying"
+    assert seen(client, real)["state"] == "flying"
+
+
+def test_without_anybody_in_control_nothing_real_takes_off(client: TestClient, staged: Json) -> None:
+    assert take_off(client, staged, OUR_PAGE) == (409, "Nobody is in control of Drone.")
+
+
+def test_the_word_sent_twice_with_one_key_is_one_word(client: TestClient, real: Json, staged: Json) -> None:
+    headers = {**OUR_PAGE, **control_header(client, real), "Idempotency-Key": "hold"}
+    assert take_off(client, staged, headers) == (202, "")
+    assert take_off(client, staged, headers) == (202, "")
+
+
+def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
+    with database.write() as session:
+        session.get_one(FlightRow, staged["flight"]["id"]).take_off_at = utc_now() - timedelta(seconds=11)
+    why = "it could not take off within 10 s of the operator's word"
+    assert is_wanted(database, staged) == (False, why)
+    with pytest.raises(ConflictError, match=why), database.write() as session:
+        flights.record_lift_off(session, staged["flight"]["id"])
+
+
+def test_a_real_vehicle_is_never_flown_in_one_go(client: TestClient, planned: Json) -> None:
+    for path, body in (
+        (f"/api/trials/{planned['id']}/fly", {}),
+        (f"/api/campaigns/{planned['campaign_id']}/trials", {"gains": DEFAULT_GAINS, "fly": {}}),
+    ):
+        refused = client.post(path, json=body, headers=OUR_PAGE)
+        assert refused.status_code == 403
+        assert "Stage the trial" in refused.json()["hint"]
+    assert planned["actions"] == ["stage", "cancel", "note"]
+
+
+def test_real_vehicles_fly_only_from_a_server_that_nobody_else_reaches(
+    settings: Settings, client: TestClient, database: Database, real: Json, planned: Json
+) -> None:
+    exposed = settings.model_copy(update={"host": "0.0.0.0"})
+    headers = {**OUR_PAGE, **control_header(client, real)}
+    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000") as network:
+        refused = network.post(f"/api/trials/{planned['id']}/stage", headers=headers)
+        assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
+        assert client.post(f"/api/trials/{planned['id']}/stage", headers=headers).status_code == 202
+        stage_claimed(database)
+        status, sentence = take_off(network, planned, headers)
+        assert (status, "can be reached over the network" in sentence) == (403, True)
+
+
+def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_again(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    answer = client.post(f"/api/trials/{staged['id']}/unstage")
+    assert (answer.status_code, answer.json()["state"]) == (202, "staged")
+    assert answer.json()["flight"]["standing_down"] == "unstaged by the operator"
+    assert answer.json()["actions"] == ["cancel", "abort", "note"]
+    assert is_wanted(database, staged) == (False, "unstaged by the operator")
+    headers = {**OUR_PAGE, **control_header(client, real)}
+    assert take_off(client, staged, headers) == (
+        409,
+        f"Trial {staged['number']} is being unstaged: unstaged by the operator.",
+    )
+    with database.write() as session:
+        flights.record_withdrawal(session, staged["flight"]["id"], "unstaged by the operator")
+        flights.record_restored(session, staged["flight"]["id"], DEFAULT_GAINS)
+    after = trial(client, staged)
+    assert (after["state"], after["flight"]["state"], after["actions"][0]) == ("planned", "cancelled", "stage")
+    assert seen(client, real)["state"] == "ready"
+
+
+def test_a_take_off_does_not_pass_an_unstaging(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
+    client.post(f"/api/trials/{staged['id']}/unstage")
+    with pytest.raises(ConflictError, match="unstaged by the operator"), database.write() as session:
+        flights.record_lift_off(session, staged["flight"]["id"])
+
+
+def test_a_cancelled_trial_stands_its_vehicle_down(client: TestClient, database: Database, staged: Json) -> None:
+    assert client.post(f"/api/trials/{staged['id']}/cancel").status_code == 200
+    assert is_wanted(database, staged) == (False, "the trial is cancelled")
+
+
+def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
+    with database.write() as session:
+        assert flights.lose_running_flights(session) == []
+    assert is_wanted(database, staged) == (False, "the flight is failed")
+    after = trial(client, staged)
+    assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker ended before lift-off")
+    assert seen(client, real)["state"] == "quarantined"
+
+
+def test_a_second_vehicle_of_the_kind_flies_meanwhile_and_the_same_one_does_not(
+    client: TestClient, database: Database, staged: Json
+) -> None:
+    other = create_connected(client, database, "Other")
+    second = create_trial(client, create_campaign_on(client, database, other)["id"])
+    assert client.post(f"/api/trials/{second['id']}/fly").status_code == 202
+    task = claim(database)
+    assert (task.vehicle_id, task.vehicle_kind, task.mode) == (other["id"], "mavlink", "fly")
+    assert task.vehicle_options == other["options"]
+    again = create_trial(client, staged["campaign_id"], gains={"kp": 250, "ki": 13, "kd": 82})
+    refused = client.post(f"/api/trials/{again['id']}/stage")
+    assert refused.status_code == 409
+    assert "is staged" in refused.json()["detail"]
+
+
+def test_a_simulated_vehicle_is_staged_by_a_script_too(client: TestClient, database: Database) -> None:
+    vehicle = create_connected(client, database)
+    planned = create_trial(client, create_campaign_on(client, database, vehicle)["id"])
+    assert planned["actions"] == ["fly", "stage", "cancel", "note"]
+    client.post(f"/api/trials/{planned['id']}/stage")
+    task = stage_claimed(database)
+    assert task.mode == "stage"
+    assert seen(client, vehicle)["held"] == task.gains
+    assert take_off(client, planned, {}) == (202, "")
+    with database.write() as session:
+        flights.record_lift_off(session, task.flight_id)
+
+
+def test_a_shared_simulation_is_not_staged(client: TestClient, database: Database) -> None:
+    planned = create_trial(client, create_ready_campaign(client, database)["id"])
+    refused = client.post(f"/api/trials/{planned['id']}/stage")
+    assert (refused.status_code, "is flown in one go" in refused.json()["detail"]) == (409, True)
+    client.post(f"/api/trials/{planned['id']}/fly")
+    stage_claimed(database)
+    for act in ("take-off", "unstage"):
+        answer = client.post(f"/api/trials/{planned['id']}/{act}")
+        assert (answer.status_code, "flies in one go" in answer.json()["detail"]) == (409, True)
+
+
+def fly(client: TestClient, database: Database, vehicle: Json, planned: Json, record: FlightRecord) -> Json:
+    """The whole flight of a staged trial."""
+    assert client.post(f"/api/trials/{planned['id']}/stage").status_code == 202
+    task = stage_claimed(database)
+    take_off(client, planned, {**OUR_PAGE, **control_header(client, vehicle)})
+    with database.write() as session:
+        flights.record_lift_off(session, task.flight_id)
+    with database.write() as session:
+        flights.record_landing(session, task.flight_id, record)
+        flights.record_restored(session, task.flight_id, task.safe_gains)
+    return trial(client, planned)
+
+
+def with_battery(first_v: float, last_v: float) -> FlightRecord:
+    climb = create_climb()
+    falling = first_v + (last_v - first_v) * climb.time_s / climb.time_s[-1]
+    channels = {**climb.channels, "battery_v": falling}
+    return FlightRecord(trajectory=Trajectory(climb.time_s, channels, "test", "vehicle"), ending="completed")
+
+
+def test_a_real_flight_keeps_its_battery_and_waits_for_a_persons_class(
+    client: TestClient, database: Database, real: Json, planned: Json
+) -> None:
+    answer = client.patch(f"/api/vehicles/{real['id']}", json={"version": real["version"], "battery": " blue 2 "})
+    assert answer.json()["battery"] == "blue 2"
+    flown = fly(client, database, real, planned, with_battery(11.5, 10.75))
+    assert (flown["state"], flown["flight"]["battery"]) == ("captured", "blue 2")
+    assert (flown["flight"]["battery_v_before"], flown["flight"]["battery_v_after"]) == (11.5, 10.75)
+
+
+def test_a_measurement_that_is_no_good_is_suggested_for_a_real_flight_and_said_of_a_simulated_one(
+    client: TestClient, database: Database, real: Json, planned: Json
+) -> None:
+    void = create_record(ending="invalid", reason="the clock stood still for 0.3 s")
+    flown = fly(client, database, real, planned, void)
+    assert (flown["state"], flown["reason"]) == ("captured", "the clock stood still for 0.3 s")
+    assert flown["record"]["ending"] == "invalid"
+    assert "the measurement is in doubt: the clock stood still for 0.3 s" in flown["verdict"]
+    assert flown["flight"]["state"] == "landed"
+
+    simulated = create_connected(client, database, "Simulated")
+    second = create_trial(client, create_campaign_on(client, database, simulated)["id"])
+    judged = fly(client, database, simulated, second, void)
+    assert (judged["state"], judged["reason"], judged["error"]) == ("invalid", "the clock stood still for 0.3 s", None)
+
+
+def test_the_ledger_lists_every_gain_set_that_was_given(
+    client: TestClient, database: Database, real: Json, planned: Json
+) -> None:
+    fly(client, database, real, planned, create_record())
+    assert seen(client, real)["held"] == DEFAULT_GAINS
+    better = {"kp": 250, "ki": 13, "kd": 82}
+    change = {"version": real["version"], "safe_gains": better, "statement": "Ada"}
+    header = control_header(client, real)
+    assert client.patch(f"/api/vehicles/{real['id']}", json=change, headers=header).status_code == 200
+    client.post(f"/api/vehicles/{real['id']}/restore", headers=header)
+    with database.write() as session:
+        task = acts.claim_act(session, WORKER)
+        assert task is not None
+        acts.finish_act(session, task.act_id, read_back=task.vehicle.safe_gains)
+    client.post(f"/api/vehicles/{real['id']}/check", headers=header)
+
+    path = f"/api/vehicles/{real['id']}/ledger"
+    first = get(client, f"{path}?limit=3")
+    rest = get(client, f"{path}?limit=3&cursor={first['next_cursor']}")
+    lines = [*first["items"], *rest["items"]]
+    assert (first["total"], rest["next_cursor"]) == (4, None)
+    assert [(line["purpose"], line["asked"], line["read_back"], line["outcome"]) for line in lines] == [
+        ("restore", better, better, "done"),
+        ("restore after flight", DEFAULT_GAINS, DEFAULT_GAINS, "done"),
+        ("flight", DEFAULT_GAINS, DEFAULT_GAINS, "landed"),
+        ("connect", DEFAULT_GAINS, DEFAULT_GAINS, "done"),
+    ]
+    assert [line["trial_id"] for line in lines] == [None, planned["id"], planned["id"], None]
+    assert seen(client, real)["held"] == better
+
+
+def test_safe_gains_that_did_not_come_back_stand_in_the_ledger_as_they_were_read(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    wrong = {"kp": 283, "ki": 0, "kd": 82}
+    with database.write() as session:
+        flights.record_failure(session, staged["flight"]["id"], "refused")
+        flights.record_restored(session, staged["flight"]["id"], wrong)
+        flights.quarantine_vehicle(session, staged["flight"]["id"], "ki was read back as 0")
+    line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
+    assert (line["asked"], line["read_back"], line["outcome"]) == (DEFAULT_GAINS, wrong, "failed")
+    assert seen(client, real)["state"] == "quarantined"
+
+
+def test_the_definition_keeps_the_safe_gains_of_its_first_flight(
+    client: TestClient, database: Database, real: Json, planned: Json
+) -> None:
+    flown = fly(client, database, real, planned, create_record())
+    said = {"version": flown["version"], "outcome": "valid", "reason": "clean"}
+    assert client.post(f"/api/trials/{flown['id']}/classify", json=said).status_code == 200
+    run_jobs(database)
+    path = f"/api/campaigns/{planned['campaign_id']}/proposal"
+    before = get(client, path)
+    change = {"version": real["version"], "safe_gains": {"kp": 250, "ki": 13, "kd": 82}, "statement": "Ada"}
+    header = control_header(client, real)
+    assert client.patch(f"/api/vehicles/{real['id']}", json=change, headers=header).status_code == 200
+    after = get(client, path)
+    assert (before["state"], after["state"]) == ("ready", "ready")
+    assert after["proposal"]["stale"] is False
+
+
+def test_the_telemetry_log_of_a_flight_is_handed_out(
+    settings: Settings, client: TestClient, database: Database, staged: Json
+) -> None:
+    path = f"/api/trials/{staged['id']}/tlog"
+    missing = client.get(path)
+    assert (missing.status_code, "leave one" in missing.json()["hint"]) == (404, True)
+    file = telemetry_log(settings.data_dir, staged["flight"]["id"])
+    file.parent.mkdir()
+    file.write_bytes(b"\x00\x01frames")
+    answer = client.get(path)
+    assert (answer.status_code, answer.content) == (200, b"\x00\x01frames")
+    assert f"campaign-{staged['campaign_id']}-trial-{staged['number']}.tlog" in answer.headers["content-disposition"]
+
+
+def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json) -> None:
+    client.post(f"/api/trials/{planned['id']}/stage")
+    take_control(client, real)
+    answer = client.post(f"/api/trials/{planned['id']}/abort")
+    assert (answer.status_code, answer.json()["accepted"]) == (202, True)
+    assert trial(client, planned)["flight"]["state"] == "cancelled"
