@@ -3,6 +3,7 @@ import { AppFrame } from "./components/AppFrame";
 import { CampaignPage } from "./pages/CampaignPage";
 import { CampaignsPage } from "./pages/CampaignsPage";
 import { FlightPage } from "./pages/FlightPage";
+import { FlyPage } from "./pages/FlyPage";
 import { JobsPage } from "./pages/JobsPage";
 import { NewCampaignPage } from "./pages/NewCampaignPage";
 import { NotFoundPage } from "./pages/NotFoundPage";
@@ -16,6 +17,7 @@ export function App() {
         <Route path="new" element={<NewCampaignPage />} />
         <Route path="campaigns/:campaignId" element={<CampaignPage />} />
         <Route path="campaigns/:campaignId/flights/:trialId" element={<FlightPage />} />
+        <Route path="fly/:trialId" element={<FlyPage />} />
         <Route path="reproductions" element={<ReproductionsPage />} />
         <Route path="jobs" element={<JobsPage />} />
         <Route path="*" element={<NotFoundPage />} />

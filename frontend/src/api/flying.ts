@@ -2,6 +2,7 @@
 
 import { useQuery } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef, useState } from "react";
+import { liveFlightsNow } from "../live/store";
 import { answer } from "./client";
 import { abortTrial, getCampaign, listCampaigns } from "./generated";
 
@@ -59,7 +60,7 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
 
   const tell = useCallback(async (trialId: number): Promise<void> => {
     const refusal = await askToAbort(trialId);
-    const over = !inTheAir.current.has(trialId);
+    const over = !inTheAir.current.has(trialId) && !liveFlightsNow().some((flight) => flight.trialId === trialId);
     setTrouble(over ? null : refusal);
     if (refusal !== null && !over) setTimeout(() => void tell(trialId), AGAIN_MS);
   }, []);
@@ -78,3 +79,5 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
 
   return { asked, trouble, press };
 }
+
+export type AbortControl = ReturnType<typeof useAbort>;

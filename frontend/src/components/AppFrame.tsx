@@ -1,6 +1,7 @@
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useRef } from "react";
 import { Link, Outlet, useMatch } from "react-router";
+import { useRenewedControl } from "../api/control";
 import { followEvents } from "../api/events";
 import { useAbort, useFlying } from "../api/flying";
 import { useCampaign } from "../api/queries";
@@ -12,6 +13,7 @@ import classes from "./Frame.module.css";
 import { MainNav } from "./MainNav";
 import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleBadge } from "./VehicleBadge";
+import { VehicleStrip } from "./VehicleStrip";
 
 /**
  * Space ends the flight, whatever has the focus, a text too: losing a blank is cheaper.
@@ -60,10 +62,12 @@ export function AppFrame() {
   const campaignId = onPage ? Number(onPage.params.campaignId) : null;
   const flying = useFlying();
   const abort = useAbort(flying);
+  const onFlyScreen = useMatch("/fly/:trialId") !== null;
   useEventStream(flying.length > 0);
+  useRenewedControl();
   useSpaceAborts(flying, campaignId, abort.press);
   return (
-    <>
+    <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
       <a href="#main" className={classes["skip"]}>
         Skip to the content
       </a>
@@ -91,11 +95,12 @@ export function AppFrame() {
             <strong>The abort has not reached the worker yet; it is sent again.</strong> {abort.trouble}
           </p>
         )}
+        <VehicleStrip />
         <ConnectionNotice />
       </header>
       <main id="main" className={classes["main"]} tabIndex={-1}>
-        <Outlet />
+        <Outlet context={abort} />
       </main>
-    </>
+    </div>
   );
 }

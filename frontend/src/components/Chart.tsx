@@ -13,7 +13,8 @@ interface Props {
   figure: PlotlyFigure;
   /** What the chart shows, for those who cannot see it; the data table says the rest. */
   label: string;
-  height: number;
+  /** In pixels; null fills what holds it. */
+  height: number | null;
   liveTrial?: number | null;
   onChoose?: (trial: number) => void;
 }
@@ -85,7 +86,12 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
 
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset is for forms; this groups a drawing's parts under one name
-    <div role="group" aria-label={label} className={classes["frame"]} style={{ height: `min(${height}px, 96vw)` }}>
+    <div
+      role="group"
+      aria-label={label}
+      className={classes["frame"]}
+      style={{ height: height === null ? "100%" : `min(${height}px, 96vw)` }}
+    >
       {broken !== null && (
         <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table still works.</p>
       )}

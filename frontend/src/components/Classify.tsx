@@ -2,6 +2,7 @@ import { Button, Chip, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useClassify } from "../api/mutations";
 import type { Trial } from "../api/types";
+import type { Suggestion } from "../lib/flyScreen";
 import { problemOf, reasonsByField } from "../lib/problems";
 import { INVALID_REASONS, otherClasses } from "../lib/verdict";
 import { Trouble } from "./Trouble";
@@ -9,13 +10,30 @@ import classes from "./Verdict.module.css";
 
 const WORDS = { valid: "Count it as valid", aborted: "Class as aborted", invalid: "Mark invalid" } as const;
 
+interface Props {
+  trial: Trial;
+  /** What stands out, and is one tap away with its own reason. */
+  suggestion?: Suggestion | null;
+}
+
 /** Say what a flight is worth: one tap to undo, a reason to throw out. */
-export function Classify({ trial }: { trial: Trial }) {
+export function Classify({ trial, suggestion = null }: Props) {
   const [asking, setAsking] = useState(false);
   const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
   const classify = useClassify();
   const others = otherClasses(trial);
   if (others.length === 0) return null;
+
+  function choose(outcome: Suggestion["outcome"]): void {
+    const suggested = suggestion?.outcome === outcome ? suggestion.why : "";
+    if (outcome === "invalid" && suggested === "") {
+      setAsking(true);
+      return;
+    }
+    const word = trial.state === "invalid" ? "counted again by the operator" : "judged by the operator";
+    classify.mutate({ trial, outcome, reason: outcome === "invalid" ? suggested : word });
+  }
+
   if (asking) {
     const refused = reasonsByField(problemOf(classify.error), ["reason"])["reason"];
     return (
@@ -60,17 +78,9 @@ export function Classify({ trial }: { trial: Trial }) {
       {others.map((outcome) => (
         <Button
           key={outcome}
-          variant={outcome === "invalid" || trial.state === "invalid" ? "default" : "filled"}
+          variant={standsOut(outcome, trial, suggestion) ? "filled" : "default"}
           loading={classify.isPending}
-          onClick={() =>
-            outcome === "invalid"
-              ? setAsking(true)
-              : classify.mutate({
-                  trial,
-                  outcome,
-                  reason: trial.state === "invalid" ? "counted again by the operator" : "judged by the operator",
-                })
-          }
+          onClick={() => choose(outcome)}
         >
           {trial.state === "invalid" ? `Undo: ${WORDS[outcome].toLowerCase()}` : WORDS[outcome]}
         </Button>
@@ -78,4 +88,9 @@ export function Classify({ trial }: { trial: Trial }) {
       <Trouble error={classify.error} />
     </>
   );
+}
+
+function standsOut(outcome: Suggestion["outcome"], trial: Trial, suggestion: Suggestion | null): boolean {
+  if (suggestion !== null) return outcome === suggestion.outcome;
+  return outcome !== "invalid" && trial.state !== "invalid";
 }

@@ -2,7 +2,7 @@
 
 import type { Trial, TrialState } from "../api/types";
 import { type StateWords, trialWords } from "./states";
-import { type Aged, linkText, stepWord } from "./vehicle";
+import { type Aged, stepWord } from "./vehicle";
 
 /**
  * plan: gains to be set. staged: they are on the vehicle, which waits. unstaging: the safe gains go back. judge: it landed
@@ -60,7 +60,7 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
 /** The one big word. Of a vehicle with a link of its own `status` tells the step; a silent one is never "Recording". */
 export function stateWord(trial: Standing, step: FlyStep, status: Aged | null, quarantined: boolean): StateWords {
   if (step === "flying" && status !== null) {
-    if (!status.isCurrent) return { word: `Link lost, ${linkText(status)}`, tone: "bad" };
+    if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
     if (IN_FLIGHT.has(status.status.step)) {
       const isBad = status.status.step === "link lost" || status.status.step === "abort-land";
       return { word: stepWord(status.status.step), tone: isBad ? "bad" : "busy" };
@@ -87,6 +87,11 @@ export function gainTicks(asked: Gains, readBack: Gains | null, held: Gains): Ga
     const said = readBack?.[name] ?? held[name] ?? null;
     return { name, asked: value, held: said, confirmed: said === value };
   });
+}
+
+/** The gains in the order of `names`, those that are known. */
+export function inOrder(gains: Gains, names: readonly string[]): Gains {
+  return Object.fromEntries(names.flatMap((name) => (gains[name] === undefined ? [] : [[name, gains[name]]])));
 }
 
 export function sameHeld(held: Gains, safe: Gains): boolean {

@@ -50,8 +50,8 @@ test("flights of long ago are forgotten, those under way are not", () => {
   expect([...flights.keys()]).toEqual([14, 15, 16, 17, 18, 19, 20, 99]);
 });
 
-test("what has landed or ended is not under way", () => {
-  const phases = ["staging", "flying", "landed", "ended"];
+test("what waits on the ground, has landed or ended is not under way: Space is a blank again there", () => {
+  const phases = ["staging", "staged", "flying", "landed", "ended"];
   const flights = new Map(phases.map((phase, trialId) => [trialId, { ...begun(1, trialId), phase }]));
   expect(underWay(flights).map(({ phase }) => phase)).toEqual(["staging", "flying"]);
 });

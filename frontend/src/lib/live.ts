@@ -69,11 +69,12 @@ export function readingOf(channel: string): { title: string; unit: string; digit
   return CHANNELS[channel] ?? { title: channel, unit: "", digits: 3 };
 }
 
-const OVER = new Set(["landed", "ended"]);
+/** On the ground: over, or waiting with the gains set for its operator's word. */
+const DOWN = new Set(["staged", "landed", "ended"]);
 
-/** The flights that the stream last spoke of as under way. */
+/** The flights that the stream last spoke of as under way, from the moment that their gains are set. */
 export function underWay(flights: ReadonlyMap<number, LiveFlight>): LiveFlight[] {
-  return [...flights.values()].filter(({ phase }) => !OVER.has(phase));
+  return [...flights.values()].filter(({ phase }) => !DOWN.has(phase));
 }
 
 const KEPT = 8;

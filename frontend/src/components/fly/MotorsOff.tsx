@@ -1,0 +1,37 @@
+import type { useVehicleOrders } from "../../api/fly";
+import type { Vehicle } from "../../api/types";
+import type { Aged } from "../../lib/vehicle";
+import { SlideToConfirm } from "../SlideToConfirm";
+import classes from "./Fly.module.css";
+
+interface Props {
+  vehicle: Vehicle;
+  status: Aged | null;
+  orders: ReturnType<typeof useVehicleOrders>;
+}
+
+/** The last resort, in a corner of its own. */
+export function MotorsOff({ vehicle, status, orders }: Props) {
+  const enabled = vehicle.actions.includes("motors off") || status?.status.armed === true;
+  return (
+    <div className={classes["motorsOff"]}>
+      <SlideToConfirm
+        label="Motors off – the drone falls"
+        meaning="Stops the motors at any height."
+        disabled={!enabled}
+        onConfirm={() => orders.press("motors off")}
+      />
+      <OrderSaid orders={orders} />
+    </div>
+  );
+}
+
+/** What became of the last order, loudly where the vehicle was not told. */
+export function OrderSaid({ orders: { said } }: { orders: ReturnType<typeof useVehicleOrders> }) {
+  if (said === null) return null;
+  return (
+    <p className={classes["said"]} data-bad={!said.accepted || undefined} role="alert">
+      {said.accepted ? said.sentence : `Not told (${said.order}). ${said.sentence}`}
+    </p>
+  );
+}

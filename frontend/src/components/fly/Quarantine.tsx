@@ -1,0 +1,40 @@
+import { Anchor, Button } from "@mantine/core";
+import { IconAlertOctagonFilled, IconArrowBarToDown } from "@tabler/icons-react";
+import { Link } from "react-router";
+import type { useVehicleOrders } from "../../api/fly";
+import type { Vehicle } from "../../api/types";
+import classes from "./Fly.module.css";
+import { OrderSaid } from "./MotorsOff";
+
+interface Props {
+  vehicle: Vehicle;
+  concern: string;
+  orders: ReturnType<typeof useVehicleOrders>;
+}
+
+/** Something could not be verified: what it is, what can still be done, and who ends it. */
+export function Quarantine({ vehicle, concern, orders }: Props) {
+  return (
+    <section className={classes["quarantine"]}>
+      <div role="alert">
+        <h2>
+          <IconAlertOctagonFilled size={24} aria-hidden />
+          Quarantined: do not fly
+        </h2>
+        <p>{concern}</p>
+      </div>
+      <Button
+        size="lg"
+        color="red"
+        leftSection={<IconArrowBarToDown size={22} aria-hidden />}
+        onClick={() => orders.press("land")}
+      >
+        Land now
+      </Button>
+      {orders.said?.order === "land" && <OrderSaid orders={orders} />}
+      <Anchor component={Link} to={`/vehicles/${vehicle.id}`} className={classes["link"]}>
+        Look at {vehicle.name} and release it
+      </Anchor>
+    </section>
+  );
+}
