@@ -153,8 +153,9 @@ class CheckItem:
 class ConnectedVehicle(Vehicle, Protocol):
     """A vehicle whose link stays open between flights. For one thread.
 
-    Met armed, or in doubt, it is only observed: `concern` says why, nothing but `land` and `motors_off` reaches it, and
-    `stage`, `fly`, `check` and `parameters` raise SafeGainsError until `release`.
+    Met armed, or in doubt, it is only observed: `concern` says why, and `stage`, `fly` and `parameters` raise
+    SafeGainsError until `release`. `check` only reads; `land` and `motors_off` are possible always; `restore` once it
+    is disarmed.
     """
 
     @property
@@ -180,6 +181,11 @@ class ConnectedVehicle(Vehicle, Protocol):
     def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
         """Every parameter of the vehicle; `on_progress` is told how many came, of how many. Raises VehicleError when
         they do not come."""
+        ...
+
+    def restore(self) -> dict[str, float]:
+        """Write the safe gains and return what was read back. One that is only observed stays so. Raises SafeGainsError
+        when it is armed, VehicleError when it does not confirm."""
         ...
 
     def land(self, reason: str) -> None:

@@ -4,11 +4,16 @@ from typing import Final
 
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
-from app.vehicles.base import Vehicle, VehicleOption
+from app.vehicles.base import ConnectedVehicle, Identity, Vehicle, VehicleOption
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
+from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mocap import addresses as sources
+from app.vehicles.mocap.opening import open_source
+
+SCORED: Final = ("vehicle", "mocap")
 
 
 def is_simulated(options: Options, simulation_hosts: Hosts = HERE) -> bool:
@@ -23,7 +28,32 @@ def _may_simulate(address: addresses.Address, simulation_hosts: Hosts) -> bool:
 
 
 def _open(options: Options, safe_gains: Gains) -> Vehicle:
-    return MavlinkVehicle(options, safe_gains, is_real=not is_simulated(options))
+    return _vehicle(options, safe_gains, None, observes=False)
+
+
+def _connect(options: Options, safe_gains: Gains, identity: Identity | None) -> ConnectedVehicle:
+    return _vehicle(options, safe_gains, identity, observes=True)
+
+
+def _vehicle(options: Options, safe_gains: Gains, identity: Identity | None, *, observes: bool) -> MavlinkVehicle:
+    """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows."""
+    clock = ScaledClock(float(options["clock_speed"]))
+    place = str(options["second_source"])
+    source = open_source(place, clock) if place else None
+    try:
+        return MavlinkVehicle(
+            options,
+            safe_gains,
+            is_real=not is_simulated(options),
+            clock=clock,
+            identity=identity,
+            observes=observes,
+            source=source,
+        )
+    except BaseException:
+        if source is not None:
+            source.close()
+        raise
 
 
 def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]:
@@ -37,6 +67,9 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
     if options["simulated"] and not _may_simulate(address, simulation_hosts):
         believed = ", ".join(("a loopback address", *sorted(simulation_hosts)))
         problems.append(Problem("simulated", f"is not believed of {address}: only {believed} can be simulated"))
+    problems += _second_source_problems(str(options["second_source"]), str(options["scored_source"]))
+    if options["signing_key"] and options["autopilot"] == "paparazzi":
+        problems.append(Problem("signing_key", "cannot be had: Paparazzi speaks MAVLink 1, which has no signatures"))
     if options["clock_speed"] != 1.0 and not options["simulated"]:
         problems.append(Problem("clock_speed", "must be 1: a real vehicle's time is that of life"))
     return tuple(problems)
@@ -45,6 +78,18 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
 def _experiments(options: Options) -> tuple[str, ...]:
     """The one whose gains the autopilot has."""
     return (PROFILES[str(options["autopilot"])].experiment,)
+
+
+def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
+    if scored not in SCORED:
+        return (Problem("scored_source", f"must be {' or '.join(SCORED)}, got {scored}"),)
+    if not place:
+        return (Problem("scored_source", "mocap needs a second_source"),) if scored == "mocap" else ()
+    try:
+        sources.parse(place)
+    except InputError as error:
+        return error.problems
+    return ()
 
 
 def _number(name: str, title: str, unit: str, default: float, lower: float, upper: float) -> VehicleOption:
@@ -75,10 +120,26 @@ MAVLINK: Final = VehicleKind(
         _number("radius_m", "How far from its start it may drift", "m", 5.0, 0.5, 100.0),
         _number("clock_speed", "Speed of its time: 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
+            name="second_source",
+            title="A second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
+            unit="",
+            default="",
+        ),
+        VehicleOption(
+            name="scored_source", title="Whose altitude is scored: vehicle or mocap", unit="", default="vehicle"
+        ),
+        VehicleOption(
+            name="signing_key",
+            title="ArduCopter, PX4: MAVLink 2 signing, as 64 hexadecimal digits or a file of them; empty: unsigned",
+            unit="",
+            default="",
+        ),
+        VehicleOption(
             name="log_folder", title="Folder for telemetry logs of every flight; empty: none", unit="", default=""
         ),
     ),
     open=_open,
+    connect=_connect,
     conflicts=_conflicts,
     simulates=is_simulated,
     suits=_experiments,

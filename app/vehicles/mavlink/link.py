@@ -201,6 +201,14 @@ class Link:
             self._inbox.clear()
         return heard
 
+    def log_to(self, path: Path | None) -> None:
+        """Write what passes from now on to another telemetry log, None to none; returns once the one before is stored.
+        Raises LinkError when the file cannot be opened; the log before goes on then."""
+        following = TlogWriter(path) if path else None
+        before, self._tlog = self._tlog, following
+        if before:
+            before.close()
+
     def close(self) -> None:
         """End the conversation; returns once the log is stored. Again is harmless."""
         with self._sending:
@@ -307,9 +315,9 @@ class Link:
         return True
 
     def _record(self, frame: bytes) -> None:
-        if self._tlog:
+        if tlog := self._tlog:
             passed_us = round((self._clock.now_s() - self._opened_s) * 1e6)
-            self._tlog.write(self._opened_unix_us + passed_us, frame)
+            tlog.write(self._opened_unix_us + passed_us, frame)
 
     def _new_codec(self) -> Codec:
         system, component, key = self._identity

@@ -1,13 +1,20 @@
 """Gains on the vehicle: written, read back, one request in flight, five attempts of 0.5 s each."""
 
+from collections.abc import Callable, Mapping
+from typing import Final
+
 from app.core.errors import GainsError, Problem
 from app.core.policy import Gains
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.measurements import Measurement, Parameter
+from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing
 from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, Radio
-from app.vehicles.mavlink.signals import Setting
+from app.vehicles.mavlink.signals import Heard, Setting
+
+LIST_ENDS_S: Final = 2.0
+"""The list is over when nothing of it has come for so long."""
 
 
 def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
@@ -63,6 +70,47 @@ def read_gains(radio: Radio, gain_set: GainSet, asked: Gains | None = None) -> d
 def read_parameter(radio: Radio, parameter: str) -> float | None:
     """None when the vehicle does not answer: it has no such parameter, or no ears."""
     return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter)
+
+
+def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str, float]:
+    """Every parameter of the vehicle, by the list that it sends; what is lost of that is asked for one by one. Raises
+    VehicleError when it sends none, or not all."""
+    heard: dict[int, Parameter] = {}
+    radio.listen(0.0)
+    radio.send(base.list_parameters(radio.aim))
+    last_s = radio.clock.now_s()
+    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.patience_s / PATIENCE_S and not _is_complete(heard):
+        if found := _listed(radio.listen(radio.patience_s)):
+            heard |= found
+            last_s = radio.clock.now_s()
+            on_progress(len(heard), _count(heard))
+    for place in [place for place in range(_count(heard)) if place not in heard]:
+        heard |= _fetched(radio, place)
+        on_progress(len(heard), _count(heard))
+    if not heard or not _is_complete(heard):
+        raise VehicleError(
+            f"Its parameters did not come: {len(heard)} of {_count(heard) or 'an unknown number'}.",
+            hint="See that the link is good, and that nobody else is asking for them; then try again.",
+        )
+    return {heard[place].name: heard[place].value for place in sorted(heard)}
+
+
+def _listed(heard: list[Heard]) -> dict[int, Parameter]:
+    found = (each.measurement for each in heard if isinstance(each.measurement, Parameter))
+    return {each.place: each for each in found if each.place is not None}
+
+
+def _fetched(radio: Radio, place: int) -> dict[int, Parameter]:
+    answer = radio.ask(base.read_place(radio.aim, place), lambda it: isinstance(it, Parameter) and it.place == place)
+    return {place: answer} if isinstance(answer, Parameter) else {}
+
+
+def _count(heard: Mapping[int, Parameter]) -> int:
+    return max((each.count for each in heard.values()), default=0)
+
+
+def _is_complete(heard: Mapping[int, Parameter]) -> bool:
+    return bool(heard) and len(heard) >= _count(heard)
 
 
 def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:

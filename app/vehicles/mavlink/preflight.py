@@ -1,42 +1,73 @@
-"""Before anything flies: who answers there, whether it stands still on the ground, and whether its failsafes are on."""
+"""Before anything flies: who answers there, whether it stands still on the ground, and whether its failsafes are on.
+
+Everything is judged as an item; what refuses a flight and what a person is shown are the same items.
+"""
 
 import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from app.vehicles.base import CheckItem, Identity
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.measurements import Heartbeat, Position
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.profiles.base import Requirement
+from app.vehicles.mavlink.radio import PATIENCE_S, Radio
+from app.vehicles.mavlink.sources import Lookout
 
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
 POSITIONS_HZ: Final = 40.0
+SIGHTINGS_HZ: Final = 10.0
+ARMED: Final = "The vehicle is armed, although nobody here armed it."
+_HEARTBEATS_MISSED: Final = 3.5
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
+_DISARMED: Final = "disarmed"
+_VERSION_ATTEMPTS: Final = 2
+_LAND_FIRST: Final = "Land it, see that its motors have stopped, then verify its gains and release it."
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Where the vehicle stands, on its own datum."""
+    """Where the vehicle stands, on its own datum, and where a second source saw it meanwhile, on the source's."""
 
     altitude_m: float
     last: Position
+    seen_m: tuple[float, ...] = ()
 
 
-def meet(radio: Radio, address: str) -> None:
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What was heard of a vehicle on the ground within `seconds`."""
+
+    positions: tuple[Position, ...]
+    seconds: float
+    seen_m: tuple[float, ...] = ()
+
+    @property
+    def ground(self) -> Ground:
+        """Raises ValueError when no position came."""
+        altitude_m = statistics.median(position.altitude_m for position in self.positions)
+        return Ground(altitude_m, self.positions[-1], self.seen_m)
+
+
+# ---- meeting the vehicle
+
+
+def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
     """Wait for the heartbeat of an autopilot of the right make, sending nothing. Raises VehicleError when none comes
-    within 5 s, SafeGainsError when the vehicle is armed already."""
+    within 5 s, or another vehicle's than the `pinned` one's."""
     until_s = radio.clock.now_s() + HEARTBEAT_S
     makes: set[int] = set()
     while radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
         heartbeat = radio.seen.heartbeat
         if heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot:
-            _take_aim(radio, heartbeat)
-            return
+            return _take_aim(radio, heartbeat, pinned)
         if heartbeat is not None:
             makes.add(heartbeat.autopilot)
     others = f" Others were heard: MAVLink's autopilots {sorted(makes)}." if makes else ""
@@ -47,78 +78,196 @@ def meet(radio: Radio, address: str) -> None:
     )
 
 
-def _take_aim(radio: Radio, heartbeat: Heartbeat) -> None:
-    aircraft = radio.aim.aircraft or heartbeat.system
-    radio.aim = replace(radio.aim, system=heartbeat.system, aircraft=aircraft)
-    require_disarmed(radio)
+def _take_aim(radio: Radio, heartbeat: Heartbeat, pinned: Identity | None) -> None:
+    if pinned is not None and pinned.system_id != heartbeat.system:
+        raise VehicleError(
+            f"Another vehicle answers: system {heartbeat.system} instead of {pinned.system_id}.",
+            hint="Connect the vehicle that was registered, or register this one.",
+        )
+    radio.aim = replace(radio.aim, system=heartbeat.system, aircraft=radio.aim.aircraft or heartbeat.system)
+
+
+def learn(radio: Radio) -> str:
+    """Read the flight plan and the firmware's version, changing nothing; what is wrong with the plan, or nothing."""
+    problem = ""
+    try:
+        radio.aim = replace(radio.aim, blocks=radio.profile.explore(radio.ask, radio.aim))
+    except VehicleError as error:
+        problem = str(error)
+    radio.send(*radio.profile.conclude(radio.aim))
+    asking = radio.profile.ask_version(radio.aim)
+    if asking is not None:
+        radio.ask(asking, lambda _: bool(radio.seen.version), attempts=_VERSION_ATTEMPTS)
+    return problem
+
+
+def changed(radio: Radio, pinned: Identity | None) -> str:
+    """How the vehicle differs from the one that was pinned, where both tell; nothing when it does not."""
+    version = radio.seen.version
+    if pinned is None or not version or not pinned.version or version == pinned.version:
+        return ""
+    return f"Its firmware is now version {version}; it was {pinned.version}."
+
+
+def is_armed(radio: Radio) -> bool:
+    return radio.seen.heartbeat is not None and radio.seen.heartbeat.armed
 
 
 def require_disarmed(radio: Radio) -> None:
     """Raises SafeGainsError: nobody knows what an armed vehicle is doing, so nothing but Land may be sent to it."""
-    if radio.seen.heartbeat is not None and radio.seen.heartbeat.armed:
-        raise SafeGainsError(
-            "The vehicle is armed, although nobody here armed it.",
-            hint="Land it, see that its motors have stopped, then verify its gains and release it.",
-        )
+    if is_armed(radio):
+        raise SafeGainsError(ARMED, hint=_LAND_FIRST)
 
 
 def prepare(radio: Radio, telemetry_hz: float) -> None:
-    """Learn the flight plan, ask for telemetry, read the failsafes. Raises VehicleError for what is not as it must."""
-    blocks = radio.profile.explore(radio.ask, radio.aim)
-    radio.aim = replace(radio.aim, blocks=blocks)
+    """Ask for telemetry, and set what a take-off needs. Raises VehicleError when it is refused."""
     if why := radio.perform(radio.profile.prepare(radio.aim, telemetry_hz)):
         raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
-    _require_failsafes(radio)
 
 
-def _require_failsafes(radio: Radio) -> None:
-    off = [
-        f"{requirement.parameter} ({requirement.what})"
-        for requirement in radio.profile.requirements
-        if not read_parameter(radio, requirement.parameter)
-    ]
-    if off:
-        raise VehicleError(
-            f"The vehicle's own failsafes are off, or it does not tell: {', '.join(off)}.",
-            hint="Switch them on in the autopilot: when the link is lost, nothing else brings it down.",
-        )
+# ---- judging it
 
 
-def stand(radio: Radio, *, min_battery_v: float, watched_s: float = WATCHED_S) -> Ground:
-    """Watch the vehicle on the ground. Raises VehicleError naming everything that is not as it must be before a flight,
-    SafeGainsError when it is armed."""
+def watch(radio: Radio, lookout: Lookout | None, *, watched_s: float = WATCHED_S) -> Watched:
+    """Listen for so long, and up to 10 s for the battery's voltage."""
     radio.listen(0.0)
     radio.seen.positions.clear()
+    if lookout is not None:
+        lookout.forget()
     begun_s = radio.clock.now_s()
     while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
         radio.seen.battery_v is None and now_s < begun_s + _BATTERY_S
     ):
         radio.listen(_LISTEN_S)
-    require_disarmed(radio)
-    positions = [position for _, position in radio.seen.positions]
-    if problems := [*_motion_problems(positions), *_battery_problems(radio.seen.battery_v, min_battery_v)]:
-        raise VehicleError(
-            f"The vehicle is not ready to fly. {' '.join(problems)}", hint="Correct this, then try again."
-        )
-    return Ground(statistics.median(position.altitude_m for position in positions), positions[-1])
+    seen_m = () if lookout is None else lookout.stand()
+    return Watched(tuple(position for _, position in radio.seen.positions), now_s - begun_s, seen_m)
 
 
-def _motion_problems(positions: list[Position]) -> list[str]:
-    if len(positions) < 2 or positions[-1].time_boot_s <= positions[0].time_boot_s:
-        return [f"{len(positions)} positions came instead of {POSITIONS_HZ:g} a second."]
-    problems = []
-    rate_hz = (len(positions) - 1) / (positions[-1].time_boot_s - positions[0].time_boot_s)
-    if rate_hz < POSITIONS_HZ:
-        problems.append(f"Its position comes {rate_hz:.1f} times a second, it takes {POSITIONS_HZ:g}.")
+def judge(radio: Radio, watched: Watched, *, min_battery_v: float, plan_problem: str) -> tuple[CheckItem, ...]:
+    """All but the gains and the second source. Asks for the parameters that switch failsafes on."""
+    items = [_heartbeat(radio), _disarmed(radio), *_motion(watched), _battery(radio.seen.battery_v, min_battery_v)]
+    if radio.profile.flying_blocks:
+        items.append(_flight_plan(plan_problem))
+    return (*items, *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
+
+
+def judge_source(lookout: Lookout, watched: Watched) -> CheckItem:
+    rate_hz = len(watched.seen_m) / watched.seconds
+    return CheckItem(
+        name="second_source",
+        title="Second source of altitude",
+        passed=rate_hz >= SIGHTINGS_HZ,
+        found=lookout.source.trouble or f"{rate_hz:.0f} sightings a second from the {lookout.source.name}",
+        needed=f"{SIGHTINGS_HZ:g} a second or more",
+        hint="See that it tracks the vehicle and streams, or fly without it.",
+    )
+
+
+def require(items: Sequence[CheckItem]) -> None:
+    """Raises VehicleError naming everything that is not as it must be before a flight, SafeGainsError when the vehicle
+    is armed."""
+    failed = [item for item in items if not item.passed]
+    if any(item.name == _DISARMED for item in failed):
+        raise SafeGainsError(ARMED, hint=_LAND_FIRST)
+    if failed:
+        told = "; ".join(f"{item.title}: {item.found}, needed: {item.needed}" for item in failed)
+        hints = " ".join(dict.fromkeys(item.hint for item in failed if item.hint))
+        raise VehicleError(f"The vehicle is not ready to fly. {told}.", hint=hints or "Correct this, then try again.")
+
+
+def _heartbeat(radio: Radio) -> CheckItem:
+    age_s = radio.clock.now_s() - radio.seen.heartbeat_s
+    heartbeat = radio.seen.heartbeat
+    make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
+    version = f" {radio.seen.version}" if radio.seen.version else ""
+    oldest_s = _HEARTBEATS_MISSED * radio.profile.heartbeat_s * radio.patience_s / PATIENCE_S
+    return CheckItem(
+        name="heartbeat",
+        title="Heartbeat",
+        passed=make and age_s < oldest_s,
+        found=f"{radio.profile.title}{version}, system {radio.aim.system}, {age_s:.1f} s ago"
+        if make
+        else "another make of autopilot",
+        needed=f"{radio.profile.title}, within {oldest_s:g} s",
+        hint="See that it is on and in reach.",
+    )
+
+
+def _disarmed(radio: Radio) -> CheckItem:
+    armed = is_armed(radio)
+    return CheckItem(
+        name=_DISARMED,
+        title="Motors",
+        passed=not armed,
+        found="armed" if armed else "disarmed",
+        needed="disarmed",
+        hint=_LAND_FIRST if armed else "",
+    )
+
+
+def _motion(watched: Watched) -> tuple[CheckItem, ...]:
+    positions = watched.positions
+    passed_s = positions[-1].time_boot_s - positions[0].time_boot_s if positions else 0.0
+    rate_hz = (len(positions) - 1) / passed_s if passed_s > 0.0 else 0.0
     altitudes = [position.altitude_m for position in positions]
-    if (moved_m := max(altitudes) - min(altitudes)) > _STANDS_WITHIN_M:
-        problems.append(f"Its altitude moved by {moved_m:.2f} m on the ground.")
-    return problems
+    moved_m = max(altitudes) - min(altitudes) if altitudes else 0.0
+    return (
+        CheckItem(
+            name="position",
+            title="Position",
+            passed=rate_hz >= POSITIONS_HZ,
+            found=f"{rate_hz:.1f} times a second",
+            needed=f"{POSITIONS_HZ:g} times a second or more",
+            hint="Set its telemetry up for tuning (docs/real-flight.md).",
+        ),
+        CheckItem(
+            name="clock",
+            title="Its clock",
+            passed=passed_s > 0.0,
+            found=f"{passed_s:.2f} s passed in {watched.seconds:.2f} s",
+            needed="time that passes",
+            hint="Restart the vehicle.",
+        ),
+        CheckItem(
+            name="still",
+            title="Standing still",
+            passed=bool(altitudes) and moved_m <= _STANDS_WITHIN_M,
+            found=f"its altitude moved by {moved_m:.2f} m" if altitudes else "no position",
+            needed=f"{_STANDS_WITHIN_M:g} m or less",
+            hint="Put it on firm ground and let its position settle.",
+        ),
+    )
 
 
-def _battery_problems(battery_v: float | None, min_battery_v: float) -> list[str]:
-    if battery_v is None:
-        return [f"It did not tell its battery's voltage within {_BATTERY_S:g} s."]
-    if battery_v < min_battery_v:
-        return [f"Its battery is at {battery_v:.1f} V, below {min_battery_v:g} V."]
-    return []
+def _battery(battery_v: float | None, min_battery_v: float) -> CheckItem:
+    return CheckItem(
+        name="battery",
+        title="Battery",
+        passed=battery_v is not None and battery_v >= min_battery_v,
+        found="no voltage told" if battery_v is None else f"{battery_v:.1f} V",
+        needed=f"{min_battery_v:g} V or more",
+        hint="Put a charged battery in, or correct the limit.",
+    )
+
+
+def _flight_plan(problem: str) -> CheckItem:
+    return CheckItem(
+        name="flight_plan",
+        title="Flight plan",
+        passed=not problem,
+        found=problem or "has the blocks",
+        needed="the blocks that a take-off and a landing take",
+        hint="Load a flight plan with these blocks (docs/real-flight.md), then connect again." if problem else "",
+    )
+
+
+def _failsafe(radio: Radio, requirement: Requirement) -> CheckItem:
+    value = read_parameter(radio, requirement.parameter)
+    return CheckItem(
+        name=f"failsafe {requirement.parameter}",
+        title=f"Its own failsafe {requirement.parameter}",
+        passed=bool(value),
+        found="not told" if value is None else f"{value:g}" if value else "off",
+        needed=requirement.what,
+        hint="Switch it on in the autopilot: when the link is lost, nothing else brings it down.",
+    )

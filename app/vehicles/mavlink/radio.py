@@ -6,8 +6,18 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from app.vehicles.mavlink.clock import Clock
-from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Parameter, Position, Reply, Spoken
+from app.vehicles.mavlink.link import Link, Received
+from app.vehicles.mavlink.measurements import (
+    Battery,
+    BlockEntered,
+    Heartbeat,
+    Measurement,
+    Parameter,
+    Position,
+    Reply,
+    Spoken,
+    Version,
+)
 from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile, Step
 from app.vehicles.mavlink.signals import Action, Done, Heard, Refused
 
@@ -19,9 +29,13 @@ _SPOKEN: Final = 5
 
 @dataclass(slots=True)
 class Seen:
-    """The latest of what a vehicle said; positions with the time of their receipt."""
+    """The latest of what a vehicle said; positions with the time of their receipt. `block` is the number of its flight
+    plan's block."""
 
     heartbeat: Heartbeat | None = None
+    heartbeat_s: float = float("-inf")
+    version: str = ""
+    block: int | None = None
     battery_v: float | None = None
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
     spoken: deque[str] = field(default_factory=lambda: deque(maxlen=_SPOKEN))
@@ -29,7 +43,11 @@ class Seen:
     def note(self, measurement: Measurement | None, now_s: float) -> None:
         match measurement:
             case Heartbeat():
-                self.heartbeat = measurement
+                self.heartbeat, self.heartbeat_s = measurement, now_s
+            case Version(version=version):
+                self.version = version
+            case BlockEntered(number=number):
+                self.block = number
             case Battery(voltage_v=volts):
                 self.battery_v = volts
             case Position():
@@ -41,15 +59,32 @@ class Seen:
 
 
 class Radio:
-    """A link with a profile; an answer is waited for `patience_s`. For one thread."""
+    """A link with a profile; an answer is waited for `patience_s`. `overhear` gets every message besides. For one
+    thread."""
 
-    def __init__(self, link: Link, profile: Profile, clock: Clock, aim: Aim, *, patience_s: float = PATIENCE_S) -> None:
+    def __init__(
+        self,
+        link: Link,
+        profile: Profile,
+        clock: Clock,
+        aim: Aim,
+        *,
+        patience_s: float = PATIENCE_S,
+        overhear: Callable[[Received], None] | None = None,
+    ) -> None:
         self.link: Final = link
         self.profile: Final = profile
         self.clock: Final = clock
         self.aim = aim
         self.patience_s: Final = patience_s
         self.seen: Final = Seen()
+        self._overhear = overhear
+
+    @property
+    def block(self) -> str:
+        """The block of its flight plan that the vehicle is in, by name; empty where it does not tell."""
+        names = {number: name for name, number in self.aim.blocks.items()}
+        return "" if self.seen.block is None else names.get(self.seen.block, f"block {self.seen.block}")
 
     def send(self, *messages: Outgoing) -> None:
         """Raises LinkError when the link is closed."""
@@ -58,10 +93,11 @@ class Radio:
 
     def listen(self, timeout_s: float) -> list[Heard]:
         """What has come since the last call, waiting at most so long for the first. Raises LinkError as `send`."""
-        heard = [
-            Heard(self.profile.measure(received.message), received.received_s)
-            for received in self.link.receive(timeout_s)
-        ]
+        messages = self.link.receive(timeout_s)
+        if self._overhear is not None:
+            for message in messages:
+                self._overhear(message)
+        heard = [Heard(self.profile.measure(received.message), received.received_s) for received in messages]
         for each in heard:
             self.seen.note(each.measurement, each.now_s)
         return heard

@@ -5,6 +5,7 @@ Both ends hold the same 32 bytes. Nothing of MAVLink 1 can be signed, so Paparaz
 
 import datetime as dt
 import time
+from pathlib import Path
 from typing import Final, Protocol
 
 from app.core.errors import InputError, Problem
@@ -31,6 +32,20 @@ def parse_key(text: str) -> bytes:
         key = b""
     check_key(key)
     return key
+
+
+def read_key(text: str) -> bytes:
+    """The key that `text` writes, or that is written in the file it names. Raises InputError for neither."""
+    if len(text.strip()) == 2 * KEY_BYTES and not Path(text).exists():
+        return parse_key(text)
+    try:
+        return parse_key(Path(text).expanduser().read_text(encoding="ascii"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            "The signing key cannot be read.",
+            problems=(Problem("signing_key", f"names a file that cannot be read ({type(error).__name__})"),),
+            hint=f"Give {2 * KEY_BYTES} hexadecimal digits, or a file that holds them.",
+        ) from error
 
 
 def check_key(key: bytes) -> None:

@@ -3,11 +3,13 @@
 A record has both: `altitude_m` is the scored one, `altitude_2_m` the other.
 """
 
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from app.vehicles.mavlink.link import Received
+from app.vehicles.mavlink.signals import Sighted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,3 +49,42 @@ class Source(Protocol):
         ...
 
     def close(self) -> None: ...
+
+
+class Lookout:
+    """A source whose altitudes are put on the vehicle's datum: both stood on the ground at the same time.
+
+    `seen` are the sightings of the flight so far, as time of receipt (s) and altitude (m).
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.seen: list[tuple[float, float]] = []
+        self._rise_m = 0.0
+
+    def forget(self) -> None:
+        """Pass over what came while nobody needed it."""
+        self.source.take()
+
+    def stand(self) -> tuple[float, ...]:
+        """The altitudes at which it saw the vehicle since the last call."""
+        return tuple(sample.altitude_m for sample in self.source.take() if sample.tracking_valid and sample.advances)
+
+    def begin(self, stood_m: Sequence[float], ground_m: float) -> None:
+        """A flight begins: `stood_m` is where it saw the vehicle stand, which is at `ground_m` on its own datum."""
+        self._rise_m = ground_m - statistics.median(stood_m)
+        self.seen.clear()
+        self.forget()
+
+    def look(self) -> list[Sighted]:
+        """What it saw since the last call."""
+        sighted = [
+            Sighted(
+                altitude_m=sample.altitude_m + self._rise_m,
+                is_new=sample.tracking_valid and sample.advances,
+                now_s=sample.received_s,
+            )
+            for sample in self.source.take()
+        ]
+        self.seen += [(each.now_s, each.altitude_m) for each in sighted if each.is_new]
+        return sighted

@@ -1,6 +1,6 @@
 """Carries out a trial: feeds the machine what is heard and what is wanted, and does what it says."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,6 +8,7 @@ from app.vehicles.base import Sample, ShouldStop, Stop
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.limits import Watch
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.measurements import Position
 from app.vehicles.mavlink.radio import Conversation, Radio
 from app.vehicles.mavlink.signals import (
     AbortWanted,
@@ -15,10 +16,12 @@ from app.vehicles.mavlink.signals import (
     Command,
     Event,
     Keep,
+    MotorsOffWanted,
     Perform,
     Restored,
     RestoreGains,
     SendGain,
+    Sighted,
     Tick,
 )
 from app.vehicles.mavlink.states import State
@@ -34,17 +37,24 @@ _SAMPLE_EVERY_S: Final = 0.015
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """How a trial ended, and its samples; `error` is what the caller's own functions raised meanwhile."""
+    """How a trial ended, and its samples; `error` is what the caller's own functions raised meanwhile. `offset_s` takes
+    the vehicle's clock to ours, as the packet shows that came fastest."""
 
     trial: Trial
     samples: tuple[Keep, ...]
+    offset_s: float
     error: BaseException | None
+
+
+def _blind() -> Sequence[Sighted]:
+    return ()
 
 
 class Flight:
     """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
 
-    `restore` writes the safe gains, reads them back, and says what is wrong with them, or nothing.
+    `restore` writes the safe gains, reads them back, and says what is wrong with them, or nothing. `look` gives what a
+    second source of altitude has seen since the last call; `channels` are those of a sample, for whoever watches.
     """
 
     def __init__(
@@ -56,8 +66,11 @@ class Flight:
         restore: Callable[[], str],
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
+        channels: Callable[[Keep], dict[str, float]],
+        look: Callable[[], Sequence[Sighted]] = _blind,
     ) -> None:
-        self._radio, self._restore = radio, restore
+        self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
+        self._offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
         self._samples: list[Keep] = []
         self._conversation: Conversation | None = None
@@ -67,13 +80,17 @@ class Flight:
         self._trial, commands = begin(plan, watch, radio.clock.now_s())
         self._begin_with = commands
 
+    @property
+    def state(self) -> State:
+        return self._trial.state
+
     def fly(self) -> Flown:
         """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
         self._guarded(lambda: self._carry_out(self._begin_with))
         while not self._trial.is_over:
             self._guarded(self._listen)
             self._guarded(self._judge)
-        return Flown(self._trial, tuple(self._samples), self._error)
+        return Flown(self._trial, tuple(self._samples), self._offset_s, self._error)
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
@@ -90,7 +107,11 @@ class Flight:
             heard += self._radio.listen(LISTEN_S)
         self._listened_s = now_s
         for each in heard:
+            if isinstance(each.measurement, Position):
+                self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
             self._advance(each)
+        for sighted in self._look():
+            self._advance(sighted)
         if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
             self._conversation = None
             self._advance(ended)
@@ -99,7 +120,8 @@ class Flight:
         if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
             self._advance(Restored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
-            self._advance(AbortWanted(stop.reason, self._radio.clock.now_s()))
+            wanted = MotorsOffWanted if stop.motors_off else AbortWanted
+            self._advance(wanted(stop.reason, self._radio.clock.now_s()))
         self._advance(Tick(self._radio.clock.now_s()))
 
     def _wanted(self) -> Stop | None:
@@ -145,23 +167,13 @@ class Flight:
         time_s = kept.position.time_boot_s - start_s
         if time_s >= 0.0 and time_s - self._shown_s >= _SAMPLE_EVERY_S:
             self._shown_s = time_s
-            self._show(Sample(time_s, channels_of(kept, self._trial.plan.datum_m)))
+            self._show(Sample(time_s, self._channels(kept)))
 
     def _show(self, sample: Sample) -> None:
         try:
             self._on_sample(sample)
         except BaseException as error:  # noqa: BLE001 - kept for the caller; commands that follow must not be lost
             self._error = error
-
-
-def channels_of(kept: Keep, datum_m: float) -> dict[str, float]:
-    """A sample's channels; altitudes count from `datum_m` on the vehicle's own."""
-    channels = {
-        "altitude_m": kept.position.altitude_m - datum_m,
-        "climb_rate_m_s": kept.position.climb_rate_m_s,
-        "set_point_m": kept.set_point_m - datum_m,
-    }
-    return channels if kept.battery_v is None else channels | {"battery_v": kept.battery_v}
 
 
 def _spoken(error: BaseException) -> str:

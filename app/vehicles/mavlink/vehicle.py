@@ -1,116 +1,104 @@
 """A vehicle that speaks MAVLink, between opening and closing."""
 
-import datetime as dt
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from app.core.policy import Gains
-from app.core.trajectory import Trajectory
-from app.vehicles.base import Ending, FlightOrder, FlightRecord, Sample, ShouldStop
+from app.vehicles.base import CheckItem, Condition, FlightOrder, FlightRecord, Identity, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import addresses, limits, parameters, preflight
-from app.vehicles.mavlink.clock import Clock, ScaledClock
-from app.vehicles.mavlink.failures import RESPONSES, Failure
+from app.vehicles.mavlink import limits, parameters, preflight, records
+from app.vehicles.mavlink.clock import Clock
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.gains import GainStore
+from app.vehicles.mavlink.gauges import Gauges
+from app.vehicles.mavlink.landing import Landing, send_now
 from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.machine import Plan, Trial
+from app.vehicles.mavlink.machine import Plan
+from app.vehicles.mavlink.opening import TAKEOFF_ALTITUDE_M, open_radio, patience_of
 from app.vehicles.mavlink.preflight import Ground
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Aim
-from app.vehicles.mavlink.radio import PATIENCE_S, Radio
-from app.vehicles.mavlink.signals import Keep
-from app.vehicles.mavlink.states import MOVES, State
-from app.vehicles.mavlink.trial import Flight, Flown, channels_of
+from app.vehicles.mavlink.signals import Action, Keep
+from app.vehicles.mavlink.sources import Lookout, Source
+from app.vehicles.mavlink.states import IN_DOUBT, MOVES, State
+from app.vehicles.mavlink.trial import Flight, Flown
 
-TAKEOFF_ALTITUDE_M: Final = 3.0
 STAND_S: Final = 1.0
 """Watched once more before arming, for between staging and flying a person may have taken his time."""
 
-HASTE: Final = 4.0
-"""Up to this speed of its clock a simulated vehicle is waited for as a real one is. Beyond, waiting for packets takes
-longer by its time, because a busy computer's pauses are on the wall."""
+_LISTEN_S: Final = 0.1
+_HEARD_WITHIN_S: Final = 5.0
+_ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
+_SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
 class MavlinkVehicle:
     """One vehicle at the other end of one link.
 
     Whatever ends a flight ends it with the safe gains read back, or in quarantine: then everything further that would
-    reach the vehicle raises SafeGainsError.
+    change the vehicle raises SafeGainsError, apart from Land and motors off.
     """
 
-    kind: Final = "mavlink"
+    kind: Final = records.SOURCE
 
-    def __init__(self, options: Options, safe_gains: Gains, *, is_real: bool, clock: Clock | None = None) -> None:
-        """Connect, wait for the vehicle, check it on the ground, and write the safe gains. `clock` is the vehicle's
-        time, by default that of its options. Raises VehicleError when it is not there or not ready, SafeGainsError when
-        it is armed, GainsError for safe gains that it cannot hold."""
+    def __init__(
+        self,
+        options: Options,
+        safe_gains: Gains,
+        *,
+        is_real: bool,
+        clock: Clock | None = None,
+        identity: Identity | None = None,
+        observes: bool = False,
+        source: Source | None = None,
+    ) -> None:
+        """Connect, wait for the vehicle (the one of that `identity`, where it is given), and write the safe gains, once
+        it is known to be disarmed. `clock` is the vehicle's time, by default that of its options; `source` is a second
+        source of altitude, which is closed with the vehicle.
+
+        With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
+        without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
+        nobody answers or somebody else does, GainsError for safe gains that it cannot hold.
+        """
         self.is_real: Final = is_real
         self._options = dict(options)
         self._state = State.CONNECT
-        self._why = ""
-        self._staged = False
-        profile = PROFILES[str(options["autopilot"])]
-        clock = clock or ScaledClock(float(options["clock_speed"]))
-        self._link = Link(
-            addresses.parse(str(options["address"])),
-            profile.dialect,
-            clock=clock,
-            target_system=int(options["system_id"]) or None,
-            tlog=_log_path(str(options["log_folder"])),
-        )
-        aim = Aim(
-            system=0,
-            aircraft=int(options["aircraft_id"]),
-            waypoint=int(options["climb_waypoint"]),
-            altitude_m=TAKEOFF_ALTITUDE_M,
-        )
-        self._patience = max(1.0, float(options["clock_speed"]) / HASTE)
-        self._radio = Radio(self._link, profile, clock, aim, patience_s=PATIENCE_S * self._patience)
+        self._why = self._asked = self._plan_problem = ""
+        self._datum_m = 0.0
+        self._flight: Flight | None = None
+        self._landing: Landing | None = None
+        self._lookout = None if source is None else Lookout(source)
+        self._radio = open_radio(options, clock, overhear=None if source is None else source.hear)
+        self._gauges = Gauges(self._radio)
         try:
-            self._meet(safe_gains)
+            self._gains = GainStore(self._radio, safe_gains)
+            self._connect(identity)
+            if not observes:
+                self._require_ready()
         except BaseException:
-            self._link.close()
+            self._radio.link.close()
             raise
 
-    def _meet(self, safe_gains: Gains) -> None:
-        preflight.meet(self._radio, str(self._options["address"]))
-        self._enter(State.PREFLIGHT)
-        preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
-        self._gain_set = parameters.find_gain_set(self._radio)
-        self.safe_gains: Gains = parameters.check_gains(safe_gains, self._gain_set)
-        preflight.stand(self._radio, min_battery_v=float(self._options["min_battery_v"]))
-        self._enter(State.SET_GAINS)
-        if problem := self._restore():
-            raise SafeGainsError(
-                f"The vehicle does not take its safe gains: {problem}", hint="Set them by hand and read them back."
-            )
+    # ---- as every vehicle
+
+    @property
+    def safe_gains(self) -> Gains:
+        return self._gains.safe
 
     def stage(self, gains: Gains) -> dict[str, float]:
         """Write every gain and return what was read back. Raises GainsError for gains that may not be written (nothing
         is changed then), VehicleError when the vehicle does not confirm, SafeGainsError in quarantine."""
         self._require_trust()
-        wanted = parameters.check_gains(gains, self._gain_set)
+        self._listen(0.0)
+        self._require_trust()
         if self._state is State.IDLE:
             self._enter(State.SET_GAINS)
-        self._staged = False
-        self._radio.listen(0.0)
-        preflight.require_disarmed(self._radio)
-        try:
-            held = parameters.write_gains(self._radio, self._gain_set, wanted)
-        except VehicleError:
-            self._unstage()
-            raise
-        self._staged = held == wanted
-        return held
+        return self._gains.stage(gains)
 
     def read_gains(self) -> dict[str, float]:
         """What the vehicle holds now."""
-        return parameters.read_gains(self._radio, self._gain_set)
+        return self._gains.read()
 
     def fly(
         self,
@@ -122,28 +110,18 @@ class MavlinkVehicle:
         """Arm, take off to 3 m, record, land, disarm, and restore the safe gains.
 
         The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_stop` is asked every
-        10 ms. Raises VehicleError when nothing was staged or the vehicle did not lift off; what `on_sample` and
-        `should_stop` raise lands the vehicle, and is raised again once it is down.
+        10 ms. Raises VehicleError when nothing was staged, the vehicle is not ready, does not hold the staged gains any
+        more or did not lift off; what `on_sample` and `should_stop` raise lands the vehicle, and is raised again once
+        it is down.
         """
         self._require_trust()
-        if not self._staged:
+        if self._gains.staged is None:
             raise VehicleError(
                 "No gains were staged for this flight, so it was not started.",
                 hint="Stage the gains, compare what is read back, then fly.",
             )
-        try:
-            ground = preflight.stand(
-                self._radio, min_battery_v=float(self._options["min_battery_v"]), watched_s=STAND_S
-            )
-            stop = should_stop()
-        except SafeGainsError as error:
-            self._state, self._why = State.QUARANTINE, str(error)
-            raise
-        except BaseException:
-            self._unstage()
-            raise
-        if stop is not None:
-            self._unstage()
+        ground = self._stand(STAND_S)
+        if (stop := should_stop()) is not None:
             return self._not_begun(ground, stop.reason)
         flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
@@ -152,23 +130,187 @@ class MavlinkVehicle:
 
     def close(self) -> None:
         """End the conversation; the vehicle is left as it is."""
-        self._link.close()
+        self._radio.link.close()
+        if self._lookout is not None:
+            self._lookout.source.close()
+
+    # ---- as a vehicle whose link stays open
+
+    @property
+    def identity(self) -> Identity:
+        """Its version comes when the vehicle tells it, with some only after a while."""
+        seen = self._radio.seen
+        return Identity(system_id=self._radio.aim.system, autopilot=self._radio.profile.name, version=seen.version)
+
+    @property
+    def concern(self) -> str:
+        """Why it may only be observed; empty when it may fly."""
+        if self._state not in IN_DOUBT:
+            return ""
+        return " ".join(part for part in (self._why, self._asked) if part)
+
+    def condition(self) -> Condition:
+        """How it is, as last heard: nothing is waited for. Altitude counts as in a record."""
+        step = self._state if self._flight is None else self._flight.state
+        problem = self._radio.link.log_problem
+        troubles = (
+            f"The telemetry log {problem}." if problem else "",
+            self._lookout.source.trouble if self._lookout is not None else "",
+        )
+        return self._gauges.read(
+            step=State.IDLE if step in _ON_THE_GROUND else step,
+            datum_m=self._datum_m,
+            held=self._gains.held,
+            trouble=" ".join(trouble for trouble in troubles if trouble),
+        )
+
+    def attend(self, timeout_s: float) -> None:
+        """Listen for so long; the vehicle hears this ground station's heartbeats meanwhile. After `land`, Land is
+        repeated every second until telemetry agrees. Raises LinkError when the link is closed."""
+        until_s = self._radio.clock.now_s() + timeout_s
+        while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
+            self._listen(min(left_s, _LISTEN_S))
+            if self._landing is not None and not self._landing.is_over:
+                self._landing.proceed()
+
+    def check(self) -> tuple[CheckItem, ...]:
+        """Everything that has to be so before a flight; what is not so is an item, not an error. It takes two seconds
+        and more. Raises LinkError when the link is closed."""
+        return self._check(preflight.WATCHED_S)[1]
+
+    def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
+        """Every parameter; `on_progress` is told how many came, of how many. Raises VehicleError when they do not come,
+        SafeGainsError while the vehicle is only observed."""
+        self._require_trust()
+        return parameters.read_all(self._radio, on_progress)
+
+    def restore(self) -> dict[str, float]:
+        """Write the safe gains and return what was read back; a vehicle in doubt stays so. Raises SafeGainsError when
+        it is armed, VehicleError when it does not confirm."""
+        self._listen(0.0)
+        preflight.require_disarmed(self._radio)
+        return self._gains.restore()
+
+    def land(self, reason: str) -> None:
+        """Tell it to land, at once and whatever state it is in. Raises VehicleError when it cannot be told."""
+        self._asked = f"Land was asked for: {reason}."
+        self._landing = Landing(self._radio)
+
+    def motors_off(self, reason: str) -> None:
+        """Stop its motors, at once and at any height."""
+        self._asked = f"Motors off was asked for: {reason}."
+        self._landing = None
+        send_now(self._radio, Action.KILL)
+
+    def log_to(self, path: Path | None) -> None:
+        """Write what passes from now on, in both directions, to this telemetry log; None ends the log. Raises LinkError
+        when the file cannot be opened: the log before goes on then."""
+        self._radio.link.log_to(path)
+
+    def release(self) -> None:
+        """A person has looked at it: out of observation, once it is disarmed and holds its safe gains, read back.
+        Raises VehicleError when it is not heard, is armed, or does not hold them; it stays as it was then."""
+        if self._state not in IN_DOUBT:
+            return
+        self._await_heartbeat()
+        self._set_up()
+        self._enter(State.IDLE)
+        self._why = self._asked = ""
+        self._landing = None
+
+    # ---- connecting
+
+    def _connect(self, identity: Identity | None) -> None:
+        preflight.meet(self._radio, str(self._options["address"]), identity)
+        self._plan_problem = preflight.learn(self._radio)
+        self._enter(State.PREFLIGHT)
+        self._listen(0.0)
+        if self._state in IN_DOUBT:
+            return
+        try:
+            self._set_up()
+        except VehicleError as error:
+            self._observe(f"Its safe gains could not be verified: {error}")
+            return
+        self._enter(State.SET_GAINS)
+        self._enter(State.IDLE)
+        if why := preflight.changed(self._radio, identity):
+            self._observe(why)
+
+    def _set_up(self) -> None:
+        """Raises VehicleError when the vehicle is armed, or does not take its safe gains."""
+        preflight.require_disarmed(self._radio)
+        preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
+        if problem := self._restore():
+            raise SafeGainsError(f"The vehicle does not take its safe gains: {problem}", hint=_SET_BY_HAND)
+
+    def _require_ready(self) -> None:
+        """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""
+        if self._state in IN_DOUBT:
+            raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
+        preflight.require(self.check())
+
+    def _observe(self, why: str) -> None:
+        self._enter(State.OBSERVE)
+        self._why, self._gains.staged = why, None
+
+    def _await_heartbeat(self) -> None:
+        asked_s = self._radio.clock.now_s()
+        while self._radio.seen.heartbeat_s < asked_s:
+            if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * patience_of(self._options):
+                raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
+            self._listen(_LISTEN_S)
+
+    def _listen(self, timeout_s: float) -> None:
+        """Between flights: a vehicle that somebody else arms is only observed from then on."""
+        self._radio.listen(timeout_s)
+        if preflight.is_armed(self._radio) and self._state not in IN_DOUBT:
+            self._observe(preflight.ARMED)
+
+    # ---- flying
+
+    def _stand(self, watched_s: float) -> Ground:
+        """Where it stands. Raises VehicleError when it is not ready to fly, SafeGainsError when it is armed."""
+        watched, items = self._check(watched_s)
+        preflight.require(items)
+        self._require_trust()
+        return watched.ground
+
+    def _check(self, watched_s: float) -> tuple[preflight.Watched, tuple[CheckItem, ...]]:
+        if not preflight.is_armed(self._radio) and self._state not in IN_DOUBT:
+            preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
+        watched = preflight.watch(self._radio, self._lookout, watched_s=watched_s)
+        self._listen(0.0)
+        minimum_v = float(self._options["min_battery_v"])
+        items = preflight.judge(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
+        if self._lookout is not None:
+            items = (*items, preflight.judge_source(self._lookout, watched))
+        return watched, (*items, self._gains.check())
 
     def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> Flown:
         last = ground.last
         self._radio.aim = replace(self._radio.aim, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
-        self._staged = False
+        plan = self._plan(ground)
+        self._gains.staged = None
+        self._datum_m = plan.datum_m
         watch = limits.begin(self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v)
-        flight = Flight(
+        if self._lookout is not None:
+            self._lookout.begin(ground.seen_m, ground.altitude_m)
+        self._flight = Flight(
             self._radio,
-            self._plan(ground),
+            plan,
             watch,
             restore=self._restore,
             on_sample=on_sample,
             should_stop=should_stop,
+            channels=lambda kept: records.channels_of(kept, plan.datum_m, self._scored),
+            look=list if self._lookout is None else self._lookout.look,
         )
-        flown = flight.fly()
+        try:
+            flown = self._flight.fly()
+        finally:
+            self._flight = None
         self._state, self._why = flown.trial.state, flown.trial.why
         return flown
 
@@ -176,7 +318,7 @@ class MavlinkVehicle:
         profile = self._radio.profile
         datum_m = ground.altitude_m if profile.climbs_from_ground else 0.0
         return Plan(
-            safe_gains=parameters.settings(self._gain_set, self.safe_gains),
+            safe_gains=self._gains.safe_settings,
             ground_m=ground.altitude_m,
             datum_m=datum_m,
             lift_off_s=profile.lift_off_s,
@@ -187,43 +329,50 @@ class MavlinkVehicle:
                 radius_m=float(self._options["radius_m"]),
                 flying_modes=profile.flying_modes,
                 landing_modes=profile.landing_modes,
-            ).stretched(self._patience),
+                blocks={number: name for name, number in self._radio.aim.blocks.items()},
+                arming_blocks=profile.arming_blocks,
+                flying_blocks=profile.flying_blocks,
+                landing_blocks=profile.landing_blocks,
+            ).stretched(patience_of(self._options)),
         )
-
-    def _unstage(self) -> None:
-        """Back to the safe gains, for what was staged will not fly; in quarantine where they cannot be verified."""
-        self._staged = False
-        try:
-            problem = self._restore()
-        except VehicleError as error:
-            problem = str(error)
-        if problem:
-            self._enter(State.QUARANTINE)
-            self._why = f"Its safe gains could not be verified: {problem}"
 
     def _restore(self) -> str:
         """Write the safe gains; what is wrong with those read back, or nothing. Raises VehicleError for silence."""
-        wanted = dict(self.safe_gains)
-        held = parameters.write_gains(self._radio, self._gain_set, wanted)
-        return "" if held == wanted else f"it holds {held} instead of {wanted}."
+        held = self._gains.restore()
+        return "" if held == self.safe_gains else f"it holds {held} instead of {self.safe_gains}."
+
+    # ---- records
+
+    @property
+    def _scored(self) -> records.Scored:
+        return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
     def _record(self, flown: Flown, ground: Ground) -> FlightRecord:
         """Raises VehicleError when the vehicle was never told to take off, for another reason than the operator's."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
-        reason = _reason(trial)
+        reason = records.reason_of(trial)
         if start_s is None and trial.failure is Failure.OPERATOR:
             return self._not_begun(ground, reason)
         if start_s is None:
             raise VehicleError(reason, hint="Look at the vehicle, correct this, then fly again.")
-        trajectory = _trajectory(flown.samples, start_s, trial.plan.datum_m)
-        return FlightRecord(trajectory=trajectory, ending=_ending(trial), reason=reason, settings=self._options)
+        trajectory = records.trajectory_of(
+            flown.samples,
+            start_s,
+            trial.plan.datum_m,
+            scored=self._scored,
+            second_m=None if self._lookout is None else records.seen_at(self._lookout.seen, flown.offset_s),
+        )
+        ending, settings = records.ending_of(trial), records.settings_of(self._options)
+        return FlightRecord(trajectory=trajectory, ending=ending, reason=reason, settings=settings)
 
     def _not_begun(self, ground: Ground, reason: str) -> FlightRecord:
         """Aborted before anything was commanded: the one instant on the ground."""
-        start_s = ground.last.time_boot_s
         sample = Keep(ground.last, ground.altitude_m, self._radio.seen.battery_v)
-        trajectory = _trajectory((sample,), start_s, self._plan(ground).datum_m)
-        return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=self._options)
+        trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
+        settings = records.settings_of(self._options)
+        return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=settings)
+
+    # ---- trust
 
     def _require_trust(self) -> None:
         if self._state is State.QUARANTINE:
@@ -231,43 +380,13 @@ class MavlinkVehicle:
                 f"The vehicle is quarantined: {self._why}",
                 hint="Land it if it flies, see that its motors have stopped, verify its gains, then release it.",
             )
+        if self._state is State.OBSERVE:
+            raise SafeGainsError(
+                f"The vehicle is only observed: {self._why}",
+                hint="See that it stands with its motors stopped, then release it.",
+            )
 
     def _enter(self, state: State) -> None:
         if state not in MOVES[self._state]:
             raise AssertionError(f"A vehicle cannot go from {self._state} to {state}.")
         self._state = state
-
-
-def _trajectory(samples: Sequence[Keep], start_s: float, datum_m: float) -> Trajectory:
-    """By the vehicle's own clock, from the command on; channels that some samples lack are left out."""
-    rows = [channels_of(sample, datum_m) for sample in samples]
-    names = [name for name in rows[-1] if all(name in row for row in rows)] if rows else []
-    time_s = np.array([round(sample.position.time_boot_s - start_s, 6) for sample in samples])
-    channels = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
-    return Trajectory(time_s, channels, MavlinkVehicle.kind, "vehicle")
-
-
-def _ending(trial: Trial) -> Ending:
-    """What the record is worth, whatever became of the vehicle."""
-    outcome = None if trial.failure is None else RESPONSES[trial.failure].outcome
-    if outcome is None:
-        return "completed"
-    return "aborted" if outcome == "aborted" else "invalid"
-
-
-def _reason(trial: Trial) -> str:
-    """Why the flight ended early or does not count, and what else is to be known of its record."""
-    if trial.failure is None or trial.failure is Failure.OPERATOR:
-        said = trial.why
-    else:
-        said = f"{RESPONSES[trial.failure].text} {trial.why}"
-    dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
-    flag = f"{dropped} of its samples jumped and were dropped." if dropped else ""
-    return " ".join(part for part in (said, flag) if part)
-
-
-def _log_path(folder: str) -> Path | None:
-    """A file of its own for every opening, in UTC; no folder, no log."""
-    if not folder:
-        return None
-    return Path(folder) / f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"

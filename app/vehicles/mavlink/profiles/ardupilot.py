@@ -65,6 +65,9 @@ class ArduPilot:
     def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
         return {}
 
+    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+        return ()
+
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
         return (request_positions(aim, telemetry_hz),)
 

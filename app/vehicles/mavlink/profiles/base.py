@@ -172,6 +172,10 @@ class Profile(Protocol):
         """The blocks of the flight plan, where there is one. Raises VehicleError when one is missing that is needed."""
         ...
 
+    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:
+        """What ends an exploration, however it went."""
+        ...
+
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
         """Set up telemetry and what a take-off needs, on the ground."""
         ...

@@ -71,9 +71,12 @@ class Paparazzi:
             raise _without_blocks(f"Its flight plan has no block {', '.join(missing)}.")
         return blocks
 
-    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
+    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:
         """Ends the listing of blocks, which else keeps every change of block away for 15 s."""
-        return (Step((_acknowledge(aim),)),)
+        return (_acknowledge(aim),)
+
+    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
+        return ()
 
     def ask_version(self, aim: Aim) -> None:
         """It tells every few seconds."""

@@ -59,6 +59,9 @@ class Px4:
     def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
         return {}
 
+    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+        return ()
+
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
         altitude = self.set_parameter(aim, TAKE_OFF_ALTITUDE, aim.altitude_m)
         return (request_positions(aim, telemetry_hz), Step((altitude,), awaits=TAKE_OFF_ALTITUDE))

@@ -1,0 +1,68 @@
+"""How a connected vehicle is, as last heard."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from app.vehicles.base import Condition
+from app.vehicles.mavlink.link import LinkHealth
+from app.vehicles.mavlink.radio import Radio
+
+RATE_OVER_S: Final = 2.0
+LOSS_OVER_S: Final = 10.0
+_EVERY_S: Final = 1.0
+_FRESH_S: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Count:
+    at_s: float
+    received: int
+    lost: int
+
+
+class Gauges:
+    """Reads a radio, sending and waiting for nothing. Losses are counted over the last ten seconds or so."""
+
+    def __init__(self, radio: Radio) -> None:
+        self._radio = radio
+        self._counts: deque[_Count] = deque(maxlen=round(LOSS_OVER_S / _EVERY_S) + 1)
+
+    def read(self, *, step: str, datum_m: float, held: Mapping[str, float], trouble: str) -> Condition:
+        """Altitude counts from `datum_m` on the vehicle's own."""
+        radio, now_s = self._radio, self._radio.clock.now_s()
+        health, heartbeat = radio.link.health, radio.seen.heartbeat
+        recent = [(at_s, position) for at_s, position in radio.seen.positions if now_s - at_s <= RATE_OVER_S]
+        last = recent[-1][1] if recent and now_s - recent[-1][0] < _FRESH_S else None
+        return Condition(
+            step=step,
+            packet_age_s=_age(now_s, health.last_packet_s),
+            heartbeat_age_s=_age(now_s, health.last_heartbeat_s),
+            armed=None if heartbeat is None else heartbeat.armed,
+            mode="" if heartbeat is None else self._mode(heartbeat.mode),
+            altitude_m=None if last is None else last.altitude_m - datum_m,
+            climb_rate_m_s=None if last is None else last.climb_rate_m_s,
+            battery_v=radio.seen.battery_v,
+            position_hz=len(recent) / RATE_OVER_S,
+            lost_share=self._lost_share(now_s, health),
+            held=dict(held),
+            said=radio.seen.spoken[-1] if radio.seen.spoken else "",
+            trouble=trouble,
+        )
+
+    def _mode(self, number: str) -> str:
+        """The block of the flight plan where the vehicle tells of one, for that says more than its mode."""
+        block = self._radio.block
+        return block or number
+
+    def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
+        if not self._counts or now_s - self._counts[-1].at_s >= _EVERY_S:
+            self._counts.append(_Count(now_s, health.received, health.lost))
+        first = self._counts[0]
+        lost, received = health.lost - first.lost, health.received - first.received
+        return lost / (lost + received) if lost + received else None
+
+
+def _age(now_s: float, then_s: float | None) -> float | None:
+    return None if then_s is None else max(now_s - then_s, 0.0)

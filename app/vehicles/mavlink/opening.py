@@ -1,0 +1,54 @@
+"""From a vehicle's options to a radio that speaks with it."""
+
+import datetime as dt
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from app.vehicles.kinds import Options
+from app.vehicles.mavlink import addresses, signing
+from app.vehicles.mavlink.clock import Clock, ScaledClock
+from app.vehicles.mavlink.link import Link, Received
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.profiles.base import Aim
+from app.vehicles.mavlink.radio import PATIENCE_S, Radio
+
+TAKEOFF_ALTITUDE_M: Final = 3.0
+HASTE: Final = 4.0
+"""Up to this speed of its clock a simulated vehicle is waited for as a real one is. Beyond, waiting for packets takes
+longer by its time, because a busy computer's pauses are on the wall."""
+
+
+def patience_of(options: Options) -> float:
+    """How many times longer than a real vehicle this one is waited for."""
+    return max(1.0, float(options["clock_speed"]) / HASTE)
+
+
+def open_radio(options: Options, clock: Clock | None, *, overhear: Callable[[Received], None] | None) -> Radio:
+    """`clock` is the vehicle's time, by default that of its options. Raises LinkError when its link or its log cannot
+    be opened, InputError for a signing key that cannot be read or used."""
+    profile = PROFILES[str(options["autopilot"])]
+    clock = clock or ScaledClock(float(options["clock_speed"]))
+    key = str(options["signing_key"])
+    link = Link(
+        addresses.parse(str(options["address"])),
+        profile.dialect,
+        clock=clock,
+        target_system=int(options["system_id"]) or None,
+        tlog=_log_path(str(options["log_folder"])),
+        signing_key=signing.read_key(key) if key else None,
+    )
+    aim = Aim(
+        system=0,
+        aircraft=int(options["aircraft_id"]),
+        waypoint=int(options["climb_waypoint"]),
+        altitude_m=TAKEOFF_ALTITUDE_M,
+    )
+    return Radio(link, profile, clock, aim, patience_s=PATIENCE_S * patience_of(options), overhear=overhear)
+
+
+def _log_path(folder: str) -> Path | None:
+    """A file of its own for every opening, in UTC; no folder, no log."""
+    if not folder:
+        return None
+    return Path(folder) / f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"
