@@ -101,7 +101,7 @@ def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> No
         named = ("--vehicle", f"mavlink:{address}", "--set", CLOCK_SPEED)
         result = CliRunner().invoke(app, ["run", "px4-takeoff", *named])
     assert result.exit_code == 1
-    assert "Its own failsafe FS_GCS_ENABLE: off" in " ".join(result.stderr.split())
+    assert "Its own failsafe NAV_DLL_ACT: off" in " ".join(result.stderr.split())
     assert "NAV_DLL_ACT" in result.stderr
 
 
