@@ -151,3 +151,36 @@ def test_an_ardupilot_log_imports_with_its_own_gains(settings: Settings, campaig
     stored = json.loads(result.stdout)
     assert stored["read_back"]["PSC_VELZ_P"] == 5.0
     assert "must cover 0 … 32.6 s" in stored["reason"]
+
+
+COPTERS = [
+    ("takeoff-ardupilot", "arducopter_takeoff.bin", {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5}),
+    ("takeoff-px4", "px4_takeoff.ulg", {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.2, "MPC_Z_VEL_I_ACC": 2.0}),
+]
+
+
+@pytest.mark.parametrize(("experiment", "log", "gains"), COPTERS, ids=[log for _, log, _ in COPTERS])
+def test_a_copters_log_imports_into_its_own_experiment_with_the_gains_that_it_flew(
+    experiment: str,
+    log: str,
+    gains: dict[str, float],
+    client: TestClient,
+    database: Database,
+    settings: Settings,
+    tmp_path: Path,
+) -> None:
+    definition = {
+        "experiment": experiment,
+        "strategy": "manual",
+        "start": {"kind": "default"},
+        "step_fraction": 0.25,
+        "stop": {"kind": "budget", "max_flights": 3},
+    }
+    create_ready_campaign(client, database, vehicle="import", name="Copter", definition=definition)
+    file = tmp_path / log
+    file.write_bytes(recorded(log))
+    result = run(settings, file, "--campaign", "Copter", "--yes", "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    stored = json.loads(result.stdout)
+    assert {name: stored["gains"][name] for name in gains} == pytest.approx(gains)
+    assert stored["read_back"] == stored["gains"]
