@@ -2,7 +2,7 @@ import { SegmentedControl } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import type { ReactNode } from "react";
 import type { Catalogue, OptionInfo } from "../api/types";
-import { type CampaignForm, gainsOf, type OptionValue, optionsOf, type StopKind } from "../lib/newCampaign";
+import { type CampaignForm, gainsOf, hasModel, type OptionValue, optionsOf, type StopKind } from "../lib/newCampaign";
 import { unitsOf } from "../lib/units";
 import classes from "./AdvancedFields.module.css";
 import { Entry } from "./Entry";
@@ -194,7 +194,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         error={reasons["step_fraction"]}
         onChange={(stepPercent) => set({ stepPercent })}
       />
-      {unitsOf(catalogue, form.experiment).output === "m" && (
+      {hasModel(catalogue, form.experiment) && unitsOf(catalogue, form.experiment).output === "m" && (
         <Entry
           label="Ceiling of the checks"
           description="Gains that might rise higher are refused"

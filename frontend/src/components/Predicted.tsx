@@ -14,6 +14,8 @@ interface Props {
 export function Predicted({ proposal, best, unit }: Props) {
   const { predicted_error: error, interval } = proposal;
   const change = percentChange(error, best);
+  if (error === null)
+    return <p className={classes["quiet"]}>Nothing is predicted: there is no model of these gains.</p>;
   return (
     <div className={`${classes["predicted"]} numbers`}>
       <span>

@@ -100,6 +100,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
 }
 
 function flyLabel(recommended: boolean, { kind }: Proposal): string {
+  if (kind === "manual") return "Fly these gains again";
   if (recommended) return "Fly next trial";
   return kind === "none" ? "Fly these gains" : "Fly the step";
 }

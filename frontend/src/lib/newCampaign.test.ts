@@ -6,6 +6,7 @@ import {
   kindsFor,
   requestFrom,
   startingForm,
+  startsFor,
   strategiesFor,
   withExperiment,
   withVehicle,
@@ -27,12 +28,21 @@ const catalogue = {
     {
       name: "takeoff",
       title: "Takeoff to 3 m",
+      has_model: true,
       gains: [gain("kp", 4000, 283), gain("ki", 1073, 13), gain("kd", 409, 82)],
+      options: [],
+    },
+    {
+      name: "takeoff-px4",
+      title: "Takeoff under PX4",
+      has_model: false,
+      gains: [gain("MPC_Z_P", 1.5, 1)],
       options: [],
     },
     {
       name: "pitch-tracking",
       title: "Pitch tracking",
+      has_model: true,
       gains: [gain("theta_3", 0, -15)],
       options: [{ name: "perturbation", title: "Model off by", default: 0.45, choices: [] }],
     },
@@ -42,12 +52,13 @@ const catalogue = {
     {
       name: "gradient",
       options: [{ name: "scaled", title: "Scaled", default: true, choices: [true, false] }],
-      experiments: [],
+      experiments: ["takeoff", "pitch-tracking"],
     },
     { name: "identified", options: [], experiments: ["pitch-tracking"] },
+    { name: "manual", options: [], experiments: ["takeoff", "takeoff-px4", "pitch-tracking"] },
   ],
   vehicle_kinds: [
-    { name: "import", can_fly: false, options: [], experiments: ["takeoff"] },
+    { name: "import", can_fly: false, options: [], experiments: ["takeoff", "takeoff-px4"] },
     { name: "lti", can_fly: true, options: [], experiments: ["pitch-tracking"] },
     { name: "twin", can_fly: true, options: [], experiments: ["takeoff"] },
     { name: "jsbsim", can_fly: true, options: [{ name: "mass_kg" }], experiments: ["takeoff"] },
@@ -129,8 +140,12 @@ test("the simulation is offered first, flights made elsewhere last", () => {
 
 test("an experiment is offered the vehicles and strategies that fit it", () => {
   expect(kindsFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual(["lti"]);
-  expect(strategiesFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["calibrated", "gradient"]);
-  expect(strategiesFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual(["gradient", "identified"]);
+  expect(strategiesFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["calibrated", "gradient", "manual"]);
+  expect(strategiesFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual([
+    "gradient",
+    "identified",
+    "manual",
+  ]);
 });
 
 test("another experiment begins with its own gains, vehicle and strategy, and keeps the stop rule", () => {
@@ -153,4 +168,11 @@ test("every refusable field has its place in the form", () => {
   expect(fieldsOf(form, catalogue).advanced).toEqual(
     expect.arrayContaining(["stop.max_flights", "bounds.kd", "vehicle.options.mass_kg", "definition.options.scaled"]),
   );
+});
+
+test("without a model gains are chosen by hand, in small steps, and no start is searched", () => {
+  const form = withExperiment(startingForm(catalogue), catalogue, "takeoff-px4");
+  expect(form).toMatchObject({ strategy: "manual", vehicle: "import", firstStepPercent: 25, stepPercent: 25 });
+  expect(startsFor(catalogue, "takeoff-px4")).toEqual(["default", "campaign", "given"]);
+  expect(startsFor(catalogue, "takeoff")).toContain("simplex");
 });

@@ -34,6 +34,18 @@ export function gainsOf(catalogue: Catalogue, experiment: string) {
   return catalogue.experiments.find(({ name }) => name === experiment)?.gains ?? [];
 }
 
+/** Whether flights can be foretold: without a model gains are chosen by hand, and nothing is searched or simulated. */
+export function hasModel(catalogue: Catalogue, experiment: string): boolean {
+  return catalogue.experiments.find(({ name }) => name === experiment)?.has_model ?? false;
+}
+
+/** Where the first gains may come from. */
+export function startsFor(catalogue: Catalogue, experiment: string): StartKind[] {
+  return hasModel(catalogue, experiment)
+    ? ["default", "simplex", "campaign", "given"]
+    : ["default", "campaign", "given"];
+}
+
 /** Whether something that works with `experiments` works with this one; an empty list is all of them. */
 function fits(experiments: readonly string[] | undefined, experiment: string): boolean {
   return experiments === undefined || experiments.length === 0 || experiments.includes(experiment);
@@ -92,7 +104,7 @@ export function startingForm(
     minBatteryV: "",
     bounds: Object.fromEntries(gains.map((gain) => [gain.name, [gain.lower, gain.upper]])),
     firstStepPercent: 25,
-    stepPercent: 100,
+    stepPercent: hasModel(catalogue, experiment) ? 100 : 25,
     ceilingM: 4.5,
     seed: 1,
   };

@@ -19,6 +19,7 @@ import {
   requestFrom,
   type StartKind,
   startingForm,
+  startsFor,
   strategiesFor,
   unreadable,
   withExperiment,
@@ -40,12 +41,12 @@ export function NewCampaignPage() {
   );
 }
 
-const STARTS: { value: StartKind; label: string }[] = [
-  { value: "default", label: "The vehicle's default gains" },
-  { value: "simplex", label: "Best gains on the model (simplex)" },
-  { value: "campaign", label: "Best of another campaign" },
-  { value: "given", label: "Gains of my own" },
-];
+const STARTS: Record<StartKind, string> = {
+  default: "The vehicle's default gains",
+  simplex: "Best gains on the model (simplex)",
+  campaign: "Best of another campaign",
+  given: "Gains of my own",
+};
 
 function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
   const [form, setForm] = useState<CampaignForm>(() => startingForm(catalogue));
@@ -95,7 +96,7 @@ function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
       <div className={classes["pair"]}>
         <Select
           label="Start from"
-          data={STARTS}
+          data={startsFor(catalogue, form.experiment).map((value) => ({ value, label: STARTS[value] }))}
           value={form.start}
           allowDeselect={false}
           error={reasons["start.kind"]}
