@@ -41,6 +41,14 @@ class GainStore:
         self.staged = None
         return dict(self._write(self.safe))
 
+    def give_back(self) -> str:
+        """Restore the safe gains; why they cannot be verified, or nothing."""
+        try:
+            held = self.restore()
+        except VehicleError as error:
+            return str(error)
+        return "" if held == self.safe else f"it holds {written(held)} instead of {written(self.safe)}."
+
     @property
     def wanted(self) -> Gains:
         """What the vehicle should hold now."""

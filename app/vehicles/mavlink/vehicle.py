@@ -94,7 +94,11 @@ class MavlinkVehicle:
         self._require_trust()
         if self._state is State.IDLE:
             self._enter(State.SET_GAINS)
-        return self._gains.stage(gains)
+        try:
+            return self._gains.stage(gains)
+        except VehicleError:
+            self._give_back()
+            raise
 
     def read_gains(self) -> dict[str, float]:
         """What the vehicle holds now."""
@@ -120,8 +124,13 @@ class MavlinkVehicle:
                 "No gains were staged for this flight, so it was not started.",
                 hint="Stage the gains, compare what is read back, then fly.",
             )
-        ground = self._stand(STAND_S)
-        if (stop := should_stop()) is not None:
+        try:
+            ground, stop = self._stand(STAND_S), should_stop()
+        except BaseException:
+            self._give_back()
+            raise
+        if stop is not None:
+            self._give_back()
             return self._not_begun(ground, stop.reason)
         flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
@@ -340,6 +349,12 @@ class MavlinkVehicle:
         """Write the safe gains; what is wrong with those read back, or nothing. Raises VehicleError for silence."""
         held = self._gains.restore()
         return "" if held == self.safe_gains else f"it holds {held} instead of {self.safe_gains}."
+
+    def _give_back(self) -> None:
+        """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified."""
+        if self._state not in IN_DOUBT and (problem := self._gains.give_back()):
+            self._enter(State.QUARANTINE)
+            self._why = f"Its safe gains could not be verified: {problem}"
 
     # ---- records
 
