@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import pytest
 
 from app.core.errors import GainsError
+from app.core.experiments import get_experiment
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import FieldValue, Message, number, text
 from app.vehicles.mavlink.measurements import (
@@ -182,6 +183,15 @@ def test_gains_are_clamped_here_because_no_autopilot_does() -> None:
         ("gains.kp", "must lie in 0 … 4000, got -5"),
         ("gains.ki", "must be a whole number of counts, got 300.7"),
     }
+
+
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
+def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_every_release(profile: Profile) -> None:
+    space = get_experiment(profile.experiment).space
+    for gain_set in profile.gain_sets:
+        for edge in (space.lower, space.default, space.upper):
+            gains = space.mapping(edge)
+            assert check_gains(gains, gain_set) == gains
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400])
