@@ -27,7 +27,8 @@ class Gauges:
 
     def __init__(self, radio: Radio) -> None:
         self._radio = radio
-        self._counts: deque[_Count] = deque(maxlen=round(LOSS_OVER_S / _EVERY_S) + 1)
+        opened = _Count(radio.clock.now_s(), 0, 0)
+        self._counts: deque[_Count] = deque([opened], maxlen=round(LOSS_OVER_S / _EVERY_S) + 1)
 
     def read(self, *, step: str, datum_m: float, held: Mapping[str, float], trouble: str) -> Condition:
         """Altitude counts from `datum_m` on the vehicle's own."""
@@ -57,7 +58,7 @@ class Gauges:
         return block or number
 
     def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
-        if not self._counts or now_s - self._counts[-1].at_s >= _EVERY_S:
+        if now_s - self._counts[-1].at_s >= _EVERY_S:
             self._counts.append(_Count(now_s, health.received, health.lost))
         first = self._counts[0]
         lost, received = health.lost - first.lost, health.received - first.received

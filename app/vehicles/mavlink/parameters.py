@@ -13,6 +13,7 @@ from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing
 from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, Radio
 from app.vehicles.mavlink.signals import Heard, Setting
 
+LIST_ATTEMPTS: Final = 3
 LIST_ENDS_S: Final = 2.0
 """The list is over when nothing of it has come for so long."""
 
@@ -77,13 +78,10 @@ def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str,
     VehicleError when it sends none, or not all."""
     heard: dict[int, Parameter] = {}
     radio.listen(0.0)
-    radio.send(base.list_parameters(radio.aim))
-    last_s = radio.clock.now_s()
-    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.patience_s / PATIENCE_S and not _is_complete(heard):
-        if found := _listed(radio.listen(radio.patience_s)):
-            heard |= found
-            last_s = radio.clock.now_s()
-            on_progress(len(heard), _count(heard))
+    for _ in range(LIST_ATTEMPTS):
+        if not heard:
+            radio.send(base.list_parameters(radio.aim))
+            heard = _list(radio, on_progress)
     for place in [place for place in range(_count(heard)) if place not in heard]:
         heard |= _fetched(radio, place)
         on_progress(len(heard), _count(heard))
@@ -93,6 +91,18 @@ def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str,
             hint="See that the link is good, and that nobody else is asking for them; then try again.",
         )
     return {heard[place].name: heard[place].value for place in sorted(heard)}
+
+
+def _list(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[int, Parameter]:
+    """What comes by itself, until all has come or nothing more does."""
+    heard: dict[int, Parameter] = {}
+    last_s = radio.clock.now_s()
+    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.patience_s / PATIENCE_S and not _is_complete(heard):
+        if found := _listed(radio.listen(radio.patience_s)):
+            heard |= found
+            last_s = radio.clock.now_s()
+            on_progress(len(heard), _count(heard))
+    return heard
 
 
 def _listed(heard: list[Heard]) -> dict[int, Parameter]:

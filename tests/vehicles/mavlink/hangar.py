@@ -20,8 +20,11 @@ from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mocap.addresses import parse as parse_source
+from app.vehicles.mocap.opening import open_source
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import TICK_S, new_body
+from app.vehicles.simdrone.cameras import open_outlet
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
 from tests.vehicles.mavlink.speaking import LOOPBACK, becomes, free_port
@@ -53,16 +56,20 @@ class Hangar:
         speed: float = 25.0,
         release: str = "",
         body: Mapping[str, OptionValue] | None = None,
+        mocap: str = "",
     ) -> None:
         self.autopilot, self.speed = autopilot, speed
         kind = get_autopilot(release or autopilot)
         built = new_body("twin", {"scatter": 0.0, **(body or {})}, seed=1)
-        self.drone = Drone(built, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults])
+        self._outlet = open_outlet(parse_source(mocap)) if mocap else None
+        planned = [parse_fault(text) for text in faults]
+        self.drone = Drone(built, lambda fresh: kind.make(fresh, kind.system), planned, self._outlet)
         self._ports = free_port(), free_port()
         self._transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
         self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
         self.heard: list[tuple[float, Message]] = []
         self.problem: BaseException | None = None
+        self._mute = False
         self._lookers: dict[threading.Thread, bool] = {}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -77,6 +84,8 @@ class Hangar:
         self._stopping.set()
         self._thread.join()
         self._transport.close()
+        if self._outlet is not None:
+            self._outlet.close()
         if self.problem is not None and error is None:
             raise self.problem
 
@@ -113,7 +122,14 @@ class Hangar:
 
     def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
         safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
-        return MavlinkVehicle(self.options(**options), safe, is_real=False, clock=self)
+        chosen = self.options(**options)
+        place = str(chosen["second_source"])
+        source = open_source(place, _Glances(self)) if place else None
+        return MavlinkVehicle(chosen, safe, is_real=False, clock=self, source=source)
+
+    def mute(self, muted: bool) -> None:
+        """The drone hears, and nothing that it says arrives."""
+        self._mute = muted
 
     def told(self, *kinds: str) -> list[Message]:
         return [message for _, message in self.heard if message.get_type() in kinds]
@@ -134,7 +150,7 @@ class Hangar:
                 frames = [frame for _ in range(_TICKS_AT_ONCE) for frame in self.drone.tick()]
                 for looker in tuple(self._lookers):
                     self._lookers[looker] = False
-                for frame in frames:
+                for frame in () if self._mute else frames:
                     self._transport.write(frame)
                 time.sleep(_TICKS_AT_ONCE * TICK_S / self.speed)
                 if frames:
@@ -148,3 +164,19 @@ class Hangar:
             looked or not thread.is_alive() for thread, looked in tuple(self._lookers.items())
         ):
             time.sleep(0.0002)
+
+
+class _Glances:
+    """The drone's time for somebody whom the drone does not wait for."""
+
+    def __init__(self, hangar: Hangar) -> None:
+        self._hangar = hangar
+
+    def now_s(self) -> float:
+        return self._hangar.drone.time_s
+
+    def wait_s(self, seconds: float) -> None:
+        self._hangar.wait_s(seconds)
+
+    def wall_s(self, seconds: float) -> float:
+        return self._hangar.wall_s(seconds)

@@ -1,0 +1,257 @@
+"""A vehicle whose link stays open between flights, over real UDP against the simulated drone."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from pymavlink import mavutil
+
+from app.vehicles.base import FlightOrder, Identity, Sample, Stop
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.addresses import parse
+from app.vehicles.mavlink.dialects import PAPARAZZI, number, text
+from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
+from tests.vehicles.mavlink.hangar import SAFE as OWN_SAFE
+from tests.vehicles.mavlink.hangar import Hangar
+from tests.vehicles.mavlink.speaking import becomes
+
+ORDER = FlightOrder(seed=1)
+START_ENGINE, TAKE_OFF, LAND_HERE = 3, 4, 13
+PINNED = Identity(system_id=31, autopilot="paparazzi", version="")
+
+
+@contextmanager
+def connected(
+    hangar: Hangar, identity: Identity | None = None, **options: bool | float | str
+) -> Iterator[MavlinkVehicle]:
+    vehicle = MavlinkVehicle(
+        hangar.options(**options),
+        OWN_SAFE[hangar.autopilot],
+        is_real=False,
+        clock=hangar,
+        identity=identity,
+        observes=True,
+    )
+    try:
+        yield vehicle
+    finally:
+        vehicle.close()
+
+
+def enter_block(hangar: Hangar, *blocks: int) -> None:
+    """As somebody else's ground station does."""
+    before = len(hangar.told("SCRIPT_ITEM"))
+    with Link(parse(str(hangar.options()["address"])), PAPARAZZI, clock=hangar, target_system=31) as link:
+        for place, block in enumerate(blocks):
+            link.send("MISSION_ACK", target_system=31, target_component=0, type=0)
+            link.send("SCRIPT_ITEM", target_system=31, target_component=0, seq=block, name="")
+            assert becomes(lambda place=place: len(hangar.told("SCRIPT_ITEM")) > before + place)  # type: ignore[misc]
+            hangar.wait_s(0.3)
+
+
+def blocks_told(hangar: Hangar) -> list[int]:
+    return [int(number(message, "seq")) for message in hangar.told("SCRIPT_ITEM")]
+
+
+def attend_until(vehicle: MavlinkVehicle, condition: Callable[[], bool], within_s: float = 30.0) -> None:
+    for _ in range(round(within_s / 0.2)):
+        if condition():
+            return
+        vehicle.attend(0.2)
+    raise AssertionError(f"still {vehicle.condition()}")
+
+
+def test_a_connected_vehicle_tells_who_it_is_and_how_it_is() -> None:
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        vehicle.attend(2.0)
+        condition = vehicle.condition()
+        assert replace(vehicle.identity, version="") == PINNED
+        assert (vehicle.concern, condition.step, condition.armed, condition.held) == ("", "idle", False, SAFE)
+        assert condition.altitude_m == pytest.approx(0.1, abs=0.05)
+        assert condition.position_hz == pytest.approx(51.0, abs=4.0)
+        assert condition.packet_age_s is not None
+        assert condition.packet_age_s < 0.5
+        assert condition.heartbeat_age_s is not None
+        assert condition.heartbeat_age_s < 1.5
+        assert condition.lost_share == pytest.approx(0.0, abs=0.01)
+        assert condition.battery_v is not None
+        assert condition.trouble == ""
+
+
+def test_the_version_is_asked_of_autopilots_that_answer_and_a_new_one_is_a_concern() -> None:
+    with Hangar("ardupilot") as hangar:
+        with connected(hangar) as vehicle:
+            known = vehicle.identity
+            assert (known.system_id, known.autopilot, known.version.count(".")) == (1, "ardupilot", 2)
+        with connected(hangar, replace(known, version="3.2.1")) as vehicle:
+            assert vehicle.concern == f"Its firmware is now version {known.version}; it was 3.2.1."
+            with pytest.raises(SafeGainsError, match="only observed"):
+                vehicle.stage(OWN_SAFE["ardupilot"])
+            vehicle.release()
+            assert vehicle.concern == ""
+
+
+def test_another_vehicle_than_the_pinned_one_is_not_taken_for_it() -> None:
+    with (
+        Hangar() as hangar,
+        pytest.raises(VehicleError, match="system 31 instead of 7"),
+        connected(hangar, replace(PINNED, system_id=7)),
+    ):
+        pass
+
+
+def test_a_session_flies_twice_each_flight_with_a_log_of_its_own(tmp_path: Path) -> None:
+    paths = [tmp_path / "flight-1.tlog", tmp_path / "flight-2.tlog"]
+    steps: set[str] = set()
+    with Hangar() as hangar, connected(hangar, PINNED) as vehicle:
+
+        def look(_sample: Sample) -> None:
+            steps.add(vehicle.condition().step)
+
+        for path in paths:
+            vehicle.attend(0.5)
+            vehicle.log_to(path)
+            assert vehicle.stage(TUNED) == TUNED
+            record = vehicle.fly(ORDER, on_sample=look, should_stop=Watcher(abort_at_s=2.0).decide)
+            assert (record.ending, vehicle.condition().held, vehicle.condition().step) == ("completed", SAFE, "idle")
+            vehicle.log_to(None)
+    assert {"record"} <= steps
+    for path in paths:
+        log = mavutil.mavlink_connection(str(path), dialect="paparazzi")
+        kinds = {message.get_type() for message in iter(log.recv_msg, None)}
+        assert {"PARAM_SET", "LOCAL_POSITION_NED", "HEARTBEAT"} <= kinds
+
+
+def test_a_check_judges_everything_and_raises_nothing() -> None:
+    with Hangar("px4") as hangar, connected(hangar, min_battery_v=20.0) as vehicle:
+        items = {item.name: item for item in vehicle.check()}
+        assert {name for name, item in items.items() if not item.passed} == {
+            "battery",
+            "failsafe NAV_DLL_ACT",
+            "failsafe GF_MAX_VER_DIST",
+        }
+        assert {"heartbeat", "disarmed", "position", "clock", "still", "gains"} <= set(items)
+        assert items["gains"].found == items["gains"].needed
+        assert items["battery"].needed == "20 V or more"
+        vehicle.stage(OWN_SAFE["px4"])
+        with pytest.raises(VehicleError, match=r"Battery: .* needed: 20 V or more"):
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+
+
+def test_gains_that_changed_after_they_were_staged_are_not_flown() -> None:
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        vehicle.stage(TUNED)
+        hangar.drone.reboot()
+        vehicle.attend(4.0)
+        with pytest.raises(VehicleError, match=r"Gains: kp .* needed: kp 1600"):
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert vehicle.restore() == SAFE
+
+
+def test_every_parameter_can_be_read() -> None:
+    heard: list[tuple[int, int]] = []
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        found = vehicle.parameters(lambda came, of: heard.append((came, of)))
+    assert found["gui_v_kp"] == 283.0
+    assert heard[-1][0] == heard[-1][1] >= len(found) > 50
+
+
+def test_a_vehicle_met_in_the_air_is_observed_landed_and_released_by_a_person() -> None:
+    with Hangar() as hangar:
+        enter_block(hangar, START_ENGINE, TAKE_OFF)
+        assert becomes(lambda: hangar.drone.body.altitude_m > 1.0)
+        with connected(hangar, PINNED) as vehicle:
+            assert hangar.writes == []
+            assert (vehicle.condition().step, vehicle.condition().armed) == ("observing", True)
+            assert "armed, although nobody here armed it" in vehicle.concern
+            for ask in (lambda: vehicle.stage(SAFE), vehicle.restore, vehicle.release):
+                with pytest.raises(SafeGainsError):
+                    ask()
+            assert not next(item for item in vehicle.check() if item.name == "disarmed").passed
+            vehicle.land("it is not ours")
+            assert "Land was asked for: it is not ours." in vehicle.concern
+            attend_until(vehicle, lambda: hangar.drone.body.stands)
+            assert LAND_HERE in blocks_told(hangar)
+            vehicle.motors_off("it has landed")
+            attend_until(vehicle, lambda: vehicle.condition().armed is False)
+            vehicle.release()
+            assert (vehicle.concern, vehicle.condition().step, vehicle.read_gains()) == ("", "idle", SAFE)
+
+
+def test_land_is_repeated_every_second_until_the_vehicle_obeys_and_not_afterwards() -> None:
+    with Hangar() as hangar:
+        enter_block(hangar, START_ENGINE, TAKE_OFF)
+        with connected(hangar) as vehicle:
+            hangar.mute(True)
+            vehicle.land("no answer comes")
+            before = blocks_told(hangar).count(LAND_HERE)
+            vehicle.attend(3.5)
+            assert 2 <= blocks_told(hangar).count(LAND_HERE) - before <= 5
+            hangar.mute(False)
+            vehicle.attend(2.5)
+            obeyed = blocks_told(hangar).count(LAND_HERE)
+            vehicle.attend(4.0)
+            assert blocks_told(hangar).count(LAND_HERE) == obeyed
+
+
+def test_a_vehicle_that_somebody_else_arms_is_only_observed_from_then_on() -> None:
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        vehicle.stage(TUNED)
+        hangar.drone.autopilot._enter(START_ENGINE)  # type: ignore[attr-defined]  # as by remote control
+        attend_until(vehicle, lambda: vehicle.condition().armed is True)
+        assert (vehicle.condition().step, bool(vehicle.concern)) == ("observing", True)
+
+
+def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() -> None:
+    told: list[float] = []
+
+    def slide() -> Stop | None:
+        if hangar.drone.body.altitude_m > 2.0 and not told:
+            told.append(hangar.now_s())
+            return Stop("people below", motors_off=True)
+        return None
+
+    with Hangar("ardupilot") as hangar:
+        hangar.switch_on_failsafes()
+        with connected(hangar) as vehicle:
+            vehicle.attend(2.0)
+            vehicle.stage(OWN_SAFE["ardupilot"])
+            record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
+            assert record.ending == "aborted"
+            assert record.reason == "The motors were stopped: people below"
+            forced = [
+                at_s for at_s, it in hangar.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
+            ]
+            assert forced[0] - told[0] < 0.3
+            assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
+            assert "PSC_POSZ_P" in {text(message, "param_id") for message in hangar.told("PARAM_SET")}
+
+
+def test_a_flight_plan_that_lands_by_its_own_exception_is_landed_with() -> None:
+    left: list[int] = []
+
+    def leave(sample: Sample) -> None:
+        if sample.time_s > 5.0 and not left:
+            left.append(1)
+            hangar.drone.autopilot._enter(LAND_HERE)  # type: ignore[attr-defined]  # as its exceptions do
+
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        vehicle.stage(TUNED)
+        record = vehicle.fly(ORDER, on_sample=leave, should_stop=never)
+        assert (record.ending, vehicle.concern, vehicle.read_gains()) == ("invalid", "", SAFE)
+        assert "The vehicle began to land by itself. Its flight plan went to the block “land”." in record.reason
+        assert hangar.drone.body.stands
+
+
+def test_a_log_that_cannot_be_written_is_told_and_the_one_before_goes_on(tmp_path: Path) -> None:
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        vehicle.log_to(tmp_path / "first.tlog")
+        with pytest.raises(VehicleError, match="cannot be written"):
+            vehicle.log_to(tmp_path / "nowhere" / "second.tlog")
+        vehicle.attend(0.5)
+        assert vehicle.condition().trouble == ""
+    assert (tmp_path / "first.tlog").stat().st_size > 0
