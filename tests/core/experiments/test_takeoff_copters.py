@@ -81,6 +81,21 @@ def test_only_gains_by_hand_can_be_flown_without_a_model(strategy: str) -> None:
     assert [(problem.field, problem.reason) for problem in problems] == [("strategy", reason)]
 
 
+def test_strategies_say_themselves_what_they_work_with() -> None:
+    names = ("takeoff", "takeoff-px4", "pitch-tracking")
+    found = {
+        name: [one for one in names if strategy.works_with(get_experiment(one))]
+        for name, strategy in STRATEGIES.items()
+    }
+    assert found == {
+        "calibrated": ["takeoff"],
+        "gradient": ["takeoff", "pitch-tracking"],
+        "identified": ["pitch-tracking"],
+        "simplex": ["takeoff", "pitch-tracking"],
+        "manual": ["takeoff", "takeoff-px4", "pitch-tracking"],
+    }
+
+
 def test_a_start_that_is_searched_on_a_model_is_refused_where_there_is_none() -> None:
     check_definition(replace(BY_HAND, start=Start(kind="given", gains=dict(FIRMER))))
     (problem,) = problems_of(replace(BY_HAND, start=Start(kind="simplex")))
