@@ -45,6 +45,7 @@ def test_the_default_definition_has_no_problems() -> None:
             "strategy",
             "must be one of calibrated, gradient, identified, simplex, manual, got 'luck'",
         ),
+        (replace(GOOD, strategy="identified"), "strategy", "'identified' works with pitch-tracking only"),
         (replace(GOOD, options={"raw": True}), "options.raw", "is not an option of gradient (it has: scaled, bias)"),
         (
             replace(GOOD, strategy="manual", options={"raw": 1}),
