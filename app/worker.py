@@ -1,8 +1,9 @@
 """The worker process: it flies, and it computes. One for each database; the web process needs it for both.
 
-Flights and computations run in processes of their own, each watched by a thread of this one, which keeps the books. The
-live socket has a thread of its own too, so that an abort is heard whatever the others do. Proposals have the pool to
-themselves; a reproduction, which takes minutes, has a process apart that yields to everything else.
+Flights, connected vehicles and computations have processes of their own, each watched by a thread of this one, which
+keeps the books. The live socket has a thread of its own too, so that an abort is heard whatever the others do.
+Proposals have the pool to themselves; a reproduction, which takes minutes, has a process apart that yields to
+everything else.
 """
 
 import os
@@ -25,9 +26,10 @@ from app.data_dir import prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import AlreadyRunningError, StorageError
+from app.fleet.tasks import SessionDeck
 from app.jobs.tasks import Desk, recover
 from app.live.address import live_address
-from app.live.messages import WorkerHello
+from app.live.messages import Shown, WorkerHello
 from app.live.server import LiveServer
 from app.live.watch import DatabaseWatch
 from app.locks import LockedError, exclusive
@@ -40,6 +42,7 @@ from app.trials.flying import Airspace
 from app.trials.tasks import FlightDeck
 
 FLIGHTS_AT_ONCE: Final = 8
+ACTS_AT_ONCE: Final = 8
 SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
 REPRODUCTIONS_AT_ONCE: Final = 1
 LOOK_ANYWAY_S: Final = 1.0
@@ -128,23 +131,13 @@ class Worker:
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
-            live = LiveServer(
-                live_address(self._settings.data_dir),
-                abort=self._airspace.abort,
-                order=lambda _vehicle, _order, _reason: False,
-                hello=self._hello,
-            )
-            deck = FlightDeck(
-                database,
-                self._settings.data_dir,
-                self._airspace,
-                live.publish,
-                worker=self._name,
-                closing=self._ending.event,
-            )
+            sessions, deck, live = self._decks(database)
             stack.callback(deck.close)
             self._until_stored(deck.recover)
+            self._until_stored(sessions.recover)
             stack.enter_context(live)  # from here on flights can be asked for, which recovery would withdraw
+            acting = stack.enter_context(ThreadPoolExecutor(ACTS_AT_ONCE, thread_name_prefix="act"))
+            stack.callback(sessions.close)
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
@@ -154,8 +147,26 @@ class Worker:
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid)
             _log.info("worker ready", worker=self._name)
-            self._loop(database, deck, flying, desks, computing)
+            self._loop(database, lambda: self._claim(deck, flying, sessions, acting, desks, computing))
             _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trials())
+
+    def _decks(self, database: Database) -> tuple[SessionDeck, FlightDeck, LiveServer]:
+        def publish(message: Shown) -> None:
+            live.publish(message)
+
+        data_dir, closing = self._settings.data_dir, self._ending.event
+        sessions = SessionDeck(database, data_dir, self._airspace, publish, worker=self._name, closing=closing)
+        live = LiveServer(live_address(data_dir), abort=self._airspace.abort, order=sessions.order, hello=self._hello)
+        deck = FlightDeck(
+            database,
+            data_dir,
+            self._airspace,
+            publish,
+            worker=self._name,
+            closing=closing,
+            session=sessions.session,
+        )
+        return sessions, deck, live
 
     def _desks(self, database: Database, pool: Pool) -> tuple[Desk, ...]:
         proposer = Proposer(database, pool, worker=self._name)
@@ -169,21 +180,30 @@ class Worker:
             for kind, perform, room in performed
         )
 
-    def _loop(
-        self, database: Database, deck: FlightDeck, flying: Executor, desks: Sequence[Desk], computing: Executor
-    ) -> None:
+    def _loop(self, database: Database, claim: Callable[[], None]) -> None:
         with DatabaseWatch(database.file) as watch:
             while not self._ending.event.is_set():
                 try:
-                    self._claim(deck, flying, desks, computing)
+                    claim()
                 except StorageError as error:
                     _log.error("no work can be claimed", why=str(error))
                     self._ending.event.wait(RETRY_S)
                 watch.wait(self._ending.event, LOOK_ANYWAY_S)
 
-    def _claim(self, deck: FlightDeck, flying: Executor, desks: Sequence[Desk], computing: Executor) -> None:
+    def _claim(
+        self,
+        deck: FlightDeck,
+        flying: Executor,
+        sessions: SessionDeck,
+        acting: Executor,
+        desks: Sequence[Desk],
+        computing: Executor,
+    ) -> None:
         while len(self._airspace.trials()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:
             flying.submit(deck.carry_out, task)
+        while (act := sessions.claim()) is not None:
+            acting.submit(sessions.carry_out, act)
+        sessions.tend()
         for desk in desks:
             while (job := desk.claim()) is not None:
                 computing.submit(desk.carry_out, job)

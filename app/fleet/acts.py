@@ -5,7 +5,8 @@
                        vehicle_released, record_held, record_checks
 
 Landing and motors off go another way, past the database; `record_order` writes them down afterwards. At a worker's
-start: `withdraw_acts`, then `forget_connections`, then `request_reconnections`.
+start: `withdraw_acts`, then `forget_connections`, then `request_reconnections`; later `wanted_links` are those that
+still are not there, until `vehicle_found` again.
 """
 
 from collections.abc import Iterable, Mapping
@@ -164,6 +165,30 @@ def request_reconnections(session: Session) -> list[int]:
         for row in rows
         if row.wanted_connected and repository.act_under_way(session, row.id) is None
     ]
+
+
+def wanted_links(session: Session) -> list[LinkedVehicle]:
+    """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it."""
+    rows = repository.registered_in(session, VehicleState.DISCONNECTED, VehicleState.QUARANTINED)
+    return [
+        _linked(row)
+        for row in rows
+        if row.wanted_connected
+        and repository.act_under_way(session, row.id) is None
+        and repository.flight_under_way(session, row.id) is None
+    ]
+
+
+def vehicle_found(
+    session: Session, vehicle_id: int, identity: Identity, *, concern: str, held: Mapping[str, float]
+) -> None:
+    """A vehicle that was wanted connected is there again; without a concern it was given its safe gains."""
+    row = repository.get_one(session, vehicle_id)
+    act = record_act(
+        session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=dict(row.safe_gains)
+    )
+    act.read_back = dict(held)
+    vehicle_connected(session, vehicle_id, identity, concern=concern, held=held)
 
 
 def vehicle_connected(

@@ -8,90 +8,36 @@ worker dies, the pipe between them breaks: the flight is then aborted, its vehic
 import os
 import signal
 import threading
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Final
 
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
-from app.live.messages import FlightPhase, Telemetry
-from app.locks import LockedError, exclusive
+from app.trials.crew import (
+    Decline,
+    Free,
+    Landed,
+    Orders,
+    Said,
+    Staged,
+    StandDown,
+    TakeOff,
+    Trouble,
+    died,
+    in_control,
+    mistake,
+)
 from app.trials.flying import Monitor
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, ShouldStop, Stop, Vehicle
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import FlightRecord, ShouldStop, Stop, Vehicle
+from app.vehicles.errors import SafeGainsError
 from app.vehicles.open import open_vehicle
 
 CONTROL_WITHIN_S: Final = 10.0
 """How long a flight waits for another process that still has the vehicle (one whose worker was killed, landing)."""
 ENDS_WITHIN_S: Final = 5.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Orders:
-    """Everything the process needs to know of one flight. `lock` is held while it has the vehicle."""
-
-    campaign_id: int
-    trial_id: int
-    experiment: str
-    vehicle_kind: str
-    vehicle_options: Mapping[str, OptionValue]
-    safe_gains: Mapping[str, float]
-    gains: Mapping[str, float]
-    flight: FlightOrder
-    lock: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Staged:
-    """Said by the process, which then waits for TakeOff or Decline."""
-
-    read_back: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True)
-class TakeOff:
-    """Said to the process: the gains are right and the lift-off is recorded."""
-
-
-@dataclass(frozen=True, slots=True)
-class Decline:
-    """Said to the process: this flight does not take place."""
-
-
-@dataclass(frozen=True, slots=True)
-class StandDown:
-    """Said to the process at any moment: end this flight now. One that was to take off ends on the ground."""
-
-    trial_id: int
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Landed:
-    """Said by the process: the flight's record."""
-
-    record: FlightRecord
-
-
-@dataclass(frozen=True, slots=True)
-class Trouble:
-    """Said by the process: what went wrong; `unsafe` when the safe gains could not be verified afterwards."""
-
-    what: str
-    unsafe: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Free:
-    """Said by the process: the vehicle is released, the next flight may come."""
-
-
-Said = Staged | Telemetry | FlightPhase | Landed | Trouble | Free
 
 
 class Cockpit:
@@ -116,22 +62,20 @@ class Cockpit:
                 yield said
         except (EOFError, OSError) as error:
             self._process.join(ENDS_WITHIN_S)
-            raise VehicleError(
-                f"The process that flew died (exit code {self._process.exitcode}).",
-                hint="Look at the vehicle. The worker's log may say more; then fly again.",
-            ) from error
+            raise died(self._process.exitcode) from error
+
+    @property
+    def alive(self) -> bool:
+        return self._process.is_alive()
 
     def take_off(self) -> None:
-        self._send(TakeOff())
+        self._tell(TakeOff())
 
     def decline(self) -> None:
-        self._send(Decline())
+        self._tell(Decline())
 
     def stand_down(self, trial_id: int, reason: str) -> None:
-        try:
-            self._send(StandDown(trial_id, reason))
-        except OSError:
-            return  # it is dead, which whoever listens to `fly` learns
+        self._tell(StandDown(trial_id, reason))
 
     def close(self) -> None:
         """Let the process end; it is killed when it does not."""
@@ -140,6 +84,10 @@ class Cockpit:
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
+
+    def _tell(self, message: TakeOff | Decline | StandDown) -> None:
+        with suppress(OSError):  # it is dead, which whoever listens to `fly` learns
+            self._send(message)
 
     def _send(self, message: Orders | TakeOff | Decline | StandDown) -> None:
         with self._sending:
@@ -189,7 +137,7 @@ def _work(pipe: Connection) -> None:
 def _fly(pipe: Connection, orders: Orders) -> None:
     try:
         with (
-            _control(orders),
+            in_control(orders.lock, within_s=CONTROL_WITHIN_S),
             open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
         ):
             pipe.send(Staged(vehicle.stage(orders.gains)))
@@ -204,7 +152,7 @@ def _fly(pipe: Connection, orders: Orders) -> None:
     except (EOFError, OSError):
         raise
     except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
-        pipe.send(Trouble(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False))
+        pipe.send(mistake(error))
 
 
 def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle, standing_down: str | None) -> FlightRecord:
@@ -233,17 +181,3 @@ def _listener(pipe: Connection, trial_id: int, standing_down: str | None) -> Sho
         return None
 
     return should_stop
-
-
-@contextmanager
-def _control(orders: Orders) -> Iterator[None]:
-    """The vehicle is this process's alone; one whose worker was killed may still be landing it."""
-    deadline_s = time.monotonic() + CONTROL_WITHIN_S
-    try:
-        with exclusive(orders.lock, keep_waiting=lambda: time.monotonic() < deadline_s):
-            yield
-    except LockedError as error:
-        raise VehicleError(
-            f"The vehicle is still under the control of {error.holder or 'another process'}.",
-            hint="Wait until that process has landed it, or end the process; then fly again.",
-        ) from error

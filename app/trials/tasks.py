@@ -5,6 +5,7 @@ nothing waits for the database; a record goes to the spool first, and from there
 """
 
 import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -18,13 +19,20 @@ from app.db.session import Database
 from app.errors import GainlineError, StorageError
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.trials import flights
-from app.trials.cockpit import Cockpit, Hangar, Landed, Orders, Staged, Trouble
+from app.trials.cockpit import Cockpit, Hangar
+from app.trials.crew import Crew, Landed, Orders, Restored, Staged, Trouble
 from app.trials.flights import FlightTask
 from app.trials.flying import AbortFlag, Airspace, Publish
 from app.trials.spool import Spool
+from app.trials.telemetry_logs import telemetry_log
 from app.vehicles.base import FlightOrder, FlightRecord
+from app.vehicles.errors import VehicleError
+from app.vehicles.open import get_kind
 
 RETRY_S: Final = 1.0
+STAGED_FOR_S: Final = 600.0
+"""How long a vehicle waits, with a trial's gains on it, for its operator's word."""
+LOOK_EVERY_S: Final = 0.05
 
 _log = structlog.get_logger(__name__)
 
@@ -35,7 +43,7 @@ class Ended:
 
     With a `record` it took place. Without one, `lifted_off` says whether the vehicle had been told to take off, and
     `withdrawn` that somebody ended it before that. `concern`: the safe gains could not be verified afterwards;
-    `unheard`: whoever had the vehicle ended without saying whether they are restored.
+    `unheard`: whoever had the vehicle ended without saying whether they are restored; `restored`: they were read back.
     """
 
     record: FlightRecord | None = None
@@ -44,10 +52,19 @@ class Ended:
     problem: str = ""
     concern: str = ""
     unheard: bool = False
+    restored: dict[str, float] | None = None
+
+
+def _no_session(_vehicle_id: int) -> Crew:
+    raise VehicleError("There is no link to the vehicle.", hint="Connect it, then ask again.")
 
 
 class FlightDeck:
-    """Claims flights and carries them out. `closing` ends the waiting for a database that takes nothing."""
+    """Claims flights and carries them out. `closing` ends the waiting for a database that takes nothing.
+
+    `session(vehicle_id)` gives whoever has the link to a vehicle that keeps one between flights; others are opened for
+    each flight in a process of the hangar's.
+    """
 
     def __init__(
         self,
@@ -58,9 +75,11 @@ class FlightDeck:
         *,
         worker: str,
         closing: threading.Event,
+        session: Callable[[int], Crew] = _no_session,
     ) -> None:
         self._database = database
         self._data_dir = data_dir
+        self._session = session
         self._spool = Spool(data_dir / "spool")
         self._airspace = airspace
         self._publish = publish
@@ -111,54 +130,87 @@ class FlightDeck:
             return Ended(withdrawn=True, problem=flag.reason)
         try:
             self._spool.claim(task.flight_id)
-            cockpit = self._hangar.take()
+            telemetry_log(self._data_dir, task.flight_id).parent.mkdir(exist_ok=True)
+            crew = self._crew(task)
         except (GainlineError, OSError) as error:
             return Ended(problem=f"It was not begun: {error}")
         try:
-            return self._fly_in(cockpit, task, flag)
+            return self._fly_with(crew, task, flag)
         finally:
             flag.tell(lambda _reason: None)
 
-    def _fly_in(self, cockpit: Cockpit, task: FlightTask, flag: AbortFlag) -> Ended:
+    def _crew(self, task: FlightTask) -> Crew:
+        """Raises VehicleError when the vehicle keeps a link, and there is none."""
+        if get_kind(task.vehicle_kind).connect is not None:
+            return self._session(task.vehicle_id)
+        return self._hangar.take()
+
+    def _fly_with(self, crew: Crew, task: FlightTask, flag: AbortFlag) -> Ended:
         """The part that the vehicle takes part in; whatever happens, its process is let go, and there is an end."""
         ended = Ended()
         try:
             self._phase(task, "staging")
-            flag.tell(lambda reason: cockpit.stand_down(task.trial_id, reason))
-            for said in cockpit.fly(self._orders(task)):
+            flag.tell(lambda reason: crew.stand_down(task.trial_id, reason))
+            for said in crew.fly(self._orders(task)):
                 match said:
                     case Telemetry() | FlightPhase():
                         self._publish(said)
                     case Staged(read_back):
-                        ended = self._staged(task, flag, cockpit, read_back)
+                        ended = self._staged(task, flag, crew, read_back)
                     case Landed(record):
                         ended = Ended(record=record, lifted_off=True)
+                    case Restored(held):
+                        ended = replace(ended, restored=held)
                     case Trouble(what, unsafe):
                         ended = replace(ended, problem=ended.problem or what, concern=what if unsafe else "")
         except Exception as error:  # noqa: BLE001 - a mistake of the program must not leave the trial without an end
-            cockpit.close()
+            crew.close()
             return replace(ended, problem=_spoken(error), unheard=True)
-        self._hangar.give_back(cockpit)
+        if isinstance(crew, Cockpit):
+            self._hangar.give_back(crew)
         return ended
 
-    def _staged(self, task: FlightTask, flag: AbortFlag, cockpit: Cockpit, read_back: dict[str, float]) -> Ended:
+    def _staged(self, task: FlightTask, flag: AbortFlag, crew: Crew, read_back: dict[str, float]) -> Ended:
         """Take off if the vehicle holds what it was given and the database has taken note; else stand down."""
         ended = Ended(lifted_off=True)
         try:
             self._store(lambda session: flights.record_staged(session, task.flight_id, read_back))
             if (problem := mismatch(task.gains, read_back)) is not None:
                 ended = Ended(problem=problem)
-            elif flag.reason is not None:
-                ended = Ended(withdrawn=True, problem=flag.reason)
+            elif (withdrawn := self._word(task, flag, crew)) is not None:
+                ended = Ended(withdrawn=True, problem=withdrawn)
             else:
                 self._store(lambda session: flights.record_lift_off(session, task.flight_id))
         except GainlineError as error:
             ended = Ended(problem=f"It was not flown, because that could not be recorded: {error}")
         if ended.lifted_off:
-            cockpit.take_off()
+            crew.take_off()
         else:
-            cockpit.decline()
+            crew.decline()
         return ended
+
+    def _word(self, task: FlightTask, flag: AbortFlag, crew: Crew) -> str | None:
+        """None when the vehicle may take off, at once or at its operator's word; else why it is not to."""
+        if task.mode == "fly":
+            return flag.reason
+        self._phase(task, "staged")
+        until_s = time.monotonic() + STAGED_FOR_S
+        while time.monotonic() < until_s:
+            if flag.reason is not None:
+                return flag.reason
+            if not crew.alive:
+                return "the process that has the vehicle ended"
+            try:
+                with self._database.read() as session:
+                    if (reason := flights.stand_down_wanted(session, task.flight_id)) is not None:
+                        return reason
+                    if flights.take_off_wanted(session, task.flight_id):
+                        return None
+            except StorageError as error:
+                _log.error("the operator's word cannot be read", why=str(error))
+                time.sleep(RETRY_S)
+            time.sleep(LOOK_EVERY_S)
+        return f"nobody asked for its take-off within {STAGED_FOR_S / 60:g} minutes"
 
     def _orders(self, task: FlightTask) -> Orders:
         return Orders(
@@ -171,6 +223,7 @@ class FlightDeck:
             gains=task.gains,
             flight=FlightOrder(seed=task.seed, speed=task.speed),
             lock=self._data_dir / f"vehicle-{task.vehicle_kind}.lock",
+            tlog=telemetry_log(self._data_dir, task.flight_id),
         )
 
     def _phase(self, task: FlightTask, phase: Phase, note: str = "") -> None:
@@ -270,6 +323,8 @@ def _record(session: Session, task: FlightTask, ended: Ended) -> None:
         flights.record_withdrawal(session, task.flight_id, ended.problem)
     else:
         flights.record_failure(session, task.flight_id, ended.problem)
+    if ended.restored is not None:
+        flights.record_restored(session, task.flight_id, ended.restored)
     _record_doubts(session, task, ended)
 
 

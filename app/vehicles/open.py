@@ -52,7 +52,7 @@ def open_vehicle(kind: str, options: Mapping[str, object], *, safe_gains: Gains)
         yield vehicle
     finally:
         try:
-            _restore(vehicle)
+            restore_safe_gains(vehicle)
         except SafeGainsError:
             with suppress(Exception):  # what must be heard is that its gains are in doubt
                 vehicle.close()
@@ -60,7 +60,8 @@ def open_vehicle(kind: str, options: Mapping[str, object], *, safe_gains: Gains)
         vehicle.close()
 
 
-def _restore(vehicle: Vehicle) -> None:
+def restore_safe_gains(vehicle: Vehicle) -> dict[str, float]:
+    """Write the safe gains and give what was read back, which is them. Raises SafeGainsError when it is not."""
     wanted = dict(vehicle.safe_gains)
     hint = "Do not fly it. Set its gains by hand, read them back, then release it."
     try:
@@ -69,3 +70,4 @@ def _restore(vehicle: Vehicle) -> None:
         raise SafeGainsError(f"The vehicle's safe gains {wanted} could not be set: {error}", hint=hint) from error
     if held != wanted:
         raise SafeGainsError(f"The vehicle holds {held} instead of its safe gains {wanted}.", hint=hint)
+    return held

@@ -12,7 +12,8 @@ import pytest
 from app.core.experiments import get_experiment
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import exclusive
-from app.trials.cockpit import CONTROL_WITHIN_S, Cockpit, Landed, Orders, Said, Staged, Trouble
+from app.trials.cockpit import CONTROL_WITHIN_S, Cockpit
+from app.trials.crew import Landed, Orders, Said, Staged, Trouble
 from app.vehicles.base import FlightOrder
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import open_vehicle

@@ -1,0 +1,312 @@
+"""The process of a session: it has one vehicle, listens to it, and does what the worker says.
+
+It looks into the pipe every few milliseconds, whatever it does with a vehicle that might move. What it shows of the
+vehicle is dropped when the worker does not read: nothing that flies waits for anybody.
+"""
+
+import datetime as dt
+import os
+import select
+import signal
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import fields
+from multiprocessing.connection import Connection
+from typing import Final
+
+from app.core.errors import GainlineError
+from app.core.experiments import get_experiment
+from app.fleet.session import Answered, Asked, Call, Connected, FromSeat, Obeyed, Ordered, ToSeat
+from app.fleet.states import ActKind
+from app.live.messages import FlightPhase, Telemetry, VehicleStatus
+from app.trials.crew import (
+    Decline,
+    Free,
+    Landed,
+    Orders,
+    Restored,
+    Staged,
+    StandDown,
+    TakeOff,
+    Trouble,
+    in_control,
+    mistake,
+)
+from app.trials.flying import Monitor
+from app.vehicles.base import ConnectedVehicle, FlightRecord, Stop
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.open import get_kind, restore_safe_gains
+
+LOOK_EVERY_S: Final = 0.005
+SHOW_EVERY_S: Final = 0.2
+GONE_AFTER_S: Final = 3.0
+"""Without a heartbeat for so long, a vehicle is shown as gone."""
+CONTROL_WITHIN_S: Final = 120.0
+"""How long a session waits for the one of a worker that was killed: it may be landing, or waiting for a lost link."""
+LOOK_AGAIN_S: Final = 2.0
+
+
+class WorkerGoneError(Exception):
+    """The pipe is broken: nobody keeps the books any more."""
+
+
+class Line:
+    """The process's end of the pipe. Once it is broken, `hear` says so; `show` and `say` are for nobody then."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+
+    def hear(self) -> ToSeat | None:
+        """The next message; None when there is none. Raises WorkerGoneError."""
+        try:
+            return self._pipe.recv() if self._pipe.poll() else None
+        except (EOFError, OSError) as error:
+            raise WorkerGoneError from error
+
+    def is_open(self) -> bool:
+        """To be asked while nothing is to be heard. Raises WorkerGoneError rather than say no."""
+        self.hear()
+        return True
+
+    def say(self, message: FromSeat) -> None:
+        with suppress(OSError):
+            self._pipe.send(message)
+
+    def show(self, message: FromSeat) -> None:
+        """Say it if it can be said at once."""
+        with suppress(OSError, ValueError):
+            if select.select([], [self._pipe], [], 0.0)[1]:
+                self._pipe.send(message)
+
+
+def work(pipe: Connection, call: Call) -> None:
+    """The process, from connecting until the worker closes the pipe or dies, or the link fails."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    line = Line(pipe)
+    try:
+        with in_control(call.lock, within_s=CONTROL_WITHIN_S, wanted=line.is_open):
+            seat = Seat(line, call)
+            try:
+                seat.work()
+            finally:
+                seat.leave()
+    except WorkerGoneError:
+        pass
+    except GainlineError as error:
+        line.say(Trouble(str(error), unsafe=isinstance(error, SafeGainsError)))
+    except Exception as error:  # noqa: BLE001 - the edge of the process; the worker's log says it
+        line.say(mistake(error))
+    finally:
+        pipe.close()
+        os._exit(0)
+
+
+class Seat:
+    """One vehicle under control."""
+
+    def __init__(self, line: Line, call: Call) -> None:
+        """Raises VehicleError when the vehicle does not answer."""
+        self._line, self._call = line, call
+        self._speed = float(call.options.get("clock_speed", 1.0))
+        self._vehicle = self._found()
+        self._show_due_s = 0.0
+        self._trial_id: int | None = None
+        self._stop: Stop | None = None
+        self._is_worker_gone = False
+        line.say(Connected(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
+
+    def work(self) -> None:
+        """Do what is asked, one thing after the other. Raises WorkerGoneError at the end, VehicleError when the link
+        fails."""
+        while True:
+            match self._next():
+                case Orders() as orders:
+                    self._fly(orders)
+                case Asked() as asked:
+                    self._line.say(self._act(asked))
+                case _:
+                    continue  # of a flight that is over
+
+    def leave(self) -> None:
+        self._vehicle.close()
+
+    # ---- between flights
+
+    def _found(self) -> ConnectedVehicle:
+        while True:
+            try:
+                return self._connect(self._call.safe_gains)
+            except VehicleError as error:
+                if not self._call.patient or isinstance(error, SafeGainsError):
+                    raise
+            for _ in range(round(LOOK_AGAIN_S / LOOK_EVERY_S)):
+                self._line.hear()
+                time.sleep(LOOK_EVERY_S)
+
+    def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
+        connect = get_kind(self._call.kind).connect
+        assert connect is not None, self._call.kind
+        return connect(self._call.options, safe_gains, self._call.identity)
+
+    def _next(self) -> ToSeat:
+        """The worker's next message that is no order, listening to the vehicle meanwhile."""
+        while (message := self._heed()) is None:
+            self._vehicle.attend(LOOK_EVERY_S * self._speed)
+            self._show()
+        return message
+
+    def _heed(self) -> ToSeat | None:
+        """Pass an order on at once; any other message is returned."""
+        message = self._line.hear()
+        if not isinstance(message, Ordered):
+            return message
+        self._obey(message)
+        return None
+
+    def _obey(self, ordered: Ordered) -> None:
+        problem = ""
+        try:
+            act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
+            act(ordered.reason)
+        except VehicleError as error:
+            problem = str(error)
+        self._line.say(Obeyed(ordered.order, ordered.reason, problem))
+
+    def _show(self) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._show_due_s:
+            self._show_due_s = max(self._show_due_s + SHOW_EVERY_S, now_s)
+            self._line.show(self._status())
+
+    def _status(self) -> VehicleStatus:
+        condition = self._vehicle.condition()
+        known = {each.name: getattr(condition, each.name) for each in fields(condition)}
+        age_s = condition.heartbeat_age_s
+        return VehicleStatus(
+            vehicle_id=self._call.vehicle_id,
+            state="gone" if age_s is None or age_s > GONE_AFTER_S * self._speed else "connected",
+            at=dt.datetime.now(dt.UTC).isoformat(),
+            concern=self._vehicle.concern,
+            **known | {"held": dict(condition.held)},
+        )
+
+    def _held(self) -> dict[str, float]:
+        return dict(self._vehicle.condition().held)
+
+    # ---- acts
+
+    def _act(self, asked: Asked) -> Answered:
+        try:
+            if self._vehicle.condition().armed:  # whatever takes time would keep Land waiting
+                raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
+            self._have(asked.safe_gains)
+            answer = self._acted(asked.kind)
+        except VehicleError as error:
+            return Answered(problem=str(error), concern=self._vehicle.concern, held=self._held())
+        return answer
+
+    def _acted(self, kind: ActKind) -> Answered:
+        checks, parameters = None, None
+        match kind:
+            case ActKind.CHECK:
+                checks = self._vehicle.check()
+            case ActKind.PARAMETERS:
+                parameters = self._vehicle.parameters(self._progress)
+            case ActKind.RESTORE:
+                self._vehicle.restore()
+            case ActKind.RELEASE:
+                self._vehicle.release()
+            case _:
+                raise VehicleError(f"A session cannot carry out “{kind}”.", hint="Report this with the worker's log.")
+        return Answered(
+            concern=self._vehicle.concern,
+            held=self._held(),
+            checks=checks,
+            parameters=parameters,
+            identity=self._vehicle.identity,
+        )
+
+    def _progress(self, _count: int, _of: int) -> None:
+        self._heed()
+        self._show()
+
+    def _have(self, safe_gains: Mapping[str, float]) -> None:
+        """A vehicle whose safe gains were changed by a person is connected anew, which writes them."""
+        if dict(self._vehicle.safe_gains) != dict(safe_gains):
+            self._vehicle.close()
+            self._vehicle = self._connect(safe_gains)
+
+    # ---- flights
+
+    def _fly(self, orders: Orders) -> None:
+        self._trial_id, self._stop = orders.trial_id, None
+        try:
+            self._have(orders.safe_gains)
+            with self._logged(orders):
+                try:
+                    self._line.say(Staged(self._vehicle.stage(orders.gains)))
+                    if self._is_cleared():
+                        self._line.say(Landed(self._take_off(orders)))
+                finally:
+                    self._line.say(Restored(restore_safe_gains(self._vehicle)))
+        except GainlineError as error:
+            self._line.say(Trouble(str(error), unsafe=isinstance(error, SafeGainsError)))
+        except WorkerGoneError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
+            self._line.say(mistake(error))
+        finally:
+            self._trial_id = None
+        self._line.say(Free())
+
+    @contextmanager
+    def _logged(self, orders: Orders) -> Iterator[None]:
+        self._vehicle.log_to(orders.tlog)
+        try:
+            yield
+        finally:
+            self._vehicle.log_to(None)
+
+    def _is_cleared(self) -> bool:
+        """Wait for the worker's word, attending the vehicle. Raises WorkerGoneError."""
+        while not isinstance(answer := self._next(), TakeOff | Decline):
+            self._note(answer)
+        return isinstance(answer, TakeOff)
+
+    def _take_off(self, orders: Orders) -> FlightRecord:
+        experiment = get_experiment(orders.experiment)
+        monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, self._publish)
+        monitor.phase("flying")
+        record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=self._should_stop)
+        monitor.flush()
+        monitor.phase("landed")
+        return record
+
+    def _publish(self, message: Telemetry | FlightPhase | VehicleStatus) -> None:
+        (self._line.say if isinstance(message, FlightPhase) else self._line.show)(message)
+
+    def _should_stop(self) -> Stop | None:
+        """Asked every few milliseconds in the air."""
+        self._show()
+        try:
+            while not self._is_worker_gone and (message := self._line.hear()) is not None:
+                self._note(message)
+        except WorkerGoneError:
+            self._is_worker_gone = True
+            self._stop = self._stop or Stop("the worker is gone")
+        return self._stop
+
+    def _note(self, message: ToSeat) -> None:
+        """What ends the flight: the first reason counts, but motors off counts more."""
+        match message:
+            case StandDown(trial_id, reason) if trial_id == self._trial_id:
+                self._stop = self._stop or Stop(reason)
+            case Ordered(order, reason):
+                if order == "motors off":
+                    self._stop = Stop(reason, motors_off=True)
+                self._stop = self._stop or Stop(reason)
+                self._line.say(Obeyed(order, reason))
+            case _:
+                pass

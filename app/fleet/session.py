@@ -1,0 +1,211 @@
+"""A connected vehicle's session: a process of its own that keeps the link open between flights.
+
+This is the worker's side; the process itself is in `seat`. It never touches the database. When the worker dies, the
+pipe between them breaks: a flight is then aborted, the vehicle lands and is left with its safe gains, and the process
+ends; the next worker's session waits until then.
+"""
+
+import os
+import queue
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Final
+
+from app.fleet.states import ActKind
+from app.live.messages import FlightPhase, Order, Telemetry, VehicleStatus
+from app.trials.crew import Decline, Free, Landed, Orders, Restored, Said, Staged, StandDown, TakeOff, Trouble, died
+from app.vehicles.base import CheckItem, Identity, OptionValue
+from app.vehicles.errors import SafeGainsError, VehicleError
+
+ENDS_WITHIN_S: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Call:
+    """Whom a session is for. `lock` is held as long as it has the vehicle; `identity` is the pinned one, None before
+    the first time. `patient`: look for a vehicle that does not answer until it does."""
+
+    vehicle_id: int
+    name: str
+    kind: str
+    options: Mapping[str, OptionValue]
+    safe_gains: Mapping[str, float]
+    identity: Identity | None
+    lock: Path
+    patient: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Connected:
+    """Said by the process once the link is open; `concern` is why the vehicle may only be observed."""
+
+    identity: Identity
+    concern: str
+    held: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """Said to the process: carry this act out, for a vehicle with these safe gains."""
+
+    kind: ActKind
+    safe_gains: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """Said by the process: what came of an act; `problem` when it failed. `held` are the gains as last read back."""
+
+    problem: str = ""
+    concern: str = ""
+    held: dict[str, float] = field(default_factory=dict)
+    checks: tuple[CheckItem, ...] | None = None
+    parameters: dict[str, float] | None = None
+    identity: Identity | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Ordered:
+    """Said to the process at any moment: land, or motors off."""
+
+    order: Order
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Obeyed:
+    """Said by the process: an order was passed on to the vehicle; `problem` when it could not be."""
+
+    order: Order
+    reason: str
+    problem: str = ""
+
+
+FromSeat = Connected | Answered | Obeyed | VehicleStatus | Said
+ToSeat = Orders | TakeOff | Decline | StandDown | Asked | Ordered
+Hear = Callable[[VehicleStatus | Obeyed], None]
+
+
+class Session:
+    """The worker's handle of such a process: a Crew for flights, and a link to the vehicle in between.
+
+    `hear` is told, on a thread of the session's own, how the vehicle is and what became of orders. One conversation at
+    a time: a flight or an act; orders may come at any moment, from any thread.
+    """
+
+    def __init__(self, call: Call, seat: Callable[[Connection, Call], None], *, hear: Hear) -> None:
+        self.call: Final = call
+        self._hear_of = hear
+        context = get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._sending = threading.Lock()
+        self._said: queue.SimpleQueue[FromSeat | None] = queue.SimpleQueue()
+        self._process = context.Process(target=seat, args=(theirs, call), name=f"session {call.name}", daemon=True)
+        self._process.start()
+        theirs.close()
+        self._ended = threading.Event()
+        self._open = False
+        self.trial_id: int | None = None
+        """Of the flight under way."""
+        threading.Thread(target=self._listen, name=f"session {call.name}", daemon=True).start()
+
+    @property
+    def alive(self) -> bool:
+        return not self._ended.is_set()
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    def connected(self) -> Connected:
+        """Wait until the link is open. Raises VehicleError when it cannot be, SafeGainsError when the vehicle's gains
+        are in doubt; the process has ended then."""
+        match self._next():
+            case Connected() as said:
+                self._open = True
+                return said
+            case Trouble(what, unsafe):
+                raise (SafeGainsError if unsafe else VehicleError)(what, hint="Then connect it again.")
+            case other:
+                raise AssertionError(f"A session began with {other!r}.")
+
+    def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> Answered:
+        """Have an act carried out and wait for what came of it. Raises VehicleError when the process dies."""
+        self._tell(Asked(kind=kind, safe_gains=dict(safe_gains)))
+        said = self._next()
+        assert isinstance(said, Answered), said
+        return said
+
+    def fly(self, orders: Orders) -> Iterator[Said]:
+        """As `Crew.fly` says."""
+        self.trial_id = orders.trial_id
+        try:
+            self._tell(orders)
+            while not isinstance(said := self._next(), Free):
+                assert isinstance(said, Staged | Telemetry | FlightPhase | Landed | Restored | Trouble), said
+                yield said
+        finally:
+            self.trial_id = None
+
+    def take_off(self) -> None:
+        self._tell(TakeOff())
+
+    def decline(self) -> None:
+        self._tell(Decline())
+
+    def stand_down(self, trial_id: int, reason: str) -> None:
+        self._tell(StandDown(trial_id, reason))
+
+    def order(self, order: Order, reason: str) -> bool:
+        """Whether the process was told; it passes the order on at once. False while there is no link."""
+        return self._open and self.alive and self._tell(Ordered(order, reason))
+
+    def hang_up(self) -> None:
+        """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
+        with suppress(OSError), socket.socket(fileno=os.dup(self._pipe.fileno())) as end:
+            end.shutdown(socket.SHUT_RDWR)  # unlike closing the pipe, it wakes who listens to it
+
+    def close(self) -> None:
+        """Hang up and see the process end, unless it takes long."""
+        self.hang_up()
+        self._process.join(ENDS_WITHIN_S)
+
+    def _next(self) -> FromSeat:
+        """What the process says next, apart from what is heard at once. Raises VehicleError when it is dead."""
+        if (said := self._said.get()) is None:
+            self._said.put(None)
+            raise died(self._process.exitcode)
+        return said
+
+    def _listen(self) -> None:
+        try:
+            while True:
+                match self._pipe.recv():
+                    case VehicleStatus() | Obeyed() as news:
+                        self._hear_of(news)
+                    case said:
+                        self._said.put(said)
+        except (EOFError, OSError):
+            self._process.join(ENDS_WITHIN_S)
+        finally:
+            self._ended.set()
+            self._said.put(None)
+            with self._sending:
+                self._pipe.close()
+
+    def _tell(self, message: ToSeat) -> bool:
+        try:
+            self._send(message)
+        except OSError:  # it is dead, which whoever listens to it learns
+            return False
+        return True
+
+    def _send(self, message: ToSeat) -> None:
+        with self._sending:
+            self._pipe.send(message)

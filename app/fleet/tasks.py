@@ -1,0 +1,327 @@
+"""Sessions of connected vehicles: what people ask of these beside flights is carried out here, and links that are
+wanted are kept open.
+
+Landing and motors off go from the socket's thread straight into a session's pipe; what became of them is written down
+afterwards.
+"""
+
+import datetime as dt
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import structlog
+from sqlalchemy.orm import Session as Transaction
+
+from app.core.errors import GainlineError
+from app.db.session import Database
+from app.errors import ConflictError, StorageError
+from app.fleet import acts
+from app.fleet.acts import ActTask, LinkedVehicle
+from app.fleet.seat import work
+from app.fleet.session import Answered, Call, Connected, Obeyed, Session
+from app.fleet.states import GIVES_GAINS, ActKind
+from app.live.messages import LinkTo, Order, VehicleStatus
+from app.trials.flying import Airspace, Publish
+from app.vehicles.errors import SafeGainsError, VehicleError
+
+RETRY_S: Final = 1.0
+LOOK_FOR_LINKS_EVERY_S: Final = 2.0
+AT_ONCE: Final = 16
+
+_log = structlog.get_logger(__name__)
+
+
+@dataclass(slots=True)
+class Berth:
+    """A vehicle's place: the session that has it. `busy` is held while one is opened or closed."""
+
+    busy: threading.Lock = field(default_factory=threading.Lock)
+    session: Session | None = None
+    seeking: Session | None = None
+    """One that waits for a vehicle that does not answer."""
+    concern: str = ""
+
+    @property
+    def live(self) -> Session | None:
+        return self.session if self.session is not None and self.session.alive else None
+
+
+class SessionDeck:
+    """Claims acts and carries them out, and has the sessions. `closing` ends the waiting for a database that takes
+    nothing. `order` and `session` may be called from any thread."""
+
+    def __init__(
+        self,
+        database: Database,
+        data_dir: Path,
+        airspace: Airspace,
+        publish: Publish,
+        *,
+        worker: str,
+        closing: threading.Event,
+    ) -> None:
+        self._database = database
+        self._data_dir = data_dir
+        self._airspace = airspace
+        self._publish = publish
+        self._worker = worker
+        self._closing = closing
+        self._berths: dict[int, Berth] = {}
+        self._look_due_s = 0.0
+        self._seekers = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="link")
+        self._books = ThreadPoolExecutor(1, thread_name_prefix="books")
+
+    def recover(self) -> None:
+        """After a start, and after the flights' own recovery: nobody has a link to any vehicle. Raises StorageError."""
+        with self._database.write() as transaction:
+            acts.withdraw_acts(transaction, "the worker ended")
+            acts.forget_connections(transaction)
+            acts.request_reconnections(transaction)
+
+    def close(self) -> None:
+        """When nothing is carried out any more: every vehicle is let go, with its safe gains."""
+        berths = tuple(self._berths.values())
+        for session in [each for berth in berths for each in (berth.session, berth.seeking) if each is not None]:
+            session.hang_up()
+        self._seekers.shutdown()
+        for session in [berth.session for berth in berths if berth.session is not None]:
+            session.close()
+        self._books.shutdown()
+
+    # ---- from any thread
+
+    def order(self, vehicle_id: int, order: Order, reason: str) -> bool:
+        """Whether the vehicle's session was told. A flight that waits for its take-off stands down by it too."""
+        berth = self._berths.get(vehicle_id)
+        if berth is None or (session := berth.live) is None:
+            return False
+        told = session.order(order, reason)
+        if (trial_id := session.trial_id) is not None:
+            self._airspace.abort(trial_id, reason)
+        return told
+
+    def session(self, vehicle_id: int) -> Session:
+        """For a flight. Raises VehicleError when there is no link."""
+        berth = self._berths.get(vehicle_id)
+        if berth is None or (session := berth.live) is None:
+            raise _no_link()
+        return session
+
+    # ---- acts
+
+    def claim(self) -> ActTask | None:
+        """The act that has waited longest, now this worker's; None when none waits. Raises StorageError."""
+        with self._database.write() as transaction:
+            return acts.claim_act(transaction, self._worker)
+
+    def carry_out(self, task: ActTask) -> None:
+        """The whole act, to its stored outcome. Raises nothing."""
+        with structlog.contextvars.bound_contextvars(vehicle_id=task.vehicle.vehicle_id, act_id=task.act_id):
+            try:
+                {ActKind.CONNECT: self._connect, ActKind.DISCONNECT: self._disconnect}.get(task.kind, self._ask)(task)
+            except Exception as error:  # noqa: BLE001 - the edge of the thread; the vehicle must not stay busy for ever
+                _log.exception("act failed by a mistake of the program")
+                self._fail(task, f"The program made a mistake ({type(error).__name__}); see the worker's log.")
+
+    def _connect(self, task: ActTask) -> None:
+        berth = self._berth(task.vehicle.vehicle_id)
+        if berth.seeking is not None:
+            berth.seeking.hang_up()
+        try:
+            with berth.busy:
+                said = self._opened(berth, task.vehicle)
+        except GainlineError as error:
+            concern = str(error) if isinstance(error, SafeGainsError) else ""
+            self._fail(task, str(error), also=lambda t: acts.vehicle_gone(t, task.vehicle.vehicle_id, concern=concern))
+            return
+        self._store_patiently(partial(_connected, task=task, said=said))
+
+    def _disconnect(self, task: ActTask) -> None:
+        berth = self._berth(task.vehicle.vehicle_id)
+        with berth.busy:
+            session, berth.session = berth.session, None
+            if session is not None:
+                session.close()
+        self._show(task.vehicle.vehicle_id, "gone")
+        self._store_patiently(partial(_disconnected, task=task))
+
+    def _ask(self, task: ActTask) -> None:
+        try:
+            answered = self.session(task.vehicle.vehicle_id).ask(task.kind, task.vehicle.safe_gains)
+        except VehicleError as error:
+            self._fail(task, str(error))
+            return
+        self._berth(task.vehicle.vehicle_id).concern = answered.concern
+        self._store_patiently(partial(_answered, task=task, answered=answered))
+
+    def _fail(self, task: ActTask, problem: str, *, also: Callable[[Transaction], None] = lambda _: None) -> None:
+        _log.warning("act failed", act=task.kind, why=problem)
+
+        def store(transaction: Transaction) -> None:
+            acts.finish_act(transaction, task.act_id, problem=problem)
+            also(transaction)
+
+        self._store_patiently(store)
+
+    # ---- links
+
+    def tend(self) -> None:
+        """To be called every second or so: sessions that ended by themselves are taken out of the books, and vehicles
+        that are wanted connected are looked for. Raises StorageError."""
+        for vehicle_id, berth in tuple(self._berths.items()):
+            if berth.session is not None and not berth.session.alive:
+                self._let_go(vehicle_id, berth)
+        if time.monotonic() < self._look_due_s:
+            return
+        self._look_due_s = time.monotonic() + LOOK_FOR_LINKS_EVERY_S
+        with self._database.read() as transaction:
+            wanted = acts.wanted_links(transaction)
+        for vehicle in wanted:
+            self._look_for(vehicle)
+
+    def _let_go(self, vehicle_id: int, berth: Berth) -> None:
+        try:
+            with self._database.write() as transaction:
+                acts.vehicle_gone(transaction, vehicle_id)
+        except ConflictError:
+            return  # its flight is still in the books; later
+        _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
+        berth.session = None
+        self._show(vehicle_id, "gone")
+
+    def _look_for(self, vehicle: LinkedVehicle) -> None:
+        berth = self._berth(vehicle.vehicle_id)
+        seeking = berth.seeking
+        if seeking is not None and seeking.call.options != vehicle.options:
+            seeking.hang_up()
+        if berth.session is None and seeking is None and berth.busy.acquire(blocking=False):
+            self._seekers.submit(self._seek, berth, vehicle)
+
+    def _seek(self, berth: Berth, vehicle: LinkedVehicle) -> None:
+        """With `busy` held. Raises nothing that matters: who is wanted is looked for again."""
+        try:
+            said = self._opened(berth, vehicle, patient=True)
+        except GainlineError as error:
+            _log.info("not connected", vehicle_id=vehicle.vehicle_id, why=str(error))
+            return
+        finally:
+            berth.busy.release()
+        self._store_patiently(
+            lambda t: acts.vehicle_found(t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held)
+        )
+
+    def _opened(self, berth: Berth, vehicle: LinkedVehicle, *, patient: bool = False) -> Connected:
+        """With `busy` held. Raises VehicleError when there is no link in the end."""
+        vehicle_id = vehicle.vehicle_id
+        if berth.session is not None:
+            berth.session.close()
+        self._show(vehicle_id, "connecting")
+        call = Call(
+            vehicle_id=vehicle_id,
+            name=vehicle.name,
+            kind=vehicle.kind,
+            options=vehicle.options,
+            safe_gains=vehicle.safe_gains,
+            identity=vehicle.identity,
+            lock=self._data_dir / f"vehicle-{vehicle_id}.lock",
+            patient=patient,
+        )
+        session = berth.seeking = Session(call, work, hear=partial(self._heard, berth, vehicle_id))
+        try:
+            if self._closing.is_set():
+                raise _no_link()
+            said = session.connected()
+        except BaseException:
+            session.close()
+            self._show(vehicle_id, "gone")
+            raise
+        finally:
+            berth.seeking = None
+        berth.concern, berth.session = said.concern, session
+        _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(said.identity), concern=said.concern)
+        return said
+
+    def _berth(self, vehicle_id: int) -> Berth:
+        return self._berths.setdefault(vehicle_id, Berth())
+
+    # ---- what sessions say by themselves
+
+    def _heard(self, berth: Berth, vehicle_id: int, news: VehicleStatus | Obeyed) -> None:
+        """On the session's own thread."""
+        match news:
+            case VehicleStatus(concern=concern):
+                self._publish(news)
+                if concern and not berth.concern:
+                    self._write_down(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
+                berth.concern = concern
+            case Obeyed(order, reason, problem):
+                kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
+                self._write_down(lambda t: acts.record_order(t, vehicle_id, kind, reason, problem=problem))
+
+    def _show(self, vehicle_id: int, state: LinkTo) -> None:
+        now = dt.datetime.now(dt.UTC).isoformat()
+        self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=now, step=""))
+
+    # ---- books
+
+    def _write_down(self, work: Callable[[Transaction], None]) -> None:
+        """Afterwards, in its turn: whoever says it waits for nothing."""
+        with suppress(RuntimeError):  # the worker has ended
+            self._books.submit(self._store_patiently, work)
+
+    def _store_patiently(self, work: Callable[[Transaction], None]) -> None:
+        """Try until the database takes it, or the worker closes."""
+        while True:
+            try:
+                with self._database.write() as transaction:
+                    work(transaction)
+            except StorageError as error:
+                _log.error("what became of a vehicle is not stored yet", why=str(error))
+                if self._closing.wait(RETRY_S):
+                    return
+            except GainlineError as error:
+                _log.error("what became of a vehicle does not fit the books", why=str(error))
+                return
+            else:
+                return
+
+
+def _connected(transaction: Transaction, task: ActTask, said: Connected) -> None:
+    acts.vehicle_connected(
+        transaction, task.vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held or None
+    )
+    acts.finish_act(transaction, task.act_id, read_back=said.held or None)
+
+
+def _disconnected(transaction: Transaction, task: ActTask) -> None:
+    acts.vehicle_gone(transaction, task.vehicle.vehicle_id)
+    acts.finish_act(transaction, task.act_id)
+
+
+def _answered(transaction: Transaction, task: ActTask, answered: Answered) -> None:
+    vehicle_id = task.vehicle.vehicle_id
+    result: dict[str, object] | None = None
+    if answered.checks is not None:
+        acts.record_checks(transaction, vehicle_id, answered.checks)
+        result = {"checks": [{"name": item.name, "passed": item.passed} for item in answered.checks]}
+    if answered.parameters is not None:
+        result = {"parameters": answered.parameters}
+    if task.kind == ActKind.RELEASE and not answered.problem:
+        acts.vehicle_released(transaction, vehicle_id, identity=answered.identity)
+    elif answered.concern:
+        acts.quarantine_vehicle(transaction, vehicle_id, answered.concern)
+    read_back = answered.held if task.kind in GIVES_GAINS and answered.held else None
+    acts.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
+
+
+def _no_link() -> VehicleError:
+    return VehicleError(
+        "There is no link to the vehicle.", hint="It is looked for; wait until it is connected, then ask again."
+    )

@@ -1,0 +1,139 @@
+"""What the worker and a process that flies say to each other, whoever that process is.
+
+    worker    Orders ───────────→ TakeOff | Decline ─────────────────────────────→
+    process            → Staged                      → Telemetry … Landed → Restored → Free
+
+`StandDown` may come at any moment; in place of what is missing comes `Trouble`.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from app.live.messages import FlightPhase, Telemetry
+from app.locks import LockedError, exclusive
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue
+from app.vehicles.errors import VehicleError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Orders:
+    """Everything the process needs to know of one flight. `lock` is held while it has the vehicle; a vehicle that can
+    keeps a log of its link in `tlog`."""
+
+    campaign_id: int
+    trial_id: int
+    experiment: str
+    vehicle_kind: str
+    vehicle_options: Mapping[str, OptionValue]
+    safe_gains: Mapping[str, float]
+    gains: Mapping[str, float]
+    flight: FlightOrder
+    lock: Path
+    tlog: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Staged:
+    """Said by the process, which then waits for TakeOff or Decline."""
+
+    read_back: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """Said to the process: the gains are right and the lift-off is recorded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decline:
+    """Said to the process: this flight does not take place."""
+
+
+@dataclass(frozen=True, slots=True)
+class StandDown:
+    """Said to the process at any moment: end this flight now. One that was to take off ends on the ground."""
+
+    trial_id: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Landed:
+    """Said by the process: the flight's record."""
+
+    record: FlightRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """Said by the process, however the flight ended: the vehicle was given its safe gains and holds these."""
+
+    held: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """Said by the process: what went wrong; `unsafe` when the safe gains could not be verified afterwards."""
+
+    what: str
+    unsafe: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Free:
+    """Said by the process: this flight is over, the next one may come."""
+
+
+Said = Staged | Telemetry | FlightPhase | Landed | Restored | Trouble | Free
+
+
+class Crew(Protocol):
+    """The worker's handle of a process that flies. Everything but `fly` may be called from any thread."""
+
+    @property
+    def alive(self) -> bool: ...
+
+    def fly(self, orders: Orders) -> Iterator[Said]:
+        """What the process says, until it is free again; the caller answers Staged by `take_off` or `decline`.
+
+        Raises VehicleError when the process dies.
+        """
+        ...
+
+    def take_off(self) -> None: ...
+    def decline(self) -> None: ...
+    def stand_down(self, trial_id: int, reason: str) -> None: ...
+    def close(self) -> None:
+        """Let the process end: what flies is aborted and left with its safe gains."""
+        ...
+
+
+def died(exit_code: int | None) -> VehicleError:
+    return VehicleError(
+        f"The process that flew died (exit code {exit_code}).",
+        hint="Look at the vehicle. The worker's log may say more; then fly again.",
+    )
+
+
+def mistake(error: Exception) -> Trouble:
+    """What the program did wrong, for a truthful end of the trial."""
+    return Trouble(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False)
+
+
+@contextmanager
+def in_control(lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True) -> Iterator[None]:
+    """The vehicle is this process's alone; one whose worker was killed may still be landing it, and is waited for while
+    that is `wanted`. Raises VehicleError."""
+    deadline_s = time.monotonic() + within_s
+    try:
+        with exclusive(lock, keep_waiting=lambda: wanted() and time.monotonic() < deadline_s):
+            yield
+    except LockedError as error:
+        raise VehicleError(
+            f"The vehicle is still under the control of {error.holder or 'another process'}.",
+            hint="Wait until that process has landed it, or end the process; then fly again.",
+        ) from error
