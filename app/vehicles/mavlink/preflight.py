@@ -157,7 +157,7 @@ def judge_source(lookout: Lookout, watched: Watched) -> CheckItem:
         name="second_source",
         title="Second source of altitude",
         passed=rate_hz >= SIGHTINGS_HZ,
-        found=lookout.source.trouble or f"{rate_hz:.0f} sightings a second from the {lookout.source.name}",
+        found=lookout.source.trouble.removesuffix(".") or f"{rate_hz:.0f} sightings a second by {lookout.source.name}",
         needed=f"{SIGHTINGS_HZ:g} a second or more",
         hint="See that it tracks the vehicle and streams, or fly without it.",
     )

@@ -1,21 +1,19 @@
 """What a trial leaves: its samples as a trajectory, and in words how it ended."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Literal, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final, TypeVar
 
 import numpy as np
 
-from app.core.trajectory import Samples, Trajectory
+from app.core.trajectory import Trajectory
 from app.vehicles.base import Ending
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.machine import Trial
 from app.vehicles.mavlink.signals import Keep
-
-Scored = Literal["vehicle", "mocap"]
-"""The source of altitude that is scored, where there are two."""
+from app.vehicles.mocap.recording import Scored
 
 SOURCE: Final = "mavlink"
-_Altitude = TypeVar("_Altitude", float, Samples)
 _Value = TypeVar("_Value")
 _SCORED: Final = "altitude_m"
 _OTHER: Final = "altitude_2_m"
@@ -32,43 +30,20 @@ def channels_of(kept: Keep, datum_m: float, scored: Scored) -> dict[str, float]:
     if kept.battery_v is not None:
         channels["battery_v"] = kept.battery_v
     if kept.second_m is not None:
-        channels |= _sources(own_m, kept.second_m - datum_m, scored)
+        second_m = kept.second_m - datum_m
+        scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)
+        channels |= {_SCORED: scored_m, _OTHER: other_m}
     return channels
 
 
-def trajectory_of(
-    samples: Sequence[Keep],
-    start_s: float,
-    datum_m: float,
-    *,
-    scored: Scored = "vehicle",
-    second_m: Callable[[Samples], Samples] | None = None,
-) -> Trajectory:
-    """By the vehicle's own clock, from the command on; channels that some samples lack are left out.
-
-    `second_m` gives where a second source saw the vehicle (on its datum) at instants of the vehicle's clock: closer
-    than what each sample holds, which is the last that had come.
-    """
-    rows = [channels_of(sample, datum_m, "vehicle") for sample in samples]
+def trajectory_of(samples: Sequence[Keep], start_s: float, datum_m: float) -> Trajectory:
+    """What the vehicle said, by its own clock, from the command on; channels that some samples lack are left out, and
+    what a second source saw is not in it: each sample holds only the last that had come."""
+    rows = [channels_of(replace(sample, second_m=None), datum_m, "vehicle") for sample in samples]
     names = [name for name in rows[-1] if all(name in row for row in rows)] if rows else []
-    boot_s = np.array([sample.position.time_boot_s for sample in samples])
-    channels = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names if name != _OTHER}
-    if second_m is not None and rows:
-        channels |= _sources(channels[_SCORED], second_m(boot_s) - datum_m, scored)
-    return Trajectory(np.round(boot_s - start_s, 6), channels, SOURCE, "vehicle")
-
-
-def seen_at(seen: Sequence[tuple[float, float]], offset_s: float) -> Callable[[Samples], Samples] | None:
-    """Straight lines between sightings (our clock in s, m), by the vehicle's clock, which `offset_s` takes to ours;
-    None without sightings."""
-    if not seen:
-        return None
-    times_s, altitudes_m = np.array(sorted(seen)).T
-    return lambda boot_s: np.interp(boot_s + offset_s, times_s, altitudes_m)
-
-
-def _sources(own_m: _Altitude, second_m: _Altitude, scored: Scored) -> dict[str, _Altitude]:
-    return {_SCORED: own_m, _OTHER: second_m} if scored == "vehicle" else {_SCORED: second_m, _OTHER: own_m}
+    time_s = np.array([round(sample.position.time_boot_s - start_s, 6) for sample in samples])
+    channels = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
+    return Trajectory(time_s, channels, SOURCE, "vehicle")
 
 
 def ending_of(trial: Trial) -> Ending:

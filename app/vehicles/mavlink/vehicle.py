@@ -23,6 +23,7 @@ from app.vehicles.mavlink.signals import Action, Keep
 from app.vehicles.mavlink.sources import Lookout, Source
 from app.vehicles.mavlink.states import IN_DOUBT, MOVES, State
 from app.vehicles.mavlink.trial import Flight, Flown
+from app.vehicles.mocap.recording import Recorded, Scored, with_second
 
 STAND_S: Final = 1.0
 """Watched once more before arming, for between staging and flying a person may have taken his time."""
@@ -359,7 +360,7 @@ class MavlinkVehicle:
     # ---- records
 
     @property
-    def _scored(self) -> records.Scored:
+    def _scored(self) -> Scored:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
     def _record(self, flown: Flown, ground: Ground) -> FlightRecord:
@@ -370,15 +371,16 @@ class MavlinkVehicle:
             return self._not_begun(ground, reason)
         if start_s is None:
             raise VehicleError(reason, hint="Look at the vehicle, correct this, then fly again.")
-        trajectory = records.trajectory_of(
-            flown.samples,
-            start_s,
-            trial.plan.datum_m,
-            scored=self._scored,
-            second_m=None if self._lookout is None else records.seen_at(self._lookout.seen, flown.offset_s),
+        both = Recorded(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
+        if self._lookout is not None:
+            zero_s, name = start_s + flown.offset_s, self._lookout.source.name
+            both = with_second(both.trajectory, self._lookout.seen, name=name, zero_s=zero_s, scored=self._scored)
+        return FlightRecord(
+            trajectory=both.trajectory,
+            ending=records.ending_of(trial),
+            reason=" ".join(part for part in (reason, both.remark) if part),
+            settings={**records.settings_of(self._options), **both.settings},
         )
-        ending, settings = records.ending_of(trial), records.settings_of(self._options)
-        return FlightRecord(trajectory=trajectory, ending=ending, reason=reason, settings=settings)
 
     def _not_begun(self, ground: Ground, reason: str) -> FlightRecord:
         """Aborted before anything was commanded: the one instant on the ground."""

@@ -82,7 +82,7 @@ class NatNetSource:
     @property
     def trouble(self) -> str:
         if not self._thread.is_alive():
-            return f"{self.name} is not listened to any more."
+            return f"The {self.name} is not listened to any more."
         if self._frame_s is not None and (silent_s := time.monotonic() - self._frame_s) > SILENT_S:
             return f"Nothing has come of {self.name} for {silent_s:.0f} s."
         newest = self._stream.newest

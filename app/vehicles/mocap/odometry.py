@@ -69,9 +69,9 @@ class OdometrySource:
     @property
     def trouble(self) -> str:
         if (silent_s := self._clock.now_s() - self._heard_s) > SILENT_S:
-            return f"No odometry has come from {self.name} for {silent_s:.0f} s."
+            return f"No {self.name} has come for {silent_s:.0f} s."
         newest = self._stream.newest
-        return f"The odometry from {self.name} has failed." if newest is not None and not newest.tracking_valid else ""
+        return f"The {self.name} has failed." if newest is not None and not newest.tracking_valid else ""
 
     def hear(self, received: Received) -> None:
         message, arrived_s = received.message, received.received_s
@@ -107,7 +107,7 @@ class StreamSource:
     def __init__(self, address: StreamAddress, clock: Clock) -> None:
         """Wait for the first odometry. Raises LinkError when the address cannot be opened, VehicleError when none
         comes."""
-        self._inner: Final = OdometrySource(str(address), clock)
+        self._inner: Final = OdometrySource(f"odometry at {address}", clock)
         self._clock = clock
         self._transport = open_transport(address.link)
         self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
@@ -126,7 +126,7 @@ class StreamSource:
 
     @property
     def trouble(self) -> str:
-        return self._inner.trouble if self._thread.is_alive() else f"{self.name} is not listened to any more."
+        return self._inner.trouble if self._thread.is_alive() else f"The {self.name} is not listened to any more."
 
     def hear(self, received: Received) -> None:
         """The vehicle's own link is another."""

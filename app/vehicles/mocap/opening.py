@@ -14,6 +14,6 @@ def open_source(text: str, clock: Clock) -> Source:
         case NatNetAddress() as address:
             return NatNetSource(address, clock)
         case OdometryAddress():
-            return OdometrySource("the vehicle's own link", clock)
+            return OdometrySource("odometry on the vehicle's own link", clock)
         case StreamAddress() as address:
             return StreamSource(address, clock)

@@ -41,7 +41,8 @@ def with_second(
     other_s, other_m = _rising(seen, zero_s)
     inside = (other_s >= trajectory.time_s[0]) & (other_s <= trajectory.time_s[-1])
     if np.count_nonzero(inside) < 2:
-        return Recorded(trajectory=trajectory, remark=f"Nothing was seen by {name}, the second source of altitude.")
+        unseen = f"Nothing was seen by {name}, the second source of altitude; the vehicle's own is scored."
+        return Recorded(trajectory=trajectory, remark=unseen)
     alignment, remarks = _aligned(trajectory, other_s, other_m)
     second_m = resample(trajectory.time_s, other_s, other_m, alignment)
     covered = (trajectory.time_s + alignment.delay_s >= other_s[0]) & (
@@ -54,7 +55,7 @@ def with_second(
             f"({apart.rms_m:.2f} m root mean square)."
         )
     if gap := _longest_gap(other_s - alignment.delay_s, trajectory):
-        remarks.append(f"{name.capitalize()} saw nothing for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
+        remarks.append(f"{name[0].upper()}{name[1:]} saw nothing for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
     both = (
         _on_the_second_s_times(trajectory, other_s - alignment.delay_s, other_m - alignment.datum_m)
         if scored == "mocap"

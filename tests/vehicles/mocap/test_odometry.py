@@ -44,7 +44,7 @@ def hear(source: OdometrySource, kind: str, fields: Mapping[str, FieldValue], di
 
 @pytest.fixture
 def own() -> OdometrySource:
-    return OdometrySource("the vehicle's own link", CLOCK)
+    return OdometrySource("odometry on the vehicle's own link", CLOCK)
 
 
 @pytest.mark.parametrize("dialect", [PAPARAZZI, ARDUPILOTMEGA, COMMON], ids=lambda dialect: dialect.name)
@@ -70,7 +70,7 @@ def test_odometry_that_has_failed_or_is_no_number_is_not_tracking(own: OdometryS
     hear(own, "ODOMETRY", pose(-1.1, 2000, quality=-1))
     hear(own, "ODOMETRY", pose(math.nan, 3000))
     assert [sample.tracking_valid for sample in own.take()] == [True, False, False]
-    assert own.trouble == "The odometry from the vehicle's own link has failed."
+    assert own.trouble == "The odometry on the vehicle's own link has failed."
 
 
 def test_the_first_kind_heard_is_the_one_taken_and_other_messages_are_passed_over(own: OdometrySource) -> None:
@@ -83,7 +83,7 @@ def test_the_first_kind_heard_is_the_one_taken_and_other_messages_are_passed_ove
 
 def test_a_link_without_odometry_is_troubled(monkeypatch: pytest.MonkeyPatch, own: OdometrySource) -> None:
     monkeypatch.setattr(odometry, "SILENT_S", 0.05)
-    assert comes_true(lambda: own.trouble.startswith("No odometry has come from the vehicle's own link for"))
+    assert comes_true(lambda: own.trouble.startswith("No odometry on the vehicle's own link has come for"))
 
 
 def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
@@ -95,9 +95,8 @@ def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
             heard = news(source, 50)
             assert source.trouble == ""
             motive.cameras.blind = True
-            assert comes_true(
-                lambda: source.trouble == f"The odometry from mavlink:udpin:{LOOPBACK}:{port} has failed."
-            )
+            failed = f"The odometry at mavlink:udpin:{LOOPBACK}:{port} has failed."
+            assert comes_true(lambda: source.trouble == failed)
     assert heard[-1].altitude_m == pytest.approx(1.2, abs=0.01)
     assert all(sample.advances for sample in heard)
     assert "not listened to any more" in source.trouble

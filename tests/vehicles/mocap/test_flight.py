@@ -1,0 +1,98 @@
+"""Whole flights that cameras watch, over real links: the simulated drone, its motion capture, and what goes wrong."""
+
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.core.experiments.takeoff import Takeoff
+from app.core.glitches import find_glitches
+from app.vehicles.base import FlightRecord, OptionValue
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.kind import MAVLINK
+from tests.vehicles.flying import SAFE
+from tests.vehicles.mavlink.hangar import Hangar
+from tests.vehicles.mavlink.test_vehicle import fly
+from tests.vehicles.simdrone.ground import free_port
+
+SPEED = 8.0
+"""Of the drone's time: sources are looked at every 4 ms on the wall."""
+
+
+def natnet(port: int) -> str:
+    return f"natnet:127.0.0.1?body=4&multicast=no&command_port={port}"
+
+
+def flown(mocap: str, faults: Sequence[str] = (), **options: OptionValue) -> FlightRecord:
+    """And landed with its safe gains, whatever happened."""
+    with Hangar(faults=faults, speed=SPEED, mocap=mocap) as hangar:
+        vehicle = hangar.vehicle(SAFE, second_source=mocap, **options)
+        record = fly(vehicle)
+        assert vehicle.read_gains() == SAFE
+        assert hangar.drone.body.stands
+        vehicle.close()
+    return record
+
+
+def test_cameras_are_recorded_beside_the_vehicle_aligned_and_in_agreement() -> None:
+    record = flown(natnet(free_port()))
+    assert (record.ending, record.reason) == ("completed", "")
+    both = record.trajectory
+    np.testing.assert_allclose(both["altitude_2_m"], both["altitude_m"], atol=0.1)
+    assert 0.0 < float(record.settings["second_delay_s"]) < 0.25
+    assert float(record.settings["second_rms_m"]) < 0.02
+    assert not find_glitches(Takeoff(), both)
+
+
+def test_cameras_can_be_the_ones_that_are_scored() -> None:
+    record = flown(natnet(free_port()), scored_source="mocap")
+    both = record.trajectory
+    assert (record.ending, record.reason) == ("completed", "")
+    assert 1.0 / np.median(np.diff(both.time_s)) == pytest.approx(100.0, rel=0.2)
+    own = replace(both, channels={**both.channels, "altitude_m": both["altitude_2_m"]})
+    assert Takeoff().error(both) == pytest.approx(Takeoff().error(own), rel=0.02)
+
+
+def test_odometry_on_the_vehicle_s_own_link_is_a_second_source_too() -> None:
+    record = flown("odometry")
+    assert (record.ending, record.reason) == ("completed", "")
+    np.testing.assert_allclose(record.trajectory["altitude_2_m"], record.trajectory["altitude_m"], atol=0.1)
+
+
+@pytest.mark.parametrize("fault", ["mocap-lost@4", "mocap-frozen@4"])
+def test_cameras_that_see_nothing_new_land_the_vehicle_and_void_the_flight(fault: str) -> None:
+    record = flown(natnet(free_port()), [fault])
+    assert record.ending == "invalid"
+    assert "The second source of altitude did not see it for more than" in record.reason
+    assert "Rigid body 4 of the motion capture at 127.0.0.1 saw nothing for" in record.reason
+    assert 4.0 < record.trajectory.time_s[-1] < 25.0
+
+
+def test_cameras_that_drift_away_land_the_vehicle_and_the_record_says_by_how_much() -> None:
+    record = flown(natnet(free_port()), ["mocap-drift@4"])
+    assert record.ending == "invalid"
+    assert "Two sources of altitude disagree." in record.reason
+    assert "The vehicle and rigid body 4 of the motion capture at 127.0.0.1 disagree: up to" in record.reason
+    assert float(record.settings["second_largest_m"]) > 0.3
+    assert 4.0 < record.trajectory.time_s[-1] < 25.0
+
+
+def test_cameras_that_do_not_see_the_vehicle_on_the_ground_refuse_the_flight() -> None:
+    mocap = natnet(free_port())
+    with Hangar(speed=SPEED, mocap=mocap) as hangar:
+        vehicle = hangar.vehicle(second_source=mocap)
+        hangar.drone.cameras.blind = True
+        with pytest.raises(VehicleError, match="Second source of altitude: The cameras do not see rigid body 4 of"):
+            fly(vehicle)
+        vehicle.close()
+
+
+def test_the_source_is_let_go_when_the_vehicle_cannot_be_opened() -> None:
+    mocap = natnet(free_port())
+    with Hangar(mocap=mocap) as hangar:
+        options = {**hangar.options(second_source=mocap), "system_id": 99.0}
+        with pytest.raises(VehicleError, match="No heartbeat was heard"):
+            MAVLINK.open(options, SAFE)
+        assert not any(thread.name.startswith("natnet:") for thread in threading.enumerate())
