@@ -184,8 +184,8 @@ class ConnectedVehicle(Vehicle, Protocol):
         ...
 
     def restore(self) -> dict[str, float]:
-        """Write the safe gains and return what was read back. One that is only observed stays so. Raises SafeGainsError
-        when it is armed, VehicleError when it does not confirm."""
+        """Write the safe gains and return what was read back, which is them. One that is only observed stays so. Raises
+        SafeGainsError when it is armed or does not take them."""
         ...
 
     def land(self, reason: str) -> None:

@@ -1,4 +1,4 @@
-"""From a vehicle's options to a radio that speaks with it."""
+"""From a vehicle's options to a radio that speaks with it, and to the limits of its trials."""
 
 import datetime as dt
 from collections.abc import Callable
@@ -8,6 +8,7 @@ from typing import Final
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, signing
 from app.vehicles.mavlink.clock import Clock, ScaledClock
+from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Aim
@@ -45,6 +46,23 @@ def open_radio(options: Options, clock: Clock | None, *, overhear: Callable[[Rec
         altitude_m=TAKEOFF_ALTITUDE_M,
     )
     return Radio(link, profile, clock, aim, patience_s=PATIENCE_S * patience_of(options), overhear=overhear)
+
+
+def limits_of(options: Options, radio: Radio, *, datum_m: float) -> Limits:
+    """`datum_m` is where the altitude that the vehicle is told to climb to counts from, on its own datum."""
+    profile = radio.profile
+    return Limits(
+        set_point_m=datum_m + TAKEOFF_ALTITUDE_M,
+        heartbeat_s=profile.heartbeat_s,
+        min_battery_v=float(options["min_battery_v"]),
+        radius_m=float(options["radius_m"]),
+        flying_modes=profile.flying_modes,
+        landing_modes=profile.landing_modes,
+        blocks={number: name for name, number in radio.aim.blocks.items()},
+        arming_blocks=profile.arming_blocks,
+        flying_blocks=profile.flying_blocks,
+        landing_blocks=profile.landing_blocks,
+    ).stretched(patience_of(options))
 
 
 def _log_path(folder: str) -> Path | None:

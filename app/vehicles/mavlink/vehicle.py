@@ -15,9 +15,8 @@ from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.gains import GainStore
 from app.vehicles.mavlink.gauges import Gauges
 from app.vehicles.mavlink.landing import Landing, send_now
-from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.machine import Plan
-from app.vehicles.mavlink.opening import TAKEOFF_ALTITUDE_M, open_radio, patience_of
+from app.vehicles.mavlink.opening import limits_of, open_radio, patience_of
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.signals import Action, Keep
 from app.vehicles.mavlink.sources import Lookout, Source
@@ -168,7 +167,7 @@ class MavlinkVehicle:
             self._lookout.source.trouble if self._lookout is not None else "",
         )
         return self._gauges.read(
-            step=State.IDLE if step in _ON_THE_GROUND else step,
+            step=(State.IDLE if step in _ON_THE_GROUND else step).value,
             datum_m=self._datum_m,
             held=self._gains.held,
             trouble=" ".join(trouble for trouble in troubles if trouble),
@@ -195,11 +194,13 @@ class MavlinkVehicle:
         return parameters.read_all(self._radio, on_progress)
 
     def restore(self) -> dict[str, float]:
-        """Write the safe gains and return what was read back; a vehicle in doubt stays so. Raises SafeGainsError when
-        it is armed, VehicleError when it does not confirm."""
+        """Write the safe gains and return what was read back, which is them; a vehicle in doubt stays so. Raises
+        SafeGainsError when it is armed or does not take them."""
         self._listen(0.0)
         preflight.require_disarmed(self._radio)
-        return self._gains.restore()
+        if problem := self._gains.give_back():
+            raise SafeGainsError(f"The vehicle does not take its safe gains: {problem}", hint=_SET_BY_HAND)
+        return dict(self._gains.held)
 
     def land(self, reason: str) -> None:
         """Tell it to land, at once and whatever state it is in. Raises VehicleError when it cannot be told."""
@@ -248,11 +249,10 @@ class MavlinkVehicle:
             self._observe(why)
 
     def _set_up(self) -> None:
-        """Raises VehicleError when the vehicle is armed, or does not take its safe gains."""
+        """Raises VehicleError when the vehicle is armed, refuses, or does not take its safe gains."""
         preflight.require_disarmed(self._radio)
         preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
-        if problem := self._restore():
-            raise SafeGainsError(f"The vehicle does not take its safe gains: {problem}", hint=_SET_BY_HAND)
+        self.restore()
 
     def _require_ready(self) -> None:
         """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""
@@ -311,7 +311,7 @@ class MavlinkVehicle:
             self._radio,
             plan,
             watch,
-            restore=self._restore,
+            restore=self._gains.give_back,
             on_sample=on_sample,
             should_stop=should_stop,
             channels=lambda kept: records.channels_of(kept, plan.datum_m, self._scored),
@@ -332,24 +332,8 @@ class MavlinkVehicle:
             ground_m=ground.altitude_m,
             datum_m=datum_m,
             lift_off_s=profile.lift_off_s,
-            limits=Limits(
-                set_point_m=datum_m + TAKEOFF_ALTITUDE_M,
-                heartbeat_s=profile.heartbeat_s,
-                min_battery_v=float(self._options["min_battery_v"]),
-                radius_m=float(self._options["radius_m"]),
-                flying_modes=profile.flying_modes,
-                landing_modes=profile.landing_modes,
-                blocks={number: name for name, number in self._radio.aim.blocks.items()},
-                arming_blocks=profile.arming_blocks,
-                flying_blocks=profile.flying_blocks,
-                landing_blocks=profile.landing_blocks,
-            ).stretched(patience_of(self._options)),
+            limits=limits_of(self._options, self._radio, datum_m=datum_m),
         )
-
-    def _restore(self) -> str:
-        """Write the safe gains; what is wrong with those read back, or nothing. Raises VehicleError for silence."""
-        held = self._gains.restore()
-        return "" if held == self.safe_gains else f"it holds {held} instead of {self.safe_gains}."
 
     def _give_back(self) -> None:
         """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified."""

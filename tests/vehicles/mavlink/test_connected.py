@@ -1,7 +1,7 @@
 """A vehicle whose link stays open between flights, over real UDP against the simulated drone."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -121,8 +121,8 @@ def test_a_session_flies_twice_each_flight_with_a_log_of_its_own(tmp_path: Path)
             vehicle.log_to(None)
     assert {"record"} <= steps
     for path in paths:
-        log = mavutil.mavlink_connection(str(path), dialect="paparazzi")
-        kinds = {message.get_type() for message in iter(log.recv_msg, None)}
+        with closing(mavutil.mavlink_connection(str(path), dialect="paparazzi")) as log:
+            kinds = {message.get_type() for message in iter(log.recv_msg, None)}
         assert {"PARAM_SET", "LOCAL_POSITION_NED", "HEARTBEAT"} <= kinds
 
 
