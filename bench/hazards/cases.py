@@ -18,6 +18,8 @@ OTHER_MODE: Final = "other-mode"
 """Another ground station switches the vehicle to a mode that nobody here asked for."""
 WILD_GAINS: Final = "wild-gains"
 """The gains of this trial are bad: the vehicle does not stay inside its limits."""
+MOCAP: Final = ("mocap-lost", "mocap-frozen", "mocap-drift")
+"""Of a second source of altitude, which only trials with one of these have."""
 MISHAPS: Final = (
     "no-heartbeat",
     "param-unconfirmed",
@@ -31,6 +33,7 @@ MISHAPS: Final = (
     "duplicated-packets",
     "reordered-packets",
     "wrong-system",
+    *MOCAP,
     ABORT,
     MOTORS_OFF,
     OTHER_LANDING,
@@ -97,6 +100,10 @@ class Case:
     warm_s: float
     waits_s: float
     pinned: bool
+
+    @property
+    def has_second_source(self) -> bool:
+        return any(each.kind in MOCAP for each in self.mishaps)
 
     @property
     def safe(self) -> Mapping[str, float]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case
+from bench.hazards.cases import ABORT, MOCAP, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case
 from bench.hazards.flying import Flown
 from bench.hazards.intervals import Span, covers, longest, overlap, total
 from bench.hazards.rig import Struck
@@ -24,6 +24,7 @@ HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "
 BATTERY_S: Final[Mapping[str, float]] = {"paparazzi": 1.2, "ardupilot": 0.5, "px4": 0.2}
 LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "px4": 8.0}
 
+DRIFT_M_S: Final = 0.1
 SLACK_S: Final = 0.35
 """Of the rig's clock, and of a packet under way."""
 STAND_S: Final = 1.05
@@ -99,6 +100,7 @@ class _Judgement:
         for failure, kinds, shortest_s in (
             ("preflight", SILENT, 0.15),
             ("preflight", ("frozen-position", "jumping-position", "low-battery"), 0.0),
+            ("preflight", MOCAP, 0.0),
             ("F2", ("param-unconfirmed",), 0.0),
             ("F10", ("reboot", OTHER_MODE), 0.0),
         ):
@@ -117,7 +119,7 @@ class _Judgement:
             yield Cause("F3", "refused")
         if self.within(self.of("low-battery"), *arming) > 1.0 - SLACK_S:
             yield Cause("F7", "refused")
-        if self.within(self.of("frozen-position"), *arming) > 0.15:
+        if self.within(self.of("frozen-position", *MOCAP), *arming) > 0.15:
             yield Cause("F9a", "refused")
         if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE)):
             yield Cause("F10", "refused")
@@ -137,13 +139,18 @@ class _Judgement:
             ("F5", self.beatless, 2.5 * self.heartbeat_s - 0.1, 3.5 * self.heartbeat_s + SLACK_S),
             ("F7", self.of("low-battery"), 1.0 - SLACK_S, battery_s),
             ("F9a", frozen, 0.15, 0.25 + SLACK_S),
+            ("F9a", self.of("mocap-frozen"), 0.15, 0.25 + SLACK_S),
+            ("F9a", self.of("mocap-lost"), 1.0 - SLACK_S, 1.0 + SLACK_S),
+            ("F9c", self.of("mocap-drift"), 2.0, 0.3 / DRIFT_M_S + 0.3 + 1.0 + SLACK_S),
             ("F10", self.of_flight(OTHER_MODE), 0.0, 1.0 + 2.0 * self.heartbeat_s + SLACK_S),
             ("F11", self.of_flight(OTHER_LANDING), 0.0, 1.0 + 2.0 * self.heartbeat_s + SLACK_S),
         ):
-            watched = (Stage.ARM, *AIR) if failure in ("F5", "F7") and self.took_off_s is not None else AIR
+            watched = (Stage.ARM, *AIR) if failure in ("F5", "F7", "F9c") and self.took_off_s is not None else AIR
             lasted_s = self.within(spans, *watched)
             if lasted_s > may_s:
                 yield Cause(failure, "invalid", had_to=lasted_s > must_s)
+        if self.within(self.of("mocap-drift"), Stage.SET_GAINS, Stage.ARM, *AIR) > 1.0:
+            yield Cause("F9c", "invalid")
         if self.began_in("reboot", *AIR):
             yield Cause("F10", "invalid", had_to=True)
         jumped_s = total(self.of("jumping-position"), self.stages.spans(Stage.ARM, *AIR))

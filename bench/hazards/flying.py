@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from app.vehicles.base import FlightOrder, Sample
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import Case
 from bench.hazards.rig import Rig, Stopping, Struck
 from bench.hazards.stages import Stages
@@ -44,7 +45,8 @@ def carry_out(case: Case) -> Flown:
 
 def _try(rig: Rig) -> Flown:
     try:
-        vehicle = MavlinkVehicle(rig.options(), rig.case.safe, is_real=False, clock=rig)
+        source = open_source("odometry", rig) if rig.case.has_second_source else None
+        vehicle = MavlinkVehicle(rig.options(), rig.case.safe, is_real=False, clock=rig, source=source)
     except VehicleError as error:
         rig.stages.over_s = rig.drone.time_s
         return _end(rig, "refused", "unopened", str(error))

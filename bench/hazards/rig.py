@@ -20,6 +20,7 @@ from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import new_body
+from app.vehicles.simdrone.cameras import OwnLink
 from app.vehicles.simdrone.drone import BOOT_S, Drone
 from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case, Mishap
 from bench.hazards.stages import Stage, Stages
@@ -81,8 +82,9 @@ class Rig:
         self.problem: BaseException | None = None
         self._waiting = list(case.mishaps)
         self._kind = get_autopilot(case.autopilot)
+        self._outlet = OwnLink() if case.has_second_source else None
         body = new_body("twin", {}, seed=case.seed % 100_000)
-        self.drone = Drone(body, lambda fresh: self._kind.set_up(fresh, self._kind.system))
+        self.drone = Drone(body, lambda fresh: self._kind.set_up(fresh, self._kind.system), outlet=self._outlet)
         self._ports = _free_port(), _free_port()
         self._transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
         self._codec = DIALECTS[case.autopilot].codec(system=1, component=1)
