@@ -1,6 +1,6 @@
 """Vehicles over HTTP."""
 
-from typing import Literal
+from typing import Final, Literal
 
 from fastapi import APIRouter, Depends, status
 
@@ -24,7 +24,7 @@ from app.schemas import Page
 
 router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])
 
-_NO_LINK = "The worker has no link to this vehicle, so it was told nothing: use its own remote control now."
+_NO_LINK: Final = "No worker has a link to this vehicle, so it was told nothing: use its own remote control now."
 
 
 @router.get("")
@@ -110,8 +110,9 @@ async def stop_motors(live: Live, vehicle_id: Id, body: VehicleOrder | None = No
 async def _order(
     live: Live, vehicle_id: int, order: Literal["land", "motors off"], body: VehicleOrder | None, sentence: str
 ) -> OrderAnswer:
-    answer = await live.order(vehicle_id, order, (body or VehicleOrder()).reason)
-    return OrderAnswer(accepted=answer.accepted, sentence=sentence if answer.accepted else _NO_LINK)
+    reason = (body or VehicleOrder()).reason
+    accepted = live.worker_running and (await live.order(vehicle_id, order, reason)).accepted
+    return OrderAnswer(accepted=accepted, sentence=sentence if accepted else _NO_LINK)
 
 
 @router.post("/{vehicle_id}/release")

@@ -18,6 +18,7 @@ from schemathesis.specs.openapi.checks import (
 
 from app.db.session import Database
 from tests.builders import create_flown_trial, create_imported_trial, create_ready_campaign, create_trial, run_jobs
+from tests.fleet.vehicles import create_campaign_on, create_connected
 
 pytestmark = pytest.mark.slow
 
@@ -38,6 +39,7 @@ def furnished(client: TestClient, database: Database) -> None:
     create_imported_trial(client, imported)
     run_jobs(database)
     create_trial(client, imported)
+    create_trial(client, create_campaign_on(client, database, create_connected(client, database))["id"])
 
 
 @pytest.mark.parametrize("mode", GenerationMode)
