@@ -2,6 +2,7 @@
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { RecordFiles } from "../lib/records";
+import { controlHeader } from "../live/leases";
 import { answer } from "./client";
 import {
   archiveCampaign,
@@ -49,22 +50,23 @@ export function useCreateCampaign() {
 }
 
 /** Plan a trial of a proposal or of gains of one's own, and fly it if the body says so. */
-export function useCreateTrial(campaignId: number) {
+export function useCreateTrial({ id, vehicle }: Campaign) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: (body: NewTrial) => answer(createTrial({ path: { campaign_id: campaignId }, body })),
+    mutationFn: (body: NewTrial) =>
+      answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
     onSuccess: settled.trial,
-    onError: () => settled.ofCampaign(campaignId),
+    onError: () => settled.ofCampaign(id),
   });
 }
 
-export function useFlyTrial(campaignId: number) {
+export function useFlyTrial({ id, vehicle }: Campaign) {
   const settled = useSettled();
   return useMutation({
     mutationFn: ({ trialId, speed }: { trialId: number; speed: number | null }) =>
-      answer(flyTrial({ path: { trial_id: trialId }, body: { speed } })),
+      answer(flyTrial({ path: { trial_id: trialId }, body: { speed }, headers: controlHeader(vehicle.id) })),
     onSuccess: settled.trial,
-    onError: () => settled.ofCampaign(campaignId),
+    onError: () => settled.ofCampaign(id),
   });
 }
 

@@ -5,6 +5,7 @@ import { useRenewedControl } from "../api/control";
 import { followEvents } from "../api/events";
 import { useAbort, useFlying } from "../api/flying";
 import { useCampaign } from "../api/queries";
+import { useVehicle } from "../api/vehicles";
 import { abortTargets, type Flying } from "../lib/abort";
 import { liveFlightsNow } from "../live/store";
 import { ConnectionNotice, ConnectionState } from "./ConnectionState";
@@ -54,7 +55,10 @@ function useEventStream(flying: boolean): void {
 
 function CampaignVehicle({ campaignId }: { campaignId: number }) {
   const vehicle = useCampaign(campaignId).data?.vehicle;
-  return vehicle === undefined ? null : <VehicleBadge isReal={vehicle.is_real} title={vehicle.title} />;
+  const state = useVehicle(vehicle?.id ?? null)?.state;
+  // A connected one stands in its own line below.
+  if (vehicle === undefined || (vehicle.registered && state !== "disconnected")) return null;
+  return <VehicleBadge isReal={vehicle.is_real} title={vehicle.registered ? vehicle.name : vehicle.title} />;
 }
 
 export function AppFrame() {

@@ -1,7 +1,9 @@
+import { Button } from "@mantine/core";
+import { Link } from "react-router";
 import type { Campaign, Trial } from "../api/types";
 import { withUnit } from "../lib/format";
 import { gainsInBrackets } from "../lib/gains";
-import { readingOf } from "../lib/live";
+import { type LiveFlight, readingOf } from "../lib/live";
 import { predictedText } from "../lib/uncertainty";
 import { useLiveFlight } from "../live/store";
 import { Marks } from "./Marks";
@@ -19,17 +21,22 @@ function share(value: number | null | undefined): string {
   return value === null || value === undefined ? "–" : `${Math.round(100 * value)} %`;
 }
 
+const STAGED = "Gains set, waiting for its operator";
+
+function stageWord(trial: Trial | undefined, live: LiveFlight | null): string {
+  const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
+  if (waits && live?.phase !== "flying") return STAGED;
+  if (live !== null && live.timeS.length > 0) return "Flying";
+  return trial?.state === "planned" ? "Waiting for the worker" : "Setting the gains";
+}
+
 /** What the flight under way says about itself. ABORT stands in the bar above, on every page. */
 export function FlyingCard({ campaign, trial, step }: Props) {
   const live = useLiveFlight(step.trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
-  const stage =
-    live === null || live.timeS.length === 0
-      ? trial?.state === "planned"
-        ? "Waiting for the worker"
-        : "Setting the gains"
-      : "Flying";
+  const { registered } = campaign.vehicle;
+  const stage = stageWord(trial, live);
   return (
     <Panel
       title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
@@ -66,10 +73,16 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             {trial.read_back && ", read back from the vehicle"}.
           </p>
         )}
-        <p className={classes["quiet"]}>
-          ABORT above ends the flight at once and restores the safe gains
-          {campaign.vehicle.is_real ? "." : "; so does the Space key."}
-        </p>
+        {registered && (
+          <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
+            Open the fly screen
+          </Button>
+        )}
+        {stage !== STAGED && (
+          <p className={classes["quiet"]}>
+            ABORT above ends the flight at once and restores the safe gains; so does the Space key.
+          </p>
+        )}
       </div>
     </Panel>
   );

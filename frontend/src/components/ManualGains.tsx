@@ -1,6 +1,7 @@
 import { Button, TextInput } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useState } from "react";
+import { useNavigate } from "react-router";
 import { useCreateTrial } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import type { Campaign } from "../api/types";
@@ -25,7 +26,7 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
   const [texts, setTexts] = useState(() =>
     Object.fromEntries(Object.entries(start).map(([name, value]) => [name, typedGain(value)])),
   );
-  const create = useCreateTrial(campaign.id);
+  const create = useCreateTrial(campaign);
   const experiment = useCatalogue().data?.experiments.find(({ name }) => name === campaign.definition.experiment);
   const problem = problemOf(create.error);
   const refused = isGateRefusal(problem);
@@ -35,7 +36,10 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
   const gains = Object.fromEntries(
     readings.flatMap(({ name, value }) => (value === undefined ? [] : [[name, value] as const])),
   );
-  const act = campaign.vehicle.can_fly ? "Fly" : "Plan";
+  const navigate = useNavigate();
+  const { can_fly, needs_staging } = campaign.vehicle;
+  const flies = can_fly && !needs_staging;
+  const act = flies ? "Fly" : "Plan";
   const change = (name: string, text: string): void => {
     setTexts({ ...texts, [name]: text });
     create.reset();
@@ -46,9 +50,9 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
       {
         gains,
         ...(overrule === undefined ? {} : { overrule }),
-        ...(campaign.vehicle.can_fly ? { fly: { speed } } : {}),
+        ...(flies ? { fly: { speed } } : {}),
       },
-      { onSuccess: onClose },
+      { onSuccess: ({ id }) => (needs_staging ? void navigate(`/fly/${id}`) : onClose()) },
     );
   }
   return (

@@ -1,5 +1,6 @@
 import { Button } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
+import { Link } from "react-router";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../api/mutations";
 import type { Campaign, Trial } from "../api/types";
 import { gainText } from "../lib/format";
@@ -25,8 +26,9 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
   const experiment = campaign.definition.experiment ?? "";
   const unit = useUnits(experiment).error;
   const titles = useGainTitles(experiment);
-  const fly = useFlyTrial(campaign.id);
+  const fly = useFlyTrial(campaign);
   const cancel = useCancelTrial();
+  const { can_fly, needs_staging, registered } = campaign.vehicle;
   return (
     <Panel title={`Flight ${trial.number} is planned`} tools={<Marks trial={trial} />}>
       <div className={classes["stack"]}>
@@ -45,18 +47,32 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           </div>
         </dl>
         {trial.flight?.problem && <Trouble error={new Error(trial.flight.problem)} />}
-        {campaign.vehicle.can_fly ? (
+        {can_fly ? (
           <>
-            <Button
-              size="lg"
-              leftSection={<IconPlaneDeparture size={22} aria-hidden />}
-              loading={fly.isPending}
-              disabled={!trial.actions.includes("fly")}
-              onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
-            >
-              Fly it
-            </Button>
-            <SpeedSwitch value={speed} onChange={setSpeed} />
+            {!needs_staging && (
+              <Button
+                size="lg"
+                leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+                loading={fly.isPending}
+                disabled={!trial.actions.includes("fly")}
+                onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
+              >
+                Fly it
+              </Button>
+            )}
+            {registered ? (
+              <Button
+                component={Link}
+                to={`/fly/${trial.id}`}
+                size="lg"
+                variant={needs_staging ? "filled" : "default"}
+                leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+              >
+                Stage
+              </Button>
+            ) : (
+              <SpeedSwitch value={speed} onChange={setSpeed} />
+            )}
           </>
         ) : (
           <ImportRecord upload={upload} trialId={trial.id} />

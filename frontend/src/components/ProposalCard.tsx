@@ -1,6 +1,7 @@
 import { Button } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useState } from "react";
+import { useNavigate } from "react-router";
 import { type RecordUpload, useCreateTrial } from "../api/mutations";
 import type { Campaign, Proposal, Trial } from "../api/types";
 import { speedOf } from "../lib/nextStep";
@@ -31,14 +32,17 @@ interface Props {
 export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const [editing, setEditing] = useState(false);
   const [speed, setSpeed] = useSpeed();
-  const create = useCreateTrial(campaign.id);
+  const create = useCreateTrial(campaign);
   const experiment = campaign.definition.experiment ?? "";
   const units = useUnits(experiment);
   const titles = useGainTitles(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
-  const order = campaign.vehicle.can_fly ? { fly: { speed: speedOf(speed) } } : {};
+  const { can_fly, needs_staging, registered } = campaign.vehicle;
+  const order = can_fly && !needs_staging ? { fly: { speed: speedOf(speed) } } : {};
   const advice = advised(proposal);
-  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order });
+  const navigate = useNavigate();
+  const toFlyScreen = { onSuccess: ({ id }: Trial) => void navigate(`/fly/${id}`) };
+  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order }, needs_staging ? toFlyScreen : {});
   if (editing) {
     return (
       <Panel title={`Flight ${number}, gains of your own`}>
@@ -67,16 +71,28 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
         )}
         <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
         <Predicted proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />
-        {campaign.vehicle.can_fly ? (
+        {can_fly ? (
           <>
-            <FlyButton
-              label={flyLabel(advice.variant === null, proposal)}
-              quiet={advice.variant !== null || advice.kind === "stop"}
-              loading={create.isPending}
-              disabled={!proposal.gate.passed}
-              onClick={() => create.mutate({ proposal_id: proposal.id, ...order })}
-            />
-            <SpeedSwitch value={speed} onChange={setSpeed} />
+            {!needs_staging && (
+              <FlyButton
+                label={flyLabel(advice.variant === null, proposal)}
+                quiet={advice.variant !== null || advice.kind === "stop"}
+                loading={create.isPending}
+                disabled={!proposal.gate.passed}
+                onClick={() => create.mutate({ proposal_id: proposal.id, ...order })}
+              />
+            )}
+            {registered ? (
+              <FlyButton
+                label="Stage"
+                quiet={!needs_staging || advice.variant !== null || advice.kind === "stop"}
+                loading={create.isPending}
+                disabled={!proposal.gate.passed}
+                onClick={() => create.mutate({ proposal_id: proposal.id }, toFlyScreen)}
+              />
+            ) : (
+              <SpeedSwitch value={speed} onChange={setSpeed} />
+            )}
           </>
         ) : (
           <ImportRecord upload={upload} proposalId={proposal.id} />

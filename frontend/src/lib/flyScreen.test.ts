@@ -4,11 +4,11 @@ import {
   endOfTime,
   flyStep,
   gainTicks,
+  isSaturated,
   sameHeld,
   secondsLeft,
   stateWord,
   suggestedClass,
-  thrustText,
 } from "./flyScreen";
 import { aged, statusFrom } from "./vehicle";
 
@@ -89,6 +89,6 @@ test("the countdown ends with the figure's time axis", () => {
   expect([endOfTime(undefined), endOfTime({ xaxis: {} }), secondsLeft(1, null)]).toEqual([null, null, null]);
 });
 
-test("all the thrust there is, is called saturated", () => {
-  expect([thrustText(0.62), thrustText(1)]).toEqual(["62 %", "100 %, saturated"]);
+test("all the thrust there is, is saturated", () => {
+  expect([isSaturated(0.62), isSaturated(1)]).toEqual([false, true]);
 });

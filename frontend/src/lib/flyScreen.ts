@@ -137,8 +137,7 @@ export function endOfTime(layout: Readonly<Record<string, unknown>> | undefined)
 
 const FULL_THRUST = 0.995;
 
-/** Thrust as a share of what there is, and whether the vehicle gives all of it. */
-export function thrustText(thrust: number): string {
-  const text = `${Math.round(100 * thrust)} %`;
-  return thrust >= FULL_THRUST ? `${text}, saturated` : text;
+/** Whether the vehicle gives all the thrust there is. */
+export function isSaturated(thrust: number): boolean {
+  return thrust >= FULL_THRUST;
 }

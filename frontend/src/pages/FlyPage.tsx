@@ -117,6 +117,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           readBack={trial.read_back}
           held={step === "over" || step === "judge" ? {} : (status?.status.held ?? {})}
           titles={titles}
+          areSet={step !== "plan"}
         />
       </section>
       {vehicle !== null && <MotorsOff vehicle={vehicle} status={status} orders={orders} />}

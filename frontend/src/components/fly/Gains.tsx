@@ -1,5 +1,5 @@
 import { IconCircleCheckFilled, IconCircleDashed } from "@tabler/icons-react";
-import { gainTicks } from "../../lib/flyScreen";
+import { type GainTick, gainTicks } from "../../lib/flyScreen";
 import { gainText } from "../../lib/format";
 import classes from "./Fly.module.css";
 
@@ -8,36 +8,40 @@ interface Props {
   readBack: Readonly<Record<string, number>> | null;
   held: Readonly<Record<string, number>>;
   titles: Readonly<Record<string, string>>;
+  /** Before they are set there is nothing to tick, whatever the vehicle holds. */
+  areSet: boolean;
 }
 
 /** Each gain of the flight, ticked once the vehicle has said that it holds it. */
-export function Gains({ asked, readBack, held, titles }: Props) {
+export function Gains({ asked, readBack, held, titles, areSet }: Props) {
   return (
     <table className={`${classes["gains"]} numbers`}>
       <caption className="visually-hidden">Gains of this flight and whether the vehicle holds them</caption>
       <tbody>
-        {gainTicks(asked, readBack, held).map(({ name, asked: value, held: found, confirmed }) => (
-          <tr key={name} data-confirmed={confirmed || undefined}>
+        {gainTicks(asked, readBack, held).map((tick) => (
+          <tr key={tick.name}>
             <th scope="row">
-              {name} <small>{titles[name]}</small>
+              {tick.name} <small>{titles[tick.name]}</small>
             </th>
-            <td>{gainText(value)}</td>
-            <td className={classes["tick"]}>
-              {confirmed ? (
-                <>
-                  <IconCircleCheckFilled size={22} aria-hidden />
-                  <span className="visually-hidden">read back</span>
-                </>
-              ) : (
-                <>
-                  <small>{found === null ? "not read" : `holds ${gainText(found)}`}</small>
-                  <IconCircleDashed size={22} aria-hidden />
-                </>
-              )}
-            </td>
+            <td>{gainText(tick.asked)}</td>
+            <td className={classes["tick"]}>{areSet ? <Tick tick={tick} /> : <Now held={tick.held} />}</td>
           </tr>
         ))}
       </tbody>
     </table>
+  );
+}
+
+function Now({ held }: { held: number | null }) {
+  return <small>{held === null ? "" : `now ${gainText(held)}`}</small>;
+}
+
+function Tick({ tick: { held, confirmed } }: { tick: GainTick }) {
+  if (confirmed) return <IconCircleCheckFilled size={22} aria-label="read back" className={classes["confirmed"]} />;
+  return (
+    <>
+      <small>{held === null ? "not read" : `holds ${gainText(held)}`}</small>
+      <IconCircleDashed size={22} aria-hidden />
+    </>
   );
 }

@@ -19,7 +19,7 @@ export function Quarantine({ vehicle, concern, orders }: Props) {
       <div role="alert">
         <h2>
           <IconAlertOctagonFilled size={24} aria-hidden />
-          Quarantined: do not fly
+          Do not fly it
         </h2>
         <p>{concern}</p>
       </div>

@@ -1,9 +1,9 @@
 import type { Trial } from "../../api/types";
-import { secondsLeft, thrustText } from "../../lib/flyScreen";
+import { isSaturated, secondsLeft } from "../../lib/flyScreen";
 import { withUnit } from "../../lib/format";
 import { type LiveFlight, readingOf } from "../../lib/live";
-import { predictedText } from "../../lib/uncertainty";
-import { type Aged, linkText } from "../../lib/vehicle";
+import { percent } from "../../lib/uncertainty";
+import { type Aged, ageText, linkText } from "../../lib/vehicle";
 import classes from "./Fly.module.css";
 
 interface Props {
@@ -34,6 +34,15 @@ function Reading({ title, value, size = "usual", stale = false, bad = false }: R
   );
 }
 
+/** The link in a tile: how old the last word is, or what became of it. */
+function LinkReading({ status }: { status: Aged | null }) {
+  if (status === null || status.status.state !== "connected") {
+    return <Reading title="Link" value={linkText(status)} bad />;
+  }
+  const title = status.isCurrent ? "Link age" : "Silent for";
+  return <Reading title={title} value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
+}
+
 /** What can be read from arm's length: altitude and error so far, then the rest. Grey is what is no longer so. */
 export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }: Props) {
   const reading = readingOf(live?.channel ?? "altitude_m");
@@ -41,27 +50,32 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const linked = status?.status;
   const stale = hasLink && !(status?.isCurrent ?? false);
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
-  const left = isFlying ? secondsLeft(live?.timeS.at(-1), endS) : null;
   const error = isFlying ? live?.errorSoFar : (trial.error ?? live?.errorSoFar);
-  const batteryV = linked?.batteryV ?? live?.batteryV;
+  const errorTitle = trial.error !== null && !isFlying ? "Error" : "Error so far";
+  const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
     <dl className={`${classes["readouts"]} numbers`}>
-      <Reading
-        title={stale ? `${reading.title}, as last heard` : reading.title}
-        value={withUnit(output, reading.unit, reading.digits)}
-        size="huge"
-        stale={stale}
-      />
-      <Reading
-        title={trial.error !== null && !isFlying ? "Error" : "Error so far"}
-        value={withUnit(error, unit)}
-        size="large"
-      />
-      <Reading title="Predicted error" value={predictedText(trial.predicted_error, null, unit)} />
-      {live?.thrust !== null && live !== null && <Reading title="Thrust" value={thrustText(live.thrust)} />}
-      <Reading title="Battery" value={withUnit(batteryV, "V", 1)} stale={stale} />
-      {hasLink && <Reading title="Link" value={linkText(status)} bad={stale} />}
-      <Reading title="Record ends in" value={withUnit(left, "s", 0)} />
+      <div className={classes["row"]}>
+        <Reading
+          title={stale ? `${reading.title}, as last heard` : reading.title}
+          value={withUnit(output, reading.unit, reading.digits)}
+          size="huge"
+          stale={stale}
+        />
+        <Reading title={`${errorTitle}${predicted}`} value={withUnit(error, unit)} size="large" />
+      </div>
+      <div className={classes["row"]}>
+        {live !== null && live.thrust !== null && (
+          <Reading title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"} value={percent(live.thrust)} />
+        )}
+        <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
+        {hasLink && <LinkReading status={status} />}
+        {isFlying ? (
+          <Reading title="Record ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
+        ) : (
+          <Reading title="Record lasts" value={withUnit(endS, "s", 0)} />
+        )}
+      </div>
     </dl>
   );
 }

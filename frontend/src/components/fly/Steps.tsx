@@ -51,7 +51,7 @@ export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & {
 /** The same for a simulation that is opened for each flight: one click. */
 export function PlainSteps({ campaign, trial, step, abort }: Props) {
   const [speed, setSpeed] = useSpeed();
-  const fly = useFlyTrial(campaign.id);
+  const fly = useFlyTrial(campaign);
   switch (step) {
     case "plan":
       return (
