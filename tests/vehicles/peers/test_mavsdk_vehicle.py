@@ -7,15 +7,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-from app.vehicles.base import FlightOrder, Vehicle
+from app.vehicles.base import FlightOrder, OptionValue, Vehicle
 from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.machine import Plan
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.open import open_vehicle
 from tests.vehicles.flying import never, unwatched
 from tests.vehicles.mavlink.speaking import free_port
+from tests.vehicles.peers.mavsdk_vehicle import FLOATS, INTEGERS, MAKE, MavsdkVehicle
 from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
-from tests.vehicles.peers.mavsdk_vehicle import MAKE, MavsdkVehicle
 
 TUNED = {"MPC_Z_P": 1.25, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.05, "MPC_Z_VEL_I_ACC": 1.7}
 RECORD_S = 6.0
@@ -29,12 +30,16 @@ def generic_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.vehicles.mavlink.vehicle.Plan", partial(Plan, record_s=RECORD_S))
 
 
+def options_at(port: int) -> dict[str, OptionValue]:
+    return {"autopilot": "px4", "address": f"udpin:127.0.0.1:{port}", "simulated": True}
+
+
 @contextmanager
 def met(*, armable: bool = True) -> Iterator[tuple[MavsdkVehicle, Vehicle]]:
     """MAVSDK's vehicle, and what we make of it."""
     port = free_port()
-    options = {"autopilot": "px4", "address": f"udpin:127.0.0.1:{port}", "simulated": True}
-    with MavsdkVehicle(port, armable=armable) as peer, open_vehicle("mavlink", options, safe_gains=SAFE) as ours:
+    opened = partial(open_vehicle, "mavlink", options_at(port), safe_gains=SAFE)
+    with MavsdkVehicle(port, armable=armable) as peer, opened() as ours:
         yield peer, ours
 
 
@@ -60,3 +65,17 @@ def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_g
         with pytest.raises(VehicleError, match="temporarily rejected"):
             ours.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert (peer.flew_with, peer.gains, peer.stands) == ([], SAFE, True)
+
+
+def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters() -> None:
+    port = free_port()
+    assert MAVLINK.connect is not None
+    with MavsdkVehicle(port):
+        ours = MAVLINK.connect(MAVLINK.check(options_at(port), field="options"), SAFE, None)
+        try:
+            assert (ours.identity.system_id, ours.concern) == (1, "")
+            assert {item.title: item.found for item in ours.check() if not item.passed} == {}
+            told = ours.parameters(lambda _read, _count: None)
+        finally:
+            ours.close()
+    assert told == pytest.approx({**FLOATS, **INTEGERS, "MIS_TAKEOFF_ALT": 3.0})
