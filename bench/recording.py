@@ -227,7 +227,8 @@ def measure(autopilot: str, seconds: float) -> bool:
 
 
 def report(record: FlightRecord, meter: Meter, kept: Counter[int], in_log: Counter[int], said: Said) -> bool:
-    sent = [each for each in said.sent_ms if min(kept) <= each <= max(kept)]
+    first_ms, last_ms = min(kept), max(kept)
+    sent = [each for each in said.sent_ms if first_ms <= each <= last_ms]
     missing = sum(kept[each] != 1 for each in sent) + len(set(kept) - set(sent))
     unlogged = sum(in_log[each] != 1 for each in sent)
     time_s = record.trajectory.time_s
