@@ -170,8 +170,8 @@ class ConnectedVehicle(Vehicle, Protocol):
         ...
 
     def attend(self, timeout_s: float) -> None:
-        """Listen for so long, and tell the vehicle that its ground station is there. After `land`, Land is repeated
-        every second until telemetry agrees. Raises VehicleError when the link is closed."""
+        """Listen for so long, and tell the vehicle that its ground station is there. What `land` or `motors_off` asked
+        for is repeated every second until telemetry agrees. Raises VehicleError when the link is closed."""
         ...
 
     def check(self) -> tuple[CheckItem, ...]:

@@ -106,12 +106,10 @@ class Flight:
         if now_s - self._listened_s > STALLED_S:
             heard += self._radio.listen(LISTEN_S)
         self._listened_s = now_s
-        for each in heard:
-            if isinstance(each.measurement, Position):
+        for each in in_order(heard, self._look()):
+            if isinstance(each, Heard) and isinstance(each.measurement, Position):
                 self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
             self._advance(each)
-        for sighted in self._look():
-            self._advance(sighted)
         if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
             self._conversation = None
             self._advance(ended)
@@ -180,3 +178,9 @@ def _spoken(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted from the keyboard"
     return f"the program failed ({type(error).__name__}: {error})"
+
+
+def in_order(heard: Sequence[Heard], sighted: Sequence[Sighted]) -> list[Heard | Sighted]:
+    """As they came: after a stall of this program, where the vehicle was seen then is not held against where it says
+    that it is now."""
+    return sorted((*heard, *sighted), key=lambda event: event.now_s)

@@ -14,9 +14,9 @@ from app.vehicles.mavlink.clock import Clock
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.gains import GainStore
 from app.vehicles.mavlink.gauges import Gauges
-from app.vehicles.mavlink.landing import Landing, send_now
 from app.vehicles.mavlink.machine import Plan
 from app.vehicles.mavlink.opening import limits_of, open_radio, patience_of
+from app.vehicles.mavlink.orders import StandingOrder
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.signals import Action, Keep
 from app.vehicles.mavlink.sources import Lookout, Source
@@ -67,7 +67,7 @@ class MavlinkVehicle:
         self._why = self._asked = self._plan_problem = ""
         self._datum_m = 0.0
         self._flight: Flight | None = None
-        self._landing: Landing | None = None
+        self._order: StandingOrder | None = None
         self._lookout = None if source is None else Lookout(source)
         self._radio = open_radio(options, clock, overhear=None if source is None else source.hear)
         self._gauges = Gauges(self._radio)
@@ -174,13 +174,13 @@ class MavlinkVehicle:
         )
 
     def attend(self, timeout_s: float) -> None:
-        """Listen for so long; the vehicle hears this ground station's heartbeats meanwhile. After `land`, Land is
-        repeated every second until telemetry agrees. Raises LinkError when the link is closed."""
+        """Listen for so long; the vehicle hears this ground station's heartbeats meanwhile. What `land` or `motors_off`
+        asked for is repeated every second until telemetry agrees. Raises LinkError when the link is closed."""
         until_s = self._radio.clock.now_s() + timeout_s
         while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
             self._listen(min(left_s, _LISTEN_S))
-            if self._landing is not None and not self._landing.is_over:
-                self._landing.proceed()
+            if self._order is not None:
+                self._order.proceed()
 
     def check(self) -> tuple[CheckItem, ...]:
         """Everything that has to be so before a flight; what is not so is an item, not an error. It takes two seconds
@@ -205,13 +205,12 @@ class MavlinkVehicle:
     def land(self, reason: str) -> None:
         """Tell it to land, at once and whatever state it is in. Raises VehicleError when it cannot be told."""
         self._asked = f"Land was asked for: {reason}."
-        self._landing = Landing(self._radio)
+        self._order = StandingOrder(self._radio, Action.LAND)
 
     def motors_off(self, reason: str) -> None:
         """Stop its motors, at once and at any height."""
         self._asked = f"Motors off was asked for: {reason}."
-        self._landing = None
-        send_now(self._radio, Action.KILL)
+        self._order = StandingOrder(self._radio, Action.KILL)
 
     def log_to(self, path: Path | None) -> None:
         """Write what passes from now on, in both directions, to this telemetry log; None ends the log. Raises LinkError
@@ -227,7 +226,7 @@ class MavlinkVehicle:
         self._set_up()
         self._enter(State.IDLE)
         self._why = self._asked = ""
-        self._landing = None
+        self._order = None
 
     # ---- connecting
 
@@ -302,7 +301,7 @@ class MavlinkVehicle:
         self._radio.aim = replace(self._radio.aim, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
         plan = self._plan(ground)
-        self._gains.staged = None
+        self._gains.staged = self._order = None
         self._datum_m = plan.datum_m
         watch = limits.begin(self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v)
         if self._lookout is not None:

@@ -198,6 +198,21 @@ def test_land_is_repeated_every_second_until_the_vehicle_obeys_and_not_afterward
             assert blocks_told(hangar).count(LAND_HERE) == obeyed
 
 
+def test_motors_off_is_repeated_too_until_the_vehicle_says_so() -> None:
+    with Hangar() as hangar:
+        enter_block(hangar, START_ENGINE)
+        with connected(hangar) as vehicle:
+            hangar.mute(True)
+            vehicle.motors_off("it stands among people")
+            vehicle.attend(2.5)
+            assert 2 <= hangar.writes.count("kil_thr") <= 4
+            hangar.mute(False)
+            attend_until(vehicle, lambda: vehicle.condition().armed is False)
+            stopped = hangar.writes.count("kil_thr")
+            vehicle.attend(3.0)
+            assert hangar.writes.count("kil_thr") == stopped
+
+
 def test_a_vehicle_that_somebody_else_arms_is_only_observed_from_then_on() -> None:
     with Hangar() as hangar, connected(hangar) as vehicle:
         vehicle.stage(TUNED)

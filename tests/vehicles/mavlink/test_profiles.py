@@ -13,12 +13,14 @@ from app.vehicles.mavlink.measurements import (
     Battery,
     Block,
     BlockCount,
+    BlockEntered,
     Breach,
     Heartbeat,
     Measurement,
     Parameter,
     Position,
     Reply,
+    Version,
 )
 from app.vehicles.mavlink.parameters import check_gains, settings
 from app.vehicles.mavlink.profiles import PROFILES
@@ -81,7 +83,7 @@ def test_what_is_sent_is_what_the_recorded_trial_was_flown_with(gains: tuple[int
         if not each.is_from_vehicle and each.kind in {"MISSION_ACK", "SCRIPT_ITEM"}
     ]
     whom = aim(gains)
-    ends_listing = [message for step in PAPARAZZI.prepare(whom, 50.0) for message in step.sends]
+    ends_listing = PAPARAZZI.conclude(whom)
     arming = [message for message in sent(PAPARAZZI, Action.ARM, whom) if message.kind != "MISSION_ITEM"]
     ours = [*ends_listing, *arming, *sent(PAPARAZZI, Action.TAKE_OFF, whom), *sent(PAPARAZZI, Action.LAND, whom)]
     assert [on_the_wire(message) for message in ours] == told
@@ -305,3 +307,42 @@ def test_everything_that_is_sent_can_be_packed(profile: Profile) -> None:
     steps = [*profile.prepare(whom, 50.0), *(step for action in Action for step in profile.steps(action, whom))]
     for message in (message for step in steps for message in step.sends):
         assert profile.dialect.message(message.kind, message.fields).get_type() == message.kind
+
+
+def test_motors_off_at_any_height_is_the_one_command_that_is_forced() -> None:
+    whom = Aim(system=1, aircraft=1)
+    for profile in (ARDUPILOT, PX4):
+        [message] = sent(profile, Action.KILL, whom)
+        assert (message.kind, [message.fields[f"param{place}"] for place in (1, 2)]) == ("COMMAND_LONG", [0.0, 21196.0])
+    assert sent(PAPARAZZI, Action.KILL, aim()) == sent(PAPARAZZI, Action.MOTORS_OFF, aim())
+
+
+def test_a_gimbal_or_a_companion_computer_on_board_does_not_speak_for_the_autopilot() -> None:
+    said = {"type": 26, "base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3}
+    for profile in PROFILES.values():
+        assert heard(profile, "HEARTBEAT", autopilot=8, **said) is None
+        assert isinstance(heard(profile, "HEARTBEAT", autopilot=profile.autopilot, **said), Heartbeat)
+
+
+def test_a_version_is_read_as_each_autopilot_writes_it() -> None:
+    nothing: dict[str, FieldValue] = {
+        **dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8),
+        **dict.fromkeys(("capabilities", "middleware_sw_version", "os_sw_version", "board_version"), 0),
+        **dict.fromkeys(("vendor_id", "product_id", "uid"), 0),
+    }
+    written = {"paparazzi": 51000, "ardupilot": 0x040603FF, "px4": 0x011000FF}
+    told = {
+        name: heard(PROFILES[name], "AUTOPILOT_VERSION", flight_sw_version=n, **nothing) for name, n in written.items()
+    }
+    assert told == {"paparazzi": Version("5.10.0"), "ardupilot": Version("4.6.3"), "px4": Version("1.16.0")}
+    assert heard(PX4, "AUTOPILOT_VERSION", flight_sw_version=0, **nothing) is None
+
+
+def test_paparazzi_tells_every_change_of_block() -> None:
+    entered = measured(FLOWN[0], "SCRIPT_CURRENT")
+    names = {number: name for name, number in aim().blocks.items()}
+    assert [names[each.number] for each in entered if isinstance(each, BlockEntered)][:3] == [
+        "Start Engine",
+        "Takeoff",
+        "land",
+    ]

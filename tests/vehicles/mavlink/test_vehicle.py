@@ -1,5 +1,7 @@
 """Whole trials over real UDP against the simulated drone, which was built by another reading of the same facts."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.dialects import PAPARAZZI, number, text
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.records import settings_of
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.open import open_vehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -241,9 +244,39 @@ def test_only_what_is_said_to_be_simulated_and_is_here_is_no_real_vehicle(
     assert MAVLINK.is_real_with(complete) is not is_simulated
 
 
+def test_what_runs_on_the_administrators_simulation_hosts_is_no_real_vehicle() -> None:
+    hosts, options = frozenset({"10.0.0.2"}), {"simulated": True, "address": "udp:10.0.0.2:4245"}
+    complete = MAVLINK.check(options, field="options", simulation_hosts=hosts)
+    assert MAVLINK.is_real_with(complete)
+    assert not MAVLINK.is_real_with(complete, hosts)
+    assert MAVLINK.is_real_with({**complete, "simulated": False}, hosts)
+    assert MAVLINK.is_real_with({**complete, "address": "udp:10.0.0.3:4245"}, hosts)
+
+
+def test_a_vehicle_that_does_not_sign_is_not_heard_where_signatures_are_wanted(tmp_path: Path) -> None:
+    key = tmp_path / "key.txt"
+    key.write_text("3f" * 32 + "\n", encoding="ascii")
+    with Hangar("ardupilot") as hangar, pytest.raises(VehicleError, match="No heartbeat was heard"):
+        hangar.vehicle(signing_key=str(key))
+
+
+def test_a_signing_key_that_cannot_be_read_is_refused_without_being_told() -> None:
+    with Hangar("ardupilot") as hangar, pytest.raises(InputError, match="signing key") as refusal:
+        hangar.vehicle(signing_key="nowhere/secret.txt")
+    assert "secret" not in f"{refusal.value} {refusal.value.problems}"
+
+
+def test_a_record_does_not_tell_the_signing_key() -> None:
+    assert settings_of({"signing_key": "3f" * 32, "radius_m": 5.0}) == {"radius_m": 5.0}
+
+
 @pytest.mark.parametrize(
     ("options", "field", "reason"),
     [
+        ({"signing_key": "3f" * 32}, "signing_key", "Paparazzi speaks MAVLink 1"),
+        ({"scored_source": "gps"}, "scored_source", "must be vehicle or mocap, got gps"),
+        ({"scored_source": "mocap"}, "scored_source", "needs a second_source"),
+        ({"second_source": "camera"}, "second_source", "must be natnet:HOST?body=ID"),
         ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "is not believed of udp:10.0.0.2:4245"),
         ({"simulated": True, "address": "serial:/dev/ttyUSB0:57600"}, "simulated", "only a loopback address"),
         ({"autopilot": "betaflight"}, "autopilot", "must be paparazzi, ardupilot, px4"),

@@ -1,0 +1,55 @@
+"""Land and motors off outside of a trial: repeated until the vehicle says that it has obeyed."""
+
+from typing import Final
+
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.signals import Action
+
+REPEAT_S: Final = 1.0
+_DESCENDING_M_S: Final = -0.2
+
+
+class StandingOrder:
+    """Once the vehicle has obeyed nothing more is sent: somebody else may fly it again."""
+
+    def __init__(self, radio: Radio, action: Action) -> None:
+        """Sends it. Raises VehicleError when it takes a block of a flight plan that is not known."""
+        self._radio, self._action = radio, action
+        self._asked_s = radio.clock.now_s()
+        self._is_over = False
+        self._send()
+
+    def proceed(self) -> None:
+        """Send it again when it is due."""
+        self._is_over = self._is_over or self._is_obeyed()
+        if not self._is_over and self._radio.clock.now_s() - self._sent_s >= REPEAT_S:
+            self._send()
+
+    def _send(self) -> None:
+        """Every message once, waiting for no answer."""
+        self._sent_s = self._radio.clock.now_s()
+        try:
+            steps = self._radio.profile.steps(self._action, self._radio.aim)
+        except KeyError as error:
+            raise VehicleError(
+                f"The vehicle cannot be told to {self._action} from here: it did not name a block {error}.",
+                hint="Land it with the remote control or its own ground station.",
+            ) from error
+        for step in steps:
+            self._radio.send(*step.sends)
+
+    def _is_obeyed(self) -> bool:
+        """By what came since it was given: the motors stand, or, where it was to land, it does."""
+        seen = self._radio.seen
+        is_new = seen.heartbeat is not None and seen.heartbeat_s > self._asked_s
+        if seen.heartbeat is not None and is_new and not seen.heartbeat.armed:
+            return True
+        return self._action is Action.LAND and self._lands(seen.heartbeat.mode if seen.heartbeat and is_new else "")
+
+    def _lands(self, mode: str) -> bool:
+        seen, profile = self._radio.seen, self._radio.profile
+        if self._radio.block in profile.landing_blocks or mode in profile.landing_modes - profile.flying_modes:
+            return True
+        at_s, last = seen.positions[-1] if seen.positions else (float("-inf"), None)
+        return last is not None and at_s > self._asked_s and last.climb_rate_m_s < _DESCENDING_M_S
