@@ -15,6 +15,7 @@ from app.vehicles.mavlink.signals import (
     Action,
     Command,
     Event,
+    Heard,
     Keep,
     MotorsOffWanted,
     Perform,
