@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
-from app.api.deps import Act, CursorText, Id, Limit, Reader, Writer, json_only
-from app.campaigns import service
+from app.api.deps import Act, Asking, CursorText, Id, Limit, Reader, Writer, json_only
+from app.campaigns import promoting, service
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -15,10 +15,12 @@ from app.campaigns.schemas import (
     Finish,
     NewCampaign,
     NextFlight,
+    Promotion,
     Sort,
 )
 from app.campaigns.states import CampaignState
 from app.campaigns.statistics import campaign_statistics
+from app.fleet.schemas import Vehicle
 from app.schemas import Page
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
@@ -82,6 +84,13 @@ def archive_campaign(act: Act, campaign_id: Id) -> Campaign:
 def clone_campaign(act: Act, campaign_id: Id, body: Clone | None = None) -> Campaign:
     """A new campaign with the same definition, linked to this one."""
     return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
+
+
+@router.post("/{campaign_id}/promote")
+def promote_best(act: Act, asking: Asking, campaign_id: Id, body: Promotion) -> Vehicle:
+    """Make the best gains the safe ones of the campaign's registered vehicle, once its flights have shown that they are
+    better than the first ones."""
+    return act(Vehicle, lambda session: promoting.promote_best(session, campaign_id, body, asking))
 
 
 @router.get("/{campaign_id}/statistics")

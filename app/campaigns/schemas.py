@@ -11,7 +11,7 @@ from app.core.advice import AdviceKind
 from app.core.statistics import Word
 from app.core.strategies.base import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
-from app.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Request, Text, Trouble, Version
+from app.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
 
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
 Key = Annotated[str, Field(max_length=40)]
@@ -110,6 +110,13 @@ class Finish(Request):
     """Why the operator ends the campaign."""
 
     reason: Text = "stopped by the operator"
+
+
+class Promotion(Request):
+    """Who makes the best gains the vehicle's safe ones, and why; `version` is the vehicle's."""
+
+    version: Version
+    statement: Reason
 
 
 class BestTrial(BaseModel):

@@ -63,10 +63,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: As
     naming what cannot be used."""
     row = repository.get_one(session, vehicle_id)
     check_version(edit.version, row.version, row.name, _differences(row, edit))
-    if not row.registered:
-        raise ConflictError(
-            f"{row.name} is shared by all campaigns; its settings stand in each of them.", hint="Edit the campaign."
-        )
+    _require_own(row)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     by = require_no_other(row, asker)
@@ -85,12 +82,23 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: As
     return vehicle_view(row)
 
 
-def promote_gains(session: Session, row: VehicleRow, gains: Mapping[str, float], *, reason: str, asker: Asker) -> None:
+def promote_gains(
+    session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, asker: Asker
+) -> None:
     """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
+    check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
+    _require_own(row)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     _set_safe_gains(session, row, gains, statement=reason, by=require_no_other(row, asker))
     row.version += 1
+
+
+def _require_own(row: VehicleRow) -> None:
+    if not row.registered:
+        raise ConflictError(
+            f"{row.name} is shared by all campaigns; its settings stand in each of them.", hint="Edit the campaign."
+        )
 
 
 def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, object]]:

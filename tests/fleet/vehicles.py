@@ -43,10 +43,10 @@ def create_connected(client: httpx2.Client, database: Database, name: str = "Dro
     return connect(client, database, register(client, name, real=real))
 
 
-def create_campaign_on(client: httpx2.Client, database: Database, vehicle: Json) -> Json:
+def create_campaign_on(client: httpx2.Client, database: Database, vehicle: Json, **fields: object) -> Json:
     """One whose first gains are known."""
     answer = client.post(
-        "/api/campaigns", json={"name": "Real", "vehicle": {"kind": vehicle["kind"], "id": vehicle["id"]}}
+        "/api/campaigns", json={"name": "Real", "vehicle": {"kind": vehicle["kind"], "id": vehicle["id"]}, **fields}
     )
     assert answer.status_code == 201, answer.text
     run_jobs(database)

@@ -1757,6 +1757,24 @@ export type PresetInfo = {
 };
 
 /**
+ * Promotion
+ *
+ * Who makes the best gains the vehicle's safe ones, and why; `version` is the vehicle's.
+ */
+export type Promotion = {
+    /**
+     * Version
+     *
+     * the version that was edited, as last read
+     */
+    version: number;
+    /**
+     * Statement
+     */
+    statement: string;
+};
+
+/**
  * Proposal
  *
  * The next gain set, from one history. Stale as soon as that history has changed. `recommended` is the advice's
@@ -2926,7 +2944,8 @@ export type VehicleEdit = {
 /**
  * VehicleKindInfo
  *
- * `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly.
+ * `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly. Vehicles
+ * of a kind that is `registered` are made one by one, and chosen by their id.
  */
 export type VehicleKindInfo = {
     /**
@@ -2949,6 +2968,10 @@ export type VehicleKindInfo = {
      * Can Fly
      */
     can_fly: boolean;
+    /**
+     * Registered
+     */
+    registered: boolean;
     /**
      * Experiments
      */
@@ -3394,6 +3417,50 @@ export type CloneCampaignResponses = {
 };
 
 export type CloneCampaignResponse = CloneCampaignResponses[keyof CloneCampaignResponses];
+
+export type PromoteBestData = {
+    body: Promotion;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/promote';
+};
+
+export type PromoteBestErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type PromoteBestError = PromoteBestErrors[keyof PromoteBestErrors];
+
+export type PromoteBestResponses = {
+    /**
+     * Successful Response
+     */
+    200: Vehicle;
+};
+
+export type PromoteBestResponse = PromoteBestResponses[keyof PromoteBestResponses];
 
 export type GetStatisticsData = {
     body?: never;

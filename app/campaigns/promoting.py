@@ -1,0 +1,52 @@
+"""Making a campaign's best gains the safe ones of its vehicle, where its flights have shown that they are better."""
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.schemas import Promotion
+from app.campaigns.service import safe_gains_changed
+from app.campaigns.statistics import contest_of
+from app.core.confirming import Standing
+from app.core.strategies.history import describe
+from app.db.models import CampaignRow
+from app.errors import ConflictError
+from app.fleet.control import Asker
+from app.fleet.registering import promote_gains
+from app.fleet.schemas import Vehicle
+from app.fleet.service import get_vehicle
+from app.trials import history
+
+
+def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: Asker) -> Vehicle:
+    """The vehicle with its new safe gains; the act that records it names the flights.
+
+    Raises ConflictError while the best gains are not shown to be better than the first ones, and when the vehicle is
+    shared, not at rest, in somebody else's control, or was changed meanwhile.
+    """
+    row = repository.get_one(session, campaign_id)
+    now = contest_of(row, history.trials_of(session, campaign_id))
+    if now is None or now.comparison is None:
+        raise _not_shown(row, "it has no gains that are better than its first ones")
+    said = now.comparison
+    if said.verdict != "better":
+        raise _not_shown(row, f"whether {describe(now.winner.gains)} is better than its first gains is {said.verdict}")
+    gains = dict(now.winner.gains)
+    promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), asker=asker)
+    safe_gains_changed(session, row.vehicle_id)
+    session.flush()
+    return get_vehicle(session, row.vehicle_id)
+
+
+def _because(row: CampaignRow, now: Standing, asked: Promotion) -> str:
+    assert now.comparison is not None
+    flights = ", ".join(map(str, now.winner.numbers))
+    return (
+        f"{asked.statement} (campaign {row.id}, flights {flights}: better, {now.comparison.confidence:.0%} confidence)"
+    )
+
+
+def _not_shown(row: CampaignRow, why: str) -> ConflictError:
+    return ConflictError(
+        f"No gains of campaign {row.id} can be promoted: {why}.",
+        hint="Fly the best gains and the first ones again until the statistics say “better”.",
+    )
