@@ -106,6 +106,8 @@ class _Judgement:
         ):
             if self.within(self.of(*kinds), *GROUND) > shortest_s:
                 yield Cause(failure, "refused")
+        if self.within(self.beatless, *GROUND) > 2.5 * self.heartbeat_s - 0.1:
+            yield Cause("preflight", "refused")
         if self.began_in(ABORT, Stage.CONNECT, *GROUND) or self.began_in(MOTORS_OFF, Stage.CONNECT, *GROUND):
             yield Cause("F8", "aborted", had_to=self.armed_s is not None)
         for kind in (*SILENT, "frozen-position", "jumping-position", "low-battery"):
@@ -190,7 +192,8 @@ class _Judgement:
             case "safe":
                 if not self.flown.holds_safe:
                     yield f"it is said to hold its safe gains, and holds {dict(self.flown.held)}"
-                if self.flown.armed or abs(self.flown.height_m) > LIFTED_M:
+                falls = bool(self.of(MOTORS_OFF))
+                if self.flown.armed or (abs(self.flown.height_m) > LIFTED_M and not falls):
                     yield f"it is said to be safe, and is {'armed' if self.flown.armed else 'off the ground'}"
                 if any(self.began_in(kind, *AIR) for kind in ("reboot",)):
                     yield "it changed its state by itself in the air, and was not quarantined"
