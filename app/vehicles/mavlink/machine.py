@@ -274,11 +274,12 @@ def _modes(trial: Trial) -> frozenset[str]:
 
 
 def _blocks(trial: Trial) -> frozenset[str]:
-    """The blocks of its flight plan that the vehicle may be in; at first it may still tell of those before."""
+    """The blocks of its flight plan that the vehicle may be in. At first it may still tell of those before, and some
+    plans lead back to them once it has landed."""
     limits = trial.plan.limits
     allowed = limits.flying_blocks | limits.landing_blocks
     early = trial.commanded_s is None or trial.watch.block_s - trial.commanded_s < _MODE_KNOWN_S
-    return allowed | limits.arming_blocks if early and allowed else allowed
+    return allowed | limits.arming_blocks if early or trial.state not in _HOLDING else allowed
 
 
 def _obeys(trial: Trial, now_s: float) -> bool:

@@ -16,12 +16,13 @@ from app.vehicles.mavlink.signals import Sighted
 class SourceSample:
     """What a source saw once.
 
-    `received_s`: by the clock that the source was given, as the vehicle's messages are stamped; `altitude_m`: positive
-    up, on the source's own zero, which is compared from the ground on; `tracking_valid`: false where the source says
+    `received_s`: by the clock that the source was given, as the vehicle's messages are stamped; `seen_s`: when it saw
+    that, on the same clock but for a constant latency, whatever held the message up; `altitude_m`: positive up, on the source's own zero, which is compared from the ground on; `tracking_valid`: false where the source says
     that it does not see the vehicle; `advances`: false where it repeats an old frame.
     """
 
     received_s: float
+    seen_s: float
     altitude_m: float
     tracking_valid: bool
     advances: bool

@@ -1,5 +1,6 @@
 """A vehicle whose link stays open between flights, over real UDP against the simulated drone."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -152,10 +153,20 @@ def test_gains_that_changed_after_they_were_staged_are_not_flown() -> None:
         assert vehicle.restore() == SAFE
 
 
-def test_every_parameter_can_be_read() -> None:
+@pytest.mark.parametrize("lost_s", [0.0, 0.04])
+def test_every_parameter_can_be_read_also_where_some_are_lost(lost_s: float) -> None:
+    """Lost for so long on the wall, in which the drone sends about five of them."""
     heard: list[tuple[int, int]] = []
+
+    def note(came: int, of: int) -> None:
+        heard.append((came, of))
+        if came == 20:
+            hangar.mute(True)
+            time.sleep(lost_s)
+            hangar.mute(False)
+
     with Hangar() as hangar, connected(hangar) as vehicle:
-        found = vehicle.parameters(lambda came, of: heard.append((came, of)))
+        found = vehicle.parameters(note)
     assert found["gui_v_kp"] == 283.0
     assert heard[-1][0] == heard[-1][1] >= len(found) > 50
 

@@ -87,7 +87,7 @@ def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
     walk.climb_rate_m_s = 0.0
     while walk.state is State.RECORD:
         walk.pass_s(STEP_S)
-    walk.hear(BlockEntered(LAND_BLOCK)).touch_down().disarm().restore()
+    walk.hear(BlockEntered(LAND_BLOCK)).pass_s(0.5).hear(BlockEntered(2)).touch_down().disarm().restore()
     assert (walk.state, walk.trial.failure) == (State.IDLE, None)
 
 
