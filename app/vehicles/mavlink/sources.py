@@ -17,8 +17,9 @@ class SourceSample:
     """What a source saw once.
 
     `received_s`: by the clock that the source was given, as the vehicle's messages are stamped; `seen_s`: when it saw
-    that, on the same clock but for a constant latency, whatever held the message up; `altitude_m`: positive up, on the source's own zero, which is compared from the ground on; `tracking_valid`: false where the source says
-    that it does not see the vehicle; `advances`: false where it repeats an old frame.
+    that, on the same clock but for a constant latency, whatever held the message up; `altitude_m`: positive up, on the
+    source's own zero, which is compared from the ground on; `tracking_valid`: false where the source says that it does
+    not see the vehicle; `advances`: false where it repeats an old frame.
     """
 
     received_s: float
@@ -55,7 +56,7 @@ class Source(Protocol):
 class Lookout:
     """A source whose altitudes are put on the vehicle's datum: both stood on the ground at the same time.
 
-    `seen` are the sightings of the flight so far, as time of receipt (s) and altitude (m).
+    `seen` are the sightings of the flight so far, as `SourceSample.seen_s` and altitude (m).
     """
 
     def __init__(self, source: Source) -> None:
@@ -79,13 +80,9 @@ class Lookout:
 
     def look(self) -> list[Sighted]:
         """What it saw since the last call."""
-        sighted = [
-            Sighted(
-                altitude_m=sample.altitude_m + self._rise_m,
-                is_new=sample.tracking_valid and sample.advances,
-                now_s=sample.received_s,
-            )
-            for sample in self.source.take()
+        samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.source.take()]
+        self.seen += [(sample.seen_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]
+        return [
+            Sighted(altitude_m=sample.altitude_m + self._rise_m, is_new=is_new, now_s=sample.received_s)
+            for sample, is_new in samples
         ]
-        self.seen += [(each.now_s, each.altitude_m) for each in sighted if each.is_new]
-        return sighted

@@ -9,25 +9,31 @@ SILENT_S: Final = 1.0
 KEPT: Final = 20_000
 """Samples kept for a program that does not ask for them; then the oldest are dropped."""
 
-_WINDOW: Final = 500
+_WINDOW_S: Final = 60.0
+"""Longer than a flight, so that the latency taken off is one and the same in all of it."""
 _RESTART_S: Final = 1.0
 """A source whose clock goes back by so much has started anew; by less, a packet came late."""
 
 
 class Arrivals:
-    """A source's time stamps on our clock, as if every message had travelled as fast as the fastest of late: without
-    what the network and a busy computer hold back."""
+    """A source's time stamps on our clock, as if every message had travelled as fast as the fastest of the last minute:
+    without what the network and a busy computer hold back."""
 
     def __init__(self) -> None:
-        self._offsets_s: deque[float] = deque(maxlen=_WINDOW)
+        self._fastest: deque[tuple[float, float]] = deque()
+        """Time stamps with arrival minus time stamp, both rising: each is the least of those from it on."""
 
-    def received_s(self, time_s: float, arrived_s: float) -> float:
+    def seen_s(self, time_s: float, arrived_s: float) -> float:
         """When what was stamped `time_s` and came at `arrived_s` would have come at its fastest."""
         offset_s = arrived_s - time_s
-        if self._offsets_s and abs(offset_s - self._offsets_s[-1]) > _RESTART_S:
-            self._offsets_s.clear()
-        self._offsets_s.append(offset_s)
-        return time_s + min(self._offsets_s)
+        if self._fastest and time_s < self._fastest[-1][0] - _RESTART_S:
+            self._fastest.clear()
+        while self._fastest and self._fastest[-1][1] >= offset_s:
+            self._fastest.pop()
+        self._fastest.append((time_s, offset_s))
+        while self._fastest[0][0] < time_s - _WINDOW_S:
+            self._fastest.popleft()
+        return time_s + self._fastest[0][1]
 
 
 class PoseStream:
@@ -51,7 +57,8 @@ class PoseStream:
         """`time_s` by the source's clock, `arrived_s` by ours."""
         later = time_s > self._time_s or time_s < self._time_s - _RESTART_S
         sample = SourceSample(
-            received_s=self._arrivals.received_s(time_s, arrived_s) if later else arrived_s,
+            received_s=arrived_s,
+            seen_s=self._arrivals.seen_s(time_s, arrived_s) if later else arrived_s,
             altitude_m=altitude_m,
             tracking_valid=tracking_valid,
             advances=later and pose != self._pose,
