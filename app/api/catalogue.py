@@ -15,6 +15,7 @@ from app.core.strategies.base import Strategy
 from app.core.trajectory import CHANNEL_UNITS
 from app.fleet.kinds import is_registered_one_by_one
 from app.schemas import OptionValue
+from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
@@ -74,13 +75,15 @@ class StrategyInfo(BaseModel):
 
 
 class VehicleKindInfo(BaseModel):
-    """`can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly."""
+    """`can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly.
+    Vehicles of a kind that is `registered` are made one by one, and chosen by their id."""
 
     name: str
     title: str
     line: str
     is_real: bool
     can_fly: bool
+    registered: bool
     experiments: list[str]
     options: list[OptionInfo]
 
@@ -126,8 +129,24 @@ def get_catalogue() -> Catalogue:
                 for each in EXPERIMENTS.values()
             ],
             "strategies": [_strategy(each) for each in STRATEGIES.values()],
-            "vehicle_kinds": [kind for kind in VEHICLE_KINDS.values() if kind.served],
+            "vehicle_kinds": [_kind(kind) for kind in VEHICLE_KINDS.values()],
             "presets": [preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
+        },
+        from_attributes=True,
+    )
+
+
+def _kind(kind: VehicleKind) -> VehicleKindInfo:
+    return VehicleKindInfo.model_validate(
+        {
+            "name": kind.name,
+            "title": kind.title,
+            "line": kind.line,
+            "is_real": kind.is_real,
+            "can_fly": kind.can_fly,
+            "registered": is_registered_one_by_one(kind),
+            "experiments": list(kind.experiments),
+            "options": kind.options,
         },
         from_attributes=True,
     )

@@ -1,6 +1,7 @@
 /** The API's types under the names that pages use. */
 
 export type {
+  ActKind,
   Advice,
   Campaign,
   CampaignState,
@@ -16,9 +17,11 @@ export type {
   FittedParameter,
   GainInfo,
   Gate,
+  GivenGains,
   Interval,
   LadderStep,
   NewCampaignInput as NewCampaign,
+  NewVehicle,
   NextFlight,
   OptionInfo,
   PresetInfo,
@@ -29,6 +32,9 @@ export type {
   TrialState,
   Trouble,
   Vehicle,
+  VehicleAct,
   VehicleCheck,
+  VehicleEdit,
   VehicleKindInfo,
+  VehicleState,
 } from "./generated";

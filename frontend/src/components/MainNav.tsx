@@ -5,6 +5,7 @@ import classes from "./MainNav.module.css";
 
 const PAGES = [
   { to: "/", title: "Campaigns" },
+  { to: "/vehicles", title: "Vehicles" },
   { to: "/reproductions", title: "Reproductions" },
   { to: "/jobs", title: "Jobs" },
 ] as const;

@@ -1,4 +1,4 @@
-import { Select, Switch } from "@mantine/core";
+import { Select, Switch, TextInput } from "@mantine/core";
 import type { OptionInfo } from "../api/types";
 import type { OptionValue } from "../lib/newCampaign";
 import { Entry } from "./Entry";
@@ -19,7 +19,7 @@ function shown(choice: OptionValue): string {
   return String(choice).replace(/^./, (letter) => letter.toUpperCase());
 }
 
-/** A setting as its kind asks for: a switch, a choice, or a number with its range. */
+/** A setting as its kind asks for: a switch, a choice, a text, or a number with its range. */
 export function OptionField({ option, value, error, onChange }: Props) {
   const { title, default: standard, choices = [] } = option;
   const now = value ?? standard;
@@ -46,6 +46,18 @@ export function OptionField({ option, value, error, onChange }: Props) {
       />
     );
   }
+  if (typeof standard === "string") {
+    return (
+      <TextInput
+        label={title}
+        value={String(now)}
+        error={error}
+        autoCapitalize="off"
+        spellCheck={false}
+        onChange={(event) => onChange(event.currentTarget.value)}
+      />
+    );
+  }
   return (
     <Entry
       label={title}
@@ -53,7 +65,7 @@ export function OptionField({ option, value, error, onChange }: Props) {
       value={typeof now === "boolean" ? "" : now}
       error={error}
       onChange={onChange}
-      {...(typeof standard === "number" ? { empty: standard } : {})}
+      empty={standard}
     />
   );
 }

@@ -51,11 +51,12 @@ function fits(experiments: readonly string[] | undefined, experiment: string): b
   return experiments === undefined || experiments.length === 0 || experiments.includes(experiment);
 }
 
-/** Vehicles that fly this experiment. The simulation comes first, a vehicle that is flown elsewhere last. */
+/** Shared vehicles that fly this experiment. The simulation comes first, a vehicle that is flown elsewhere last. */
 export function kindsFor(catalogue: Catalogue, experiment: string): VehicleKindInfo[] {
   const rank = (kind: VehicleKindInfo): number => (kind.name === "jsbsim" ? 0 : kind.can_fly ? 1 : 2);
   const kinds: readonly VehicleKindInfo[] = catalogue.vehicle_kinds;
-  return kinds.filter((kind) => fits(kind.experiments, experiment)).sort((one, other) => rank(one) - rank(other));
+  const shared = kinds.filter((kind) => !kind.registered && fits(kind.experiments, experiment));
+  return shared.sort((one, other) => rank(one) - rank(other));
 }
 
 /** Strategies that work with this experiment, in the catalogue's order: the first one is recommended. */

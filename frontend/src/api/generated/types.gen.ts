@@ -2944,8 +2944,8 @@ export type VehicleEdit = {
 /**
  * VehicleKindInfo
  *
- * `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly. Vehicles
- * of a kind that is `registered` are made one by one, and chosen by their id.
+ * `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly.
+ * Vehicles of a kind that is `registered` are made one by one, and chosen by their id.
  */
 export type VehicleKindInfo = {
     /**

@@ -1,0 +1,59 @@
+import { Button } from "@mantine/core";
+import { useActs } from "../../api/fleet";
+import { ACTS } from "../../lib/fleet";
+import { Panel } from "../Panel";
+import { Time } from "../Time";
+import { Trouble } from "../Trouble";
+import classes from "./Fleet.module.css";
+
+/** What the vehicle was asked beside its flights, by whom, and what came of it. */
+export function ActList({ vehicleId }: { vehicleId: number }) {
+  const acts = useActs(vehicleId);
+  const items = acts.data?.pages.flatMap((page) => page.items) ?? [];
+  return (
+    <Panel title="What it was asked" className={classes["wide"]}>
+      <Trouble error={acts.error} />
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
+      <section className={`${classes["scroll"]} sideways`} aria-label="What it was asked" tabIndex={0}>
+        <table className={classes["table"]}>
+          <thead>
+            <tr>
+              <th scope="col">When</th>
+              <th scope="col">What</th>
+              <th scope="col">By</th>
+              <th scope="col">Outcome</th>
+            </tr>
+          </thead>
+          <tbody>
+            {items.map((act) => (
+              <tr key={act.id}>
+                <td>
+                  <Time at={act.requested_at} />
+                </td>
+                <td>
+                  {ACTS[act.kind]}
+                  {act.reason && <small>{act.reason}</small>}
+                </td>
+                <td>{act.by || "–"}</td>
+                <td>
+                  {act.state}
+                  {act.problem && <small>{act.problem}</small>}
+                </td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+      {acts.hasNextPage && (
+        <Button
+          variant="default"
+          className={classes["more"] ?? ""}
+          loading={acts.isFetchingNextPage}
+          onClick={() => void acts.fetchNextPage()}
+        >
+          Show more ({items.length} of {acts.data?.pages[0]?.total})
+        </Button>
+      )}
+    </Panel>
+  );
+}

@@ -1,0 +1,48 @@
+import { Button, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { useEditVehicle } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { withUnit } from "../../lib/format";
+import { useVehicleStatus } from "../../live/store";
+import { Panel } from "../Panel";
+import { Trouble } from "../Trouble";
+import { Fact } from "./Fact";
+import classes from "./Fleet.module.css";
+
+/** Which battery is in, and what it reads. Every flight keeps the label that stood here. */
+export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
+  const status = useVehicleStatus(vehicle.id);
+  const edit = useEditVehicle(vehicle.id);
+  const [typed, setTyped] = useState<string | null>(null);
+  const label = typed ?? vehicle.battery;
+  return (
+    <Panel title="Battery">
+      <div className={classes["stack"]}>
+        <dl className={`${classes["facts"]} numbers`}>
+          <Fact title="Voltage now" value={withUnit(status?.status.batteryV, "V", 1)} stale={!status?.isCurrent} />
+          <Fact title="Flies from" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
+        </dl>
+        <form
+          className={classes["row"]}
+          onSubmit={(event) => {
+            event.preventDefault();
+            edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) });
+          }}
+        >
+          <TextInput
+            label="The battery that is in"
+            placeholder="No. 3"
+            value={label}
+            maxLength={60}
+            disabled={!vehicle.actions.includes("edit")}
+            onChange={(event) => setTyped(event.currentTarget.value)}
+          />
+          <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
+            Keep
+          </Button>
+        </form>
+        <Trouble error={edit.error} />
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,79 @@
+import { Button } from "@mantine/core";
+import { Link } from "react-router";
+import { useLedger } from "../../api/fleet";
+import type { GivenGains } from "../../api/types";
+import { PURPOSES } from "../../lib/fleet";
+import { sameHeld } from "../../lib/flyScreen";
+import { NOTHING } from "../../lib/format";
+import { gainsInBrackets } from "../../lib/gains";
+import { Panel } from "../Panel";
+import { Time } from "../Time";
+import { Trouble } from "../Trouble";
+import classes from "./Fleet.module.css";
+
+/** Every gain set that the vehicle was given, and what it said it had then. */
+export function LedgerTable({ vehicleId }: { vehicleId: number }) {
+  const ledger = useLedger(vehicleId);
+  const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
+  return (
+    <Panel title="Gains it was given" className={classes["wide"]}>
+      <Trouble error={ledger.error} />
+      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>None yet: it was never connected.</p>}
+      {lines.length > 0 && (
+        // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+        <section className={`${classes["scroll"]} sideways`} aria-label="Gains it was given" tabIndex={0}>
+          <table className={classes["table"]}>
+            <thead>
+              <tr>
+                <th scope="col">When</th>
+                <th scope="col">For</th>
+                <th scope="col">Asked {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
+                <th scope="col">Read back</th>
+                <th scope="col">Outcome</th>
+              </tr>
+            </thead>
+            <tbody>
+              {lines.map((line) => (
+                <Line key={`${line.purpose} ${line.flight_id ?? line.act_id}`} line={line} />
+              ))}
+            </tbody>
+          </table>
+        </section>
+      )}
+      {ledger.hasNextPage && (
+        <Button
+          variant="default"
+          className={classes["more"] ?? ""}
+          loading={ledger.isFetchingNextPage}
+          onClick={() => void ledger.fetchNextPage()}
+        >
+          Show more ({lines.length} of {ledger.data?.pages[0]?.total})
+        </Button>
+      )}
+    </Panel>
+  );
+}
+
+function Line({ line }: { line: GivenGains }) {
+  const { campaign_id, trial_id, read_back } = line;
+  const differs = read_back !== null && !sameHeld(read_back, line.asked);
+  return (
+    <tr>
+      <td>
+        <Time at={line.asked_at} />
+      </td>
+      <td>
+        {campaign_id !== null && trial_id !== null ? (
+          <Link to={`/campaigns/${campaign_id}/flights/${trial_id}`}>{PURPOSES[line.purpose]}</Link>
+        ) : (
+          PURPOSES[line.purpose]
+        )}
+      </td>
+      <td className="numbers">{gainsInBrackets(line.asked)}</td>
+      <td className={differs ? classes["bad"] : "numbers"}>
+        {read_back === null ? NOTHING : gainsInBrackets(read_back)}
+      </td>
+      <td>{line.outcome}</td>
+    </tr>
+  );
+}

@@ -1,0 +1,54 @@
+import type { Vehicle } from "../../api/types";
+import { NOTHING, withUnit } from "../../lib/format";
+import { percent } from "../../lib/uncertainty";
+import { linkText, stepWord } from "../../lib/vehicle";
+import { useVehicleStatus } from "../../live/store";
+import { Panel } from "../Panel";
+import { Fact } from "./Fact";
+import classes from "./Fleet.module.css";
+
+function armedText(armed: boolean | null | undefined): string {
+  if (armed === null || armed === undefined) return NOTHING;
+  return armed ? "armed" : "disarmed";
+}
+
+/** How the link is and what the vehicle says through it, as of now. */
+export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
+  const status = useVehicleStatus(vehicle.id);
+  const isLinked = vehicle.state !== "disconnected";
+  const stale = !(status?.isCurrent ?? false);
+  const said = status?.status;
+  const { identity } = vehicle;
+  return (
+    <Panel title="Connection">
+      <div className={classes["stack"]}>
+        {isLinked ? (
+          <dl className={`${classes["facts"]} numbers`}>
+            <Fact title="Last heard" value={linkText(status)} bad={stale} />
+            <Fact title="Doing" value={said === undefined ? NOTHING : stepWord(said.step)} stale={stale} />
+            <Fact title="Motors" value={armedText(said?.armed)} stale={stale} />
+            <Fact title="Mode" value={said?.mode || NOTHING} stale={stale} />
+            <Fact title="Altitude" value={withUnit(said?.altitudeM, "m", 2)} stale={stale} />
+            <Fact title="Positions" value={withUnit(said?.positionHz, "per s", 0)} stale={stale} />
+            <Fact
+              title="Packets lost"
+              value={said?.lostShare === null || said === undefined ? NOTHING : percent(said.lostShare)}
+              stale={stale}
+            />
+          </dl>
+        ) : (
+          <p className={classes["quiet"]}>
+            Not connected. Connecting opens the link, writes the safe gains and reads them back; nothing moves.
+          </p>
+        )}
+        {said?.said && <p className={classes["quiet"]}>It says: {said.said}</p>}
+        {said?.trouble && <p className={classes["bad"]}>{said.trouble}</p>}
+        <p className={classes["quiet"]}>
+          {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
+          {identity !== null &&
+            `; pinned at the first connection: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
+        </p>
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,150 @@
+import { Button, TextInput } from "@mantine/core";
+import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
+import { useState } from "react";
+import { useEditVehicle } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { inOrder, sameHeld } from "../../lib/flyScreen";
+import { gainText, NOTHING } from "../../lib/format";
+import type { Entry as Value } from "../../lib/newCampaign";
+import { problemOf, reasonsByField } from "../../lib/problems";
+import { useVehicleStatus } from "../../live/store";
+import { Entry } from "../Entry";
+import { Panel } from "../Panel";
+import { Time } from "../Time";
+import { Trouble } from "../Trouble";
+import classes from "./Fleet.module.css";
+
+interface Props {
+  vehicle: Vehicle;
+  restoring: boolean;
+  onRestore: () => void;
+}
+
+/** What the vehicle holds beside what is safe. */
+export function SafeGains({ vehicle, restoring, onRestore }: Props) {
+  const [editing, setEditing] = useState(false);
+  const status = useVehicleStatus(vehicle.id);
+  const { safe_gains: safe } = vehicle;
+  const live = status?.status.held ?? {};
+  const held = inOrder(Object.keys(live).length > 0 ? live : (vehicle.held ?? {}), Object.keys(safe));
+  const isKnown = Object.keys(held).length > 0;
+  if (editing) return <SafeGainsForm vehicle={vehicle} onDone={() => setEditing(false)} />;
+  return (
+    <Panel title="Gains">
+      <div className={classes["stack"]}>
+        <table className={classes["table"]}>
+          <thead>
+            <tr>
+              <th scope="col">Gain</th>
+              <th scope="col" data-number>
+                Holds
+              </th>
+              <th scope="col" data-number>
+                Safe
+              </th>
+            </tr>
+          </thead>
+          <tbody className="numbers">
+            {Object.entries(safe).map(([name, value]) => (
+              <tr key={name}>
+                <th scope="row">{name}</th>
+                <td data-number>{held[name] === undefined ? NOTHING : gainText(held[name])}</td>
+                <td data-number>{gainText(value)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+        {isKnown && sameHeld(held, safe) && (
+          <span className={classes["good"]}>
+            <IconCircleCheck size={18} aria-hidden /> It holds its safe gains
+          </span>
+        )}
+        {isKnown && !sameHeld(held, safe) && (
+          <span className={classes["bad"]}>
+            <IconAlertTriangle size={18} aria-hidden /> It holds other gains than the safe ones
+          </span>
+        )}
+        <p className={classes["quiet"]}>
+          {isKnown ? (
+            <>
+              Read back <Time at={vehicle.held_at} />.
+            </>
+          ) : (
+            "Nobody has read its gains yet."
+          )}{" "}
+          Every flight ends with the safe gains.
+        </p>
+        <div className={classes["row"]}>
+          <Button
+            variant="default"
+            disabled={!vehicle.actions.includes("restore")}
+            loading={restoring}
+            onClick={onRestore}
+          >
+            Restore safe gains
+          </Button>
+          <Button variant="subtle" disabled={!vehicle.actions.includes("edit")} onClick={() => setEditing(true)}>
+            Change the safe gains
+          </Button>
+        </div>
+      </div>
+    </Panel>
+  );
+}
+
+function SafeGainsForm({ vehicle, onDone }: { vehicle: Vehicle; onDone: () => void }) {
+  const [gains, setGains] = useState<Record<string, Value>>({ ...vehicle.safe_gains });
+  const [statement, setStatement] = useState("");
+  const edit = useEditVehicle(vehicle.id);
+  const fields = ["statement", ...Object.keys(gains).map((name) => `safe_gains.${name}`)];
+  const reasons = reasonsByField(problemOf(edit.error), fields);
+  const read = Object.entries(gains).filter((entry): entry is [string, number] => typeof entry[1] === "number");
+  return (
+    <Panel title="Change the safe gains">
+      <form
+        className={classes["stack"]}
+        onSubmit={(event) => {
+          event.preventDefault();
+          edit.mutate(
+            { version: vehicle.version, safe_gains: Object.fromEntries(read), statement: statement.trim() || null },
+            { onSuccess: onDone },
+          );
+        }}
+      >
+        <div className={classes["entries"]}>
+          {Object.keys(vehicle.safe_gains).map((name) => (
+            <Entry
+              key={name}
+              required
+              withAsterisk={false}
+              label={name}
+              value={gains[name] ?? ""}
+              error={reasons[`safe_gains.${name}`]}
+              onChange={(value) => setGains({ ...gains, [name]: value })}
+            />
+          ))}
+        </div>
+        <TextInput
+          label="Who decided that, and from which flights"
+          value={statement}
+          maxLength={500}
+          error={reasons["statement"]}
+          onChange={(event) => setStatement(event.currentTarget.value)}
+        />
+        <Trouble error={edit.error} shown={fields} />
+        <div className={classes["row"]}>
+          <Button
+            type="submit"
+            disabled={read.length < Object.keys(gains).length || statement.trim() === ""}
+            loading={edit.isPending}
+          >
+            These are the safe gains
+          </Button>
+          <Button variant="default" onClick={onDone}>
+            Leave them
+          </Button>
+        </div>
+      </form>
+    </Panel>
+  );
+}

@@ -1,0 +1,68 @@
+import { Button } from "@mantine/core";
+import { IconPlugConnected } from "@tabler/icons-react";
+import { Link } from "react-router";
+import { useAskVehicle } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { vehicleWords } from "../../lib/fleet";
+import { withUnit } from "../../lib/format";
+import { gainsInBrackets } from "../../lib/gains";
+import { linkText } from "../../lib/vehicle";
+import { useVehicleStatus } from "../../live/store";
+import { StateBadge } from "../StateBadge";
+import { Trouble } from "../Trouble";
+import { VehicleBadge } from "../VehicleBadge";
+import classes from "./VehicleCard.module.css";
+
+/** One vehicle in the list: how it is, what it holds, and the next thing to do with it. */
+export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
+  const status = useVehicleStatus(vehicle.registered ? vehicle.id : null);
+  const ask = useAskVehicle(vehicle.id);
+  const isLinked = vehicle.registered && vehicle.state !== "disconnected";
+  return (
+    <li className={classes["card"]} data-state={vehicle.state}>
+      <div className={classes["what"]}>
+        <h3 className={classes["name"]}>
+          <VehicleBadge isReal={vehicle.is_real} />
+          {vehicle.registered ? <Link to={`/vehicles/${vehicle.id}`}>{vehicle.name}</Link> : vehicle.name}
+          <StateBadge words={vehicleWords(vehicle)} />
+        </h3>
+        <dl className={`${classes["facts"]} numbers`}>
+          {isLinked && <Fact title="Link" value={linkText(status)} />}
+          {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
+          {vehicle.held !== null && <Fact title="Holds" value={gainsInBrackets(vehicle.held)} />}
+          <Fact
+            title={`Safe ${Object.keys(vehicle.safe_gains).join(", ")}`}
+            value={gainsInBrackets(vehicle.safe_gains)}
+          />
+          {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "nobody"} />}
+        </dl>
+        {vehicle.state === "quarantined" && <p className={classes["concern"]}>{vehicle.concern}</p>}
+        <Trouble error={ask.error} />
+      </div>
+      {vehicle.registered && vehicle.actions.includes("connect") && (
+        <Button
+          variant="default"
+          leftSection={<IconPlugConnected size={20} aria-hidden />}
+          loading={ask.isPending}
+          onClick={() => ask.mutate("connect")}
+        >
+          Connect
+        </Button>
+      )}
+      {vehicle.state === "quarantined" && (
+        <Button component={Link} to={`/vehicles/${vehicle.id}`} color="red" variant="outline">
+          Look at it
+        </Button>
+      )}
+    </li>
+  );
+}
+
+function Fact({ title, value }: { title: string; value: string }) {
+  return (
+    <div>
+      <dt>{title}</dt>
+      <dd>{value}</dd>
+    </div>
+  );
+}

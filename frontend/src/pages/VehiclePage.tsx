@@ -1,0 +1,108 @@
+import { Anchor, Button, Skeleton } from "@mantine/core";
+import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX } from "@tabler/icons-react";
+import { Link, useParams } from "react-router";
+import { type Asked, useAskVehicle } from "../api/fleet";
+import type { Vehicle } from "../api/types";
+import { useVehicles } from "../api/vehicles";
+import { ActList } from "../components/fleet/ActList";
+import { BatteryPanel } from "../components/fleet/BatteryPanel";
+import { CheckList } from "../components/fleet/CheckList";
+import { LedgerTable } from "../components/fleet/LedgerTable";
+import { LinkPanel } from "../components/fleet/LinkPanel";
+import { ParameterPanel } from "../components/fleet/ParameterPanel";
+import { QuarantinePanel } from "../components/fleet/QuarantinePanel";
+import { SafeGains } from "../components/fleet/SafeGains";
+import { Control } from "../components/fly/Control";
+import { Panel } from "../components/Panel";
+import { StateBadge } from "../components/StateBadge";
+import { Trouble } from "../components/Trouble";
+import { useTitle } from "../components/useTitle";
+import { VehicleBadge } from "../components/VehicleBadge";
+import { vehicleWords } from "../lib/fleet";
+import { NotFoundPage } from "./NotFoundPage";
+import classes from "./VehiclePage.module.css";
+
+export function VehiclePage() {
+  const vehicleId = Number(useParams()["vehicleId"]);
+  const vehicles = useVehicles();
+  const vehicle = vehicles.data?.find(({ id, registered }) => id === vehicleId && registered);
+  useTitle(vehicle?.name ?? "Vehicle");
+  if (vehicle !== undefined) return <VehicleView key={vehicle.id} vehicle={vehicle} />;
+  if (vehicles.error) return <Trouble error={vehicles.error} />;
+  return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;
+}
+
+/** One registered vehicle: its link, what it holds, what it was given and asked, and who is in control. */
+function VehicleView({ vehicle }: { vehicle: Vehicle }) {
+  const ask = useAskVehicle(vehicle.id);
+  const may = (act: Asked): boolean => vehicle.actions.includes(act);
+  const asking = ask.isPending ? ask.variables : null;
+  return (
+    <>
+      <div className={classes["head"]}>
+        <Anchor component={Link} to="/vehicles" className={classes["back"]}>
+          <IconChevronLeft size={20} aria-hidden />
+          Vehicles
+        </Anchor>
+        <h1 className={classes["title"]}>{vehicle.name}</h1>
+        <VehicleBadge isReal={vehicle.is_real} />
+        <StateBadge words={vehicleWords(vehicle)} />
+        <div className={classes["acts"]}>
+          {may("connect") && (
+            <Button
+              leftSection={<IconPlugConnected size={20} aria-hidden />}
+              loading={asking === "connect"}
+              onClick={() => ask.mutate("connect")}
+            >
+              Connect
+            </Button>
+          )}
+          {may("disconnect") && (
+            <Button
+              variant="default"
+              leftSection={<IconPlugConnectedX size={20} aria-hidden />}
+              loading={asking === "disconnect"}
+              onClick={() => ask.mutate("disconnect")}
+            >
+              Disconnect
+            </Button>
+          )}
+        </div>
+      </div>
+      <Trouble error={ask.error} />
+      {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
+      <div className={classes["grid"]}>
+        <LinkPanel vehicle={vehicle} />
+        <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
+        <Panel title="In control">
+          <Control vehicle={vehicle} />
+        </Panel>
+        <BatteryPanel vehicle={vehicle} />
+        <Panel
+          title="Preflight check"
+          className={classes["wide"]}
+          tools={
+            <Button
+              variant="default"
+              disabled={!may("check")}
+              loading={asking === "check"}
+              onClick={() => ask.mutate("check")}
+            >
+              Check now
+            </Button>
+          }
+        >
+          <CheckList vehicle={vehicle} />
+        </Panel>
+        <LedgerTable vehicleId={vehicle.id} />
+        <ActList vehicleId={vehicle.id} />
+        <ParameterPanel
+          vehicleId={vehicle.id}
+          mayRead={may("parameters")}
+          reading={asking === "parameters"}
+          onRead={() => ask.mutate("parameters")}
+        />
+      </div>
+    </>
+  );
+}
