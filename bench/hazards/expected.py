@@ -89,7 +89,7 @@ class _Judgement:
         if outcome == "refused" and self.took_off_s is not None:
             yield "a trial that took off left no record"
         if self.flown.flew_on is not None and not _same(self.flown.flew_on, self.case.gains):
-            yield f"it was told to take off holding {dict(self.flown.flew_on)}"
+            yield f"it lifted off holding {dict(self.flown.flew_on)}"
 
     def _on_ground(self) -> Iterator[Cause]:
         """From the first packet to arming."""
@@ -164,8 +164,10 @@ class _Judgement:
         """What speaks against the gains."""
         if self.began_in(ABORT, *AIR):
             yield Cause("F8", "aborted", had_to=True)
-        if self.began_in(MOTORS_OFF, *AIR, *DESCENT, Stage.DISARM, Stage.RESTORE):
+        if self.began_in(MOTORS_OFF, *AIR, *DESCENT):
             yield Cause("motors off", "aborted", had_to=True)
+        if self.began_in(MOTORS_OFF, Stage.DISARM, Stage.RESTORE):
+            yield Cause("motors off", "aborted")
         motorless_s = self.within(self.of("no-lift-off"), *AIR)
         if motorless_s > 0.0:
             yield Cause("F4/F6", "aborted", had_to=motorless_s > 3.0 + LIFT_OFF_S[self.case.autopilot])

@@ -16,7 +16,7 @@ from bench.hazards.stages import Stages
 class Flown:
     """What came of a case. `outcome`: completed, aborted, invalid (a record was left) or refused (nothing flew).
     `vehicle`: what the program says of it afterwards: safe, quarantined, or unopened (it never had control).
-    `flew_on`: the gains that it truly held when it was told to take off."""
+    `flew_on`: the gains that it truly held when it left the ground."""
 
     outcome: str
     vehicle: str

@@ -164,8 +164,6 @@ class Rig:
             self.stops.append(Stopping(now_s, height_m))
         if self.stages.now is None or self.stages.over_s < now_s:
             return
-        if told is Order.TAKE_OFF:
-            self.flew_on = self.held()
         acting = [each for each in self.struck if each.begun_s <= now_s < each.ended_s]
         silent = [each.begun_s for each in acting if each.kind in SILENCING]
         self.stages.hear(
@@ -184,6 +182,8 @@ class Rig:
         if self.stages.over_s < now_s:
             return
         self.stages.height(self.drone.body.altitude_m, now_s)
+        if self.flew_on is None and self.stages.now is Stage.RECORD:
+            self.flew_on = self.held()
         for mishap in tuple(self._waiting):
             since_s = self.stages.first_s(mishap.stage)
             if since_s is not None and now_s >= since_s + mishap.delay_s:

@@ -153,7 +153,7 @@ WRONG: Final[list[tuple[Flown, str]]] = [
     (flown(Struck("reboot", Stage.RECORD, 20.0, 22.0), outcome="invalid"), "was not quarantined"),
     (flown(Struck("jumping-position", Stage.RECORD, 20.0, 30.0)), "F9b invalid was to be met"),
     (flown(Struck("low-battery", Stage.ARM, 9.2, 99.0)), "F7 invalid"),
-    (flown(flew_on=SAFE["paparazzi"]), "it was told to take off holding"),
+    (flown(flew_on=SAFE["paparazzi"]), "it lifted off holding"),
 ]
 
 
