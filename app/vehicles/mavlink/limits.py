@@ -23,6 +23,8 @@ _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
 _MOST_GLITCHES: Final = 3
+_OWN_CEILING_M: Final = 0.5
+"""How far below our ceiling a vehicle's own may be."""
 _LOW_BATTERY_S: Final = 1.0
 _NO_BATTERY_S: Final = 10.0
 _REBOOT_S: Final = 1.0
@@ -213,14 +215,19 @@ def find_unexpected(watch: Watch, modes: frozenset[str], blocks: frozenset[str] 
     return None
 
 
-def find_own_landing(watch: Watch, limits: Limits, *, mode_known: bool) -> Finding | None:
-    """For a vehicle that should fly. `mode_known`: its mode is not the one from before the command."""
+def find_own_landing(watch: Watch, limits: Limits, ground_m: float, *, mode_known: bool) -> Finding | None:
+    """For a vehicle that should fly. `mode_known`: its mode is not the one from before the command. So high up it is
+    the vehicle's own ceiling, somewhat below ours, that was met."""
     why = ""
     if mode_known and watch.mode in limits.landing_modes - limits.flying_modes:
         why = f"It went into mode {watch.mode}."
     elif watch.block in limits.landing_blocks:
         why = f"Its flight plan went to the block “{watch.block}”."
-    return Finding(failure=Failure.OWN_LANDING, why=why) if why else None
+    if not why or watch.last is None:
+        return None
+    if (height_m := watch.last.altitude_m - ground_m) > limits.ceiling_m - _OWN_CEILING_M:
+        return Finding(failure=Failure.ENVELOPE, why=f"It was {height_m:.2f} m above the ground. {why}")
+    return Finding(failure=Failure.OWN_LANDING, why=why)
 
 
 def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:

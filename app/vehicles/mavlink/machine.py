@@ -249,7 +249,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
         watching.find_unexpected(watch, _modes(trial), _blocks(trial))
         or watching.find_link(watch, plan.limits, now_s)
         or watching.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
-        or watching.find_own_landing(watch, plan.limits, mode_known=bool(_modes(trial)))
+        or watching.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
         or watching.find_frozen(watch, plan.limits, now_s)
         or agreement.find_disagreement(watch.second)
         or watching.find_battery(watch, now_s)

@@ -72,6 +72,15 @@ def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
 
 
+def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains() -> None:
+    walk = Walk(plan=WITH_BLOCKS).lift_off()
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
+    assert "Its flight plan went to the block “land”." in walk.trial.why
+    assert walk.gains_sent[0] == walk.plan.safe_gains[0]
+
+
 def test_a_flight_plan_that_goes_where_nobody_sent_it_is_left_alone() -> None:
     walk = Walk(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
