@@ -152,8 +152,8 @@ export function useArchive(campaignId: number) {
 }
 
 export interface Cloning {
-  /** Another vehicle's kind; without it the same vehicle with its settings. */
-  vehicle?: string;
+  /** Another vehicle; without it the same one with its settings. */
+  vehicle?: NonNullable<NewCampaignInput["vehicle"]>;
   warmStart: boolean;
 }
 
@@ -164,7 +164,7 @@ export function useClone(campaignId: number) {
       answer(
         cloneCampaign({
           path: { campaign_id: campaignId },
-          body: { warm_start: warmStart, ...(vehicle === undefined ? {} : { vehicle: { kind: vehicle } }) },
+          body: { warm_start: warmStart, ...(vehicle === undefined ? {} : { vehicle }) },
         }),
       ),
     onSuccess: settled.campaign,

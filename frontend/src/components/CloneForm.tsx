@@ -5,7 +5,8 @@ import { useNavigate } from "react-router";
 import { useClone } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import type { Campaign } from "../api/types";
-import { kindsFor } from "../lib/newCampaign";
+import { useVehicles } from "../api/vehicles";
+import { kindsFor, registeredFor } from "../lib/newCampaign";
 import { Help } from "./Help";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
@@ -13,19 +14,27 @@ import { Trouble } from "./Trouble";
 /** The same settings again, on this vehicle or another, from the start or from what this campaign has reached. */
 export function CloneForm({ campaign }: { campaign: Campaign }) {
   const navigate = useNavigate();
-  const [vehicle, setVehicle] = useState(campaign.vehicle.kind);
+  const own = campaign.vehicle.registered ? String(campaign.vehicle.id) : campaign.vehicle.kind;
+  const [vehicle, setVehicle] = useState(own);
   const [warm, setWarm] = useState(false);
   const clone = useClone(campaign.id);
   const catalogue = useCatalogue().data;
-  const kinds = catalogue === undefined ? [] : kindsFor(catalogue, campaign.definition.experiment ?? "takeoff");
+  const experiment = campaign.definition.experiment ?? "takeoff";
+  const registered = registeredFor(useVehicles().data ?? [], experiment);
+  const kinds = catalogue === undefined ? [] : kindsFor(catalogue, experiment);
+  const chosen = registered.find(({ id }) => String(id) === vehicle);
+  const choice = chosen === undefined ? { kind: vehicle } : { kind: chosen.kind, id: chosen.id };
   return (
     <div className={classes["clone"]}>
       <Select
         label="Same settings again, on"
         allowDeselect={false}
-        data={kinds.map(({ name, title }) => ({ value: name, label: title }))}
+        data={[
+          ...registered.map(({ id, name }) => ({ value: String(id), label: name })),
+          ...kinds.map(({ name, title }) => ({ value: name, label: title })),
+        ]}
         value={vehicle}
-        onChange={(kind) => setVehicle(kind ?? vehicle)}
+        onChange={(key) => setVehicle(key ?? vehicle)}
       />
       {campaign.best !== null && (
         <div className={classes["warm"]}>
@@ -50,7 +59,7 @@ export function CloneForm({ campaign }: { campaign: Campaign }) {
         onClick={() =>
           // The same vehicle keeps its settings, another one starts from its own defaults.
           clone.mutate(
-            { warmStart: warm, ...(vehicle === campaign.vehicle.kind ? {} : { vehicle }) },
+            { warmStart: warm, ...(vehicle === own ? {} : { vehicle: choice }) },
             { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
           )
         }

@@ -1,30 +1,77 @@
-import { Radio } from "@mantine/core";
-import type { VehicleKindInfo } from "../api/types";
+import { Button, Radio } from "@mantine/core";
+import { Link } from "react-router";
+import type { Vehicle, VehicleKindInfo } from "../api/types";
+import { autopilotTitle, vehicleWords } from "../lib/fleet";
+import { StateBadge } from "./StateBadge";
 import { VehicleBadge } from "./VehicleBadge";
 import classes from "./VehiclePicker.module.css";
 
 interface Props {
   kinds: readonly VehicleKindInfo[];
-  value: string;
+  registered: readonly Vehicle[];
+  /** Registered vehicles that fly another experiment: choosing one changes it. */
+  others: readonly Vehicle[];
+  kind: string;
+  vehicleId: number | null;
   error: string | undefined;
-  onChange: (kind: string) => void;
+  onKind: (kind: string) => void;
+  onVehicle: (vehicle: Vehicle) => void;
 }
 
-export function VehiclePicker({ kinds, value, error, onChange }: Props) {
+const keyOf = (vehicleId: number): string => `vehicle ${vehicleId}`;
+
+/** What flies: a registered vehicle, or a simulation that campaigns share. */
+export function VehiclePicker({ kinds, registered, others, kind, vehicleId, error, onKind, onVehicle }: Props) {
+  const choose = (key: string): void => {
+    const chosen = registered.find(({ id }) => keyOf(id) === key);
+    if (chosen === undefined) onKind(key);
+    else onVehicle(chosen);
+  };
   return (
-    <Radio.Group size="md" label="Vehicle" value={value} onChange={onChange} error={error}>
-      <div className={classes["cards"]}>
-        {kinds.map((kind) => (
-          <Radio.Card key={kind.name} value={kind.name} className={classes["card"]}>
-            <span className={classes["top"]}>
-              <VehicleBadge isReal={kind.is_real} />
-              <Radio.Indicator size="md" />
-            </span>
-            <strong>{kind.title}</strong>
-            <span className={classes["line"]}>{kind.line}</span>
-          </Radio.Card>
+    <div>
+      <Radio.Group
+        size="md"
+        label="Vehicle"
+        value={vehicleId === null ? kind : keyOf(vehicleId)}
+        onChange={choose}
+        error={error}
+      >
+        <div className={classes["cards"]}>
+          {registered.map((vehicle) => (
+            <Radio.Card key={vehicle.id} value={keyOf(vehicle.id)} className={classes["card"]}>
+              <Top isReal={vehicle.is_real} />
+              <strong>{vehicle.name}</strong>
+              <span className={classes["line"]}>{autopilotTitle(vehicle)}</span>
+              <StateBadge words={vehicleWords(vehicle)} />
+            </Radio.Card>
+          ))}
+          {kinds.map(({ name, title, line, is_real }) => (
+            <Radio.Card key={name} value={name} className={classes["card"]}>
+              <Top isReal={is_real} />
+              <strong>{title}</strong>
+              <span className={classes["line"]}>{line}</span>
+            </Radio.Card>
+          ))}
+        </div>
+      </Radio.Group>
+      <div className={classes["more"]}>
+        {others.length > 0 && <span>With another experiment:</span>}
+        {others.map((vehicle) => (
+          <Button key={vehicle.id} variant="default" onClick={() => onVehicle(vehicle)}>
+            {vehicle.name}
+          </Button>
         ))}
+        <Link to="/vehicles/new">Register a vehicle</Link>
       </div>
-    </Radio.Group>
+    </div>
+  );
+}
+
+function Top({ isReal }: { isReal: boolean }) {
+  return (
+    <span className={classes["top"]}>
+      <VehicleBadge isReal={isReal} />
+      <Radio.Indicator size="md" />
+    </span>
   );
 }

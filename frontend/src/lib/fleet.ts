@@ -51,6 +51,10 @@ export const AUTOPILOTS = [
   { value: "px4", label: "PX4" },
 ] as const;
 
+export function autopilotTitle({ options }: Pick<Vehicle, "options">): string {
+  return AUTOPILOTS.find(({ value }) => value === options["autopilot"])?.label ?? "";
+}
+
 const KIND = "mavlink";
 /** Options with a place of their own in the form. */
 const PLAIN: ReadonlySet<string> = new Set(["autopilot", "address", "simulated"]);

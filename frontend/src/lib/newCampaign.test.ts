@@ -1,14 +1,18 @@
 import { expect, test } from "vitest";
-import type { CampaignSummary, Catalogue } from "../api/types";
+import type { CampaignSummary, Catalogue, Vehicle } from "../api/types";
 import {
   fieldsOf,
   firstPreset,
+  flyingOther,
   kindsFor,
+  optionsOf,
+  registeredFor,
   requestFrom,
   startingForm,
   startsFor,
   strategiesFor,
   withExperiment,
+  withRegistered,
   withVehicle,
 } from "./newCampaign";
 
@@ -68,6 +72,10 @@ const catalogue = {
     { name: "ardrone", title: "Simulated takeoff", campaign: { vehicle: { kind: "jsbsim" } } },
   ],
 } as unknown as Catalogue;
+
+const bee = { id: 7, kind: "mavlink", name: "Bee", registered: true, experiments: ["takeoff"] } as Vehicle;
+const wasp = { ...bee, id: 8, name: "Wasp", experiments: ["takeoff-px4"] };
+const shared = { ...bee, id: 1, kind: "twin", registered: false };
 
 test("the form as it comes creates the recommended campaign on the simulation", () => {
   const form = startingForm(catalogue);
@@ -175,4 +183,37 @@ test("without a model gains are chosen by hand, in small steps, and no start is 
   expect(form).toMatchObject({ strategy: "manual", vehicle: "import", firstStepPercent: 25, stepPercent: 25 });
   expect(startsFor(catalogue, "takeoff-px4")).toEqual(["default", "campaign", "given"]);
   expect(startsFor(catalogue, "takeoff")).toContain("simplex");
+});
+
+test("registered vehicles are offered where they have the experiment's gains, shared ones by their kinds alone", () => {
+  const vehicles = [shared, bee, wasp];
+  expect(registeredFor(vehicles, "takeoff")).toEqual([bee]);
+  expect(flyingOther(vehicles, "takeoff")).toEqual([wasp]);
+});
+
+test("a registered vehicle is asked for by its id, with the settings that stand at it", () => {
+  const mine = { ...startingForm(catalogue), vehicleOptions: { mass_kg: 0.5 } };
+  const form = withRegistered(mine, catalogue, bee);
+  expect(requestFrom(form, catalogue)).toMatchObject({
+    name: "Takeoff to 3 m, Bee",
+    vehicle: { kind: "mavlink", id: 7 },
+  });
+  expect(requestFrom(form, catalogue).vehicle).not.toHaveProperty("options");
+  expect(optionsOf(form, catalogue).vehicle).toEqual([]);
+  expect(requestFrom(withVehicle(form, catalogue, "twin"), catalogue)).toMatchObject({
+    name: "Twin takeoff",
+    vehicle: { kind: "twin", options: {} },
+  });
+});
+
+test("a vehicle that flies another experiment brings it along, with its gains; a name of one's own stays", () => {
+  const form = withRegistered({ ...startingForm(catalogue), name: "Mine", maxFlights: 12 }, catalogue, wasp);
+  expect(form).toMatchObject({
+    experiment: "takeoff-px4",
+    strategy: "manual",
+    startGains: { MPC_Z_P: 1 },
+    maxFlights: 12,
+    name: "Mine",
+  });
+  expect(requestFrom(form, catalogue).vehicle).toEqual({ kind: "mavlink", id: 8 });
 });

@@ -1,17 +1,29 @@
 /** The form of a new campaign: working defaults in, the request out. Number fields hold text while it is not a number. */
 
-import type { CampaignSummary, Catalogue, NewCampaign, OptionInfo, PresetInfo, VehicleKindInfo } from "../api/types";
+import type {
+  CampaignSummary,
+  Catalogue,
+  NewCampaign,
+  OptionInfo,
+  PresetInfo,
+  Vehicle,
+  VehicleKindInfo,
+} from "../api/types";
 
 export type Entry = number | string;
 export type OptionValue = boolean | number | string;
 export type StartKind = "default" | "simplex" | "given" | "campaign";
 export type StopKind = "paper" | "noise" | "budget";
 
+/** A registered vehicle, as far as the form needs it: its settings stand at the vehicle. */
+export type Chosen = Pick<Vehicle, "id" | "kind" | "name" | "experiments">;
+
 export interface CampaignForm {
   name: string;
   experiment: string;
   experimentOptions: Record<string, OptionValue>;
   vehicle: string;
+  registered: Chosen | null;
   vehicleOptions: Record<string, OptionValue>;
   strategy: string;
   strategyOptions: Record<string, OptionValue>;
@@ -59,6 +71,16 @@ export function kindsFor(catalogue: Catalogue, experiment: string): VehicleKindI
   return shared.sort((one, other) => rank(one) - rank(other));
 }
 
+/** Registered vehicles that fly this experiment. */
+export function registeredFor<T extends Vehicle>(vehicles: readonly T[], experiment: string): T[] {
+  return vehicles.filter(({ registered, experiments }) => registered && fits(experiments, experiment));
+}
+
+/** Registered vehicles that fly another one. */
+export function flyingOther<T extends Vehicle>(vehicles: readonly T[], experiment: string): T[] {
+  return vehicles.filter(({ registered, experiments }) => registered && !fits(experiments, experiment));
+}
+
 /** Strategies that work with this experiment, in the catalogue's order: the first one is recommended. */
 export function strategiesFor(catalogue: Catalogue, experiment: string) {
   return catalogue.strategies.filter((strategy) => fits(strategy.experiments, experiment));
@@ -92,6 +114,7 @@ export function startingForm(
     experiment,
     experimentOptions: {},
     vehicle,
+    registered: null,
     vehicleOptions: {},
     strategy: strategiesFor(catalogue, experiment)[0]?.name ?? "gradient",
     strategyOptions: {},
@@ -111,14 +134,22 @@ export function startingForm(
   };
 }
 
-function isNamedByHand(form: CampaignForm, catalogue: Catalogue): boolean {
-  return form.name !== nameFor(catalogue, form.experiment, form.vehicle);
+function isNamedByHand({ name, experiment, vehicle, registered }: CampaignForm, catalogue: Catalogue): boolean {
+  return name !== nameFor(catalogue, experiment, registered?.name ?? vehicle);
 }
 
 /** Another vehicle has other settings; a name that nobody has changed follows it. */
 export function withVehicle(form: CampaignForm, catalogue: Catalogue, vehicle: string): CampaignForm {
   const name = isNamedByHand(form, catalogue) ? form.name : nameFor(catalogue, form.experiment, vehicle);
-  return { ...form, vehicle, vehicleOptions: {}, name };
+  return { ...form, vehicle, registered: null, vehicleOptions: {}, name };
+}
+
+/** A registered vehicle has settings of its own, and brings its experiment where it does not fly the chosen one. */
+export function withRegistered(form: CampaignForm, catalogue: Catalogue, registered: Chosen): CampaignForm {
+  const own = registered.experiments[0] ?? form.experiment;
+  const suited = fits(registered.experiments, form.experiment) ? form : withExperiment(form, catalogue, own);
+  const name = isNamedByHand(suited, catalogue) ? suited.name : nameFor(catalogue, suited.experiment, registered.name);
+  return { ...suited, vehicle: registered.kind, registered, vehicleOptions: {}, name };
 }
 
 /** Another experiment has other gains, vehicles and strategies: everything but the stop rule begins anew. */
@@ -174,7 +205,9 @@ function stopFrom(form: CampaignForm): NonNullable<Definition["stop"]> {
 export function requestFrom(form: CampaignForm, catalogue: Catalogue): NewCampaign {
   return {
     name: form.name,
-    vehicle: { kind: form.vehicle, options: form.vehicleOptions },
+    vehicle: form.registered
+      ? { kind: form.registered.kind, id: form.registered.id }
+      : { kind: form.vehicle, options: form.vehicleOptions },
     definition: {
       experiment: form.experiment,
       experiment_options: form.experimentOptions,
@@ -202,7 +235,7 @@ export function optionsOf(form: CampaignForm, catalogue: Catalogue): OffersOptio
   return {
     experiment: catalogue.experiments.find(({ name }) => name === form.experiment)?.options ?? [],
     strategy: catalogue.strategies.find(({ name }) => name === form.strategy)?.options ?? [],
-    vehicle: catalogue.vehicle_kinds.find(({ name }) => name === form.vehicle)?.options ?? [],
+    vehicle: form.registered ? [] : (catalogue.vehicle_kinds.find(({ name }) => name === form.vehicle)?.options ?? []),
   };
 }
 
@@ -215,6 +248,7 @@ export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: str
       "name",
       "definition.experiment",
       "vehicle.kind",
+      "vehicle.id",
       "strategy",
       "start.kind",
       ...(form.start === "given" ? gains.map((name) => `start.gains.${name}`) : []),

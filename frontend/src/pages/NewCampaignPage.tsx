@@ -1,10 +1,11 @@
 import { Accordion, Button, Select, Skeleton, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
-import { useNavigate } from "react-router";
+import { useNavigate, useSearchParams } from "react-router";
 import { useCreateCampaign } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
-import type { Catalogue } from "../api/types";
+import type { Catalogue, Vehicle } from "../api/types";
+import { useVehicles } from "../api/vehicles";
 import { AdvancedFields } from "../components/AdvancedFields";
 import { DonorPicker } from "../components/DonorPicker";
 import { Entry } from "../components/Entry";
@@ -14,8 +15,10 @@ import { VehiclePicker } from "../components/VehiclePicker";
 import {
   type CampaignForm,
   fieldsOf,
+  flyingOther,
   gainsOf,
   kindsFor,
+  registeredFor,
   requestFrom,
   type StartKind,
   startingForm,
@@ -23,20 +26,31 @@ import {
   strategiesFor,
   unreadable,
   withExperiment,
+  withRegistered,
   withVehicle,
 } from "../lib/newCampaign";
 import { problemOf, reasonsByField } from "../lib/problems";
 import classes from "./NewCampaignPage.module.css";
 
+/** With `?vehicle=ID` that registered vehicle is chosen already. */
 export function NewCampaignPage() {
   useTitle("New campaign");
   const catalogue = useCatalogue();
+  const vehicles = useVehicles();
+  const wanted = Number(useSearchParams()[0].get("vehicle"));
+  const error = catalogue.error ?? vehicles.error;
   return (
     <div className={classes["page"]}>
       <h1 className={classes["title"]}>New campaign</h1>
-      {catalogue.data && <NewCampaignForm catalogue={catalogue.data} />}
-      {catalogue.error && <Trouble error={catalogue.error} />}
-      {catalogue.isPending && <Skeleton height={420} radius="md" />}
+      {catalogue.data && vehicles.data && (
+        <NewCampaignForm
+          catalogue={catalogue.data}
+          vehicles={vehicles.data}
+          wanted={vehicles.data.find(({ id, registered }) => registered && id === wanted)}
+        />
+      )}
+      {error && <Trouble error={error} />}
+      {(catalogue.isPending || vehicles.isPending) && <Skeleton height={420} radius="md" aria-busy="true" />}
     </div>
   );
 }
@@ -48,8 +62,17 @@ const STARTS: Record<StartKind, string> = {
   given: "Gains of my own",
 };
 
-function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
-  const [form, setForm] = useState<CampaignForm>(() => startingForm(catalogue));
+interface FormProps {
+  catalogue: Catalogue;
+  vehicles: readonly Vehicle[];
+  wanted: Vehicle | undefined;
+}
+
+function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
+  const [form, setForm] = useState<CampaignForm>(() => {
+    const start = startingForm(catalogue);
+    return wanted === undefined ? start : withRegistered(start, catalogue, wanted);
+  });
   const navigate = useNavigate();
   const create = useCreateCampaign();
   const { plain, advanced } = fieldsOf(form, catalogue);
@@ -82,9 +105,13 @@ function NewCampaignForm({ catalogue }: { catalogue: Catalogue }) {
       )}
       <VehiclePicker
         kinds={kindsFor(catalogue, form.experiment)}
-        value={form.vehicle}
-        error={reasons["vehicle.kind"]}
-        onChange={(vehicle) => setForm(withVehicle(form, catalogue, vehicle))}
+        registered={registeredFor(vehicles, form.experiment)}
+        others={flyingOther(vehicles, form.experiment)}
+        kind={form.vehicle}
+        vehicleId={form.registered?.id ?? null}
+        error={reasons["vehicle.kind"] ?? reasons["vehicle.id"]}
+        onKind={(kind) => setForm(withVehicle(form, catalogue, kind))}
+        onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
       />
       <TextInput
         label="Name"

@@ -1,5 +1,5 @@
 import { Anchor, Button, Skeleton } from "@mantine/core";
-import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX } from "@tabler/icons-react";
+import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
 import { Link, useParams } from "react-router";
 import { type Asked, useAskVehicle } from "../api/fleet";
 import type { Vehicle } from "../api/types";
@@ -48,6 +48,14 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
         <VehicleBadge isReal={vehicle.is_real} />
         <StateBadge words={vehicleWords(vehicle)} />
         <div className={classes["acts"]}>
+          <Button
+            component={Link}
+            to={`/new?vehicle=${vehicle.id}`}
+            variant="default"
+            leftSection={<IconPlus size={20} aria-hidden />}
+          >
+            New campaign
+          </Button>
           {may("connect") && (
             <Button
               leftSection={<IconPlugConnected size={20} aria-hidden />}
