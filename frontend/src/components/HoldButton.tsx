@@ -89,7 +89,7 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
           <circle cx={24} cy={24} r={20} strokeDasharray={AROUND} strokeDashoffset={AROUND * (1 - (share ?? 0))} />
           <IconPlaneDeparture x={13} y={13} size={22} />
         </svg>
-        <span>{share === null ? label : `Keep holding: ${(2 * (1 - share)).toFixed(1)} s`}</span>
+        <span>{share === null ? label : `Hold on: ${(2 * (1 - share)).toFixed(1)} s`}</span>
       </button>
       <p id={note} className={classes["note"]}>
         Two seconds, by finger or pointer. Letting go earlier cancels; no key does it.

@@ -50,6 +50,7 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
   expect(stateWord(trial, "flying", statusAt("record", 0.1), false)).toEqual({ word: "Recording", tone: "busy" });
   expect(stateWord(trial, "flying", statusAt("abort-land", 0.1), false).tone).toBe("bad");
   expect(stateWord(trial, "flying", statusAt("record", 4), false).word).toBe("Link lost");
+  expect(stateWord(trial, "flying", statusAt("idle", 0.1), false).word).toBe("Starting");
   expect(stateWord(trial, "flying", null, false).word).toBe("Flying");
   expect(stateWord(trial, "flying", statusAt("idle", 0.1), true).word).toBe("Quarantined");
   expect(stateWord({ state: "lost", flight }, "judge", null, false).word).toBe("Lost");

@@ -65,6 +65,7 @@ export function stateWord(trial: Standing, step: FlyStep, status: Aged | null, q
       const isBad = status.status.step === "link lost" || status.status.step === "abort-land";
       return { word: stepWord(status.status.step), tone: isBad ? "bad" : "busy" };
     }
+    if (!quarantined) return { word: "Starting", tone: "busy" };
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialWords(trial.state);

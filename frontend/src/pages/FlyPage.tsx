@@ -71,7 +71,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const isFlying = step === "flying";
   const steps = { campaign, trial, step, abort };
   return (
-    <div className={classes["screen"]}>
+    <div className={classes["screen"]} data-step={step}>
       <div className={classes["head"]}>
         <Anchor component={Link} to={`/campaigns/${campaign.id}`} className={classes["back"]}>
           <IconChevronLeft size={20} aria-hidden />

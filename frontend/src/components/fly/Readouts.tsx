@@ -50,8 +50,8 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const linked = status?.status;
   const stale = hasLink && !(status?.isCurrent ?? false);
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
-  const error = isFlying ? live?.errorSoFar : (trial.error ?? live?.errorSoFar);
-  const errorTitle = trial.error !== null && !isFlying ? "Error" : "Error so far";
+  const error = isFlying ? live?.errorSoFar : trial.error;
+  const errorTitle = isFlying ? "Error so far" : "Error";
   const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
     <dl className={`${classes["readouts"]} numbers`}>
@@ -71,7 +71,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
         <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
         {hasLink && <LinkReading status={status} />}
         {isFlying ? (
-          <Reading title="Record ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
+          <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
         ) : (
           <Reading title="Record lasts" value={withUnit(endS, "s", 0)} />
         )}
