@@ -143,9 +143,23 @@ How often each mishap set in in each state:
 {where}
 
 `other-mode` and `other-landing` are another ground station's; `motors-off` is the operator's separate act; with
-`wild-gains` the gains of the trial leave its limits or come down.
+`wild-gains` the gains of the trial do not fly; `mocap-…` are faults of a second source of altitude, which only these
+trials have.
 
 What came of runs in which nothing else set in:
 
 {ends}
+
+## What such runs found
+
+All of it was mended, and is flown again by `tests/bench/test_faults.py`:
+
+- A stop or a refusal between the staging of the gains and arming left these gains on the vehicle until it was closed.
+- An autopilot that restarted while gains were staged was flown on its own, and the record was taken for the staged ones'.
+- With a position that jumps now and then, a vehicle on the ground was never at rest for two seconds: it was quarantined
+  after 40 s.
+- Gains that overshoot to the ceiling of the vehicle's own flight plan passed for a landing that the vehicle began by
+  itself: it was landed on these gains, and nothing was learnt of them.
+
+What the runs do not have: sideways movement, radios that lose single packets, autopilots of other makes, hardware.
 """
