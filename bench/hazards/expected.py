@@ -147,7 +147,7 @@ class _Judgement:
             ("F10", self.of_flight(OTHER_MODE), 0.0, 1.0 + 2.0 * self.heartbeat_s + SLACK_S),
             ("F11", self.of_flight(OTHER_LANDING), 0.0, 1.0 + 2.0 * self.heartbeat_s + SLACK_S),
         ):
-            watched = (Stage.ARM, *AIR) if failure in ("F5", "F7", "F9c") and self.took_off_s is not None else AIR
+            watched = AIR if self.took_off_s is None else (Stage.ARM, *AIR)
             lasted_s = self.within(spans, *watched)
             if lasted_s > may_s:
                 yield Cause(failure, "invalid", had_to=lasted_s > must_s)

@@ -134,6 +134,96 @@ real-flight.md) asks:
 
 {right} of {runs} runs (seeds {seeds}; {autopilots}) ended as asked.{wrong}
 
+- The trials: {outcomes}.
+- The vehicles afterwards: {vehicles} (the program never had control of one that could not be opened).
+- {stops} packets that stop motors were sent; but for those of the operator's own act, none with the drone higher than
+  {highest} m above the ground.
+
+How often each mishap set in in each state."""
+    counted = Counter((each["kind"], each["stage"]) for line in lines for each in _struck(line))
+    wrong = Counter((each["kind"], each["stage"]) for line in lines if line["wrong"] for each in _struck(line))
+    yield from _header("what sets in", [str(stage) for stage in Stage])
+    for kind in MISHAPS:
+        cells = [(counted[kind, stage], wrong[kind, stage]) for stage in Stage]
+        yield _row(kind, [f"{count}{f' ({bad} wrong)' if bad else ''}" if count else "" for count, bad in cells])
+
+
+def _ends(lines: Sequence[Line]) -> Iterator[str]:
+    """What came of runs in which nothing else set in."""
+    yield from _header("what set in, alone", [*OUTCOMES, *VEHICLE])
+    for kind in MISHAPS:
+        alone = [line for line in lines if {each["kind"] for each in _struck(line)} == {kind}]
+        counts = [sum(line.get("outcome") == name for line in alone) for name in OUTCOMES]
+        counts += [sum(line.get("vehicle") == name for line in alone) for name in VEHICLE]
+        yield _row(kind, [str(count or "") for count in counts])
+
+
+def _header(first: str, columns: Sequence[str]) -> Iterator[str]:
+    yield _row(first, columns)
+    yield _row("---", ["---"] * len(columns))
+
+
+def _row(first: str, cells: Sequence[str]) -> str:
+    return f"| {first} | {' | '.join(cells)} |"
+
+
+def _struck(line: Line) -> list[_Struck]:
+    return cast("list[_Struck]", line.get("struck", []))
+
+
+def _wrong(line: Line) -> list[str]:
+    return cast("list[str]", line["wrong"])
+
+
+def _counts(lines: Sequence[Line], field: str, names: Sequence[str]) -> str:
+    counted: Mapping[object, int] = Counter(line.get(field) for line in lines)
+    return ", ".join(f"{counted.get(name, 0)} {name}" for name in names)
+
+
+def _total(lines: Sequence[Line], field: str) -> int:
+    return sum(cast("int", line.get(field, 0)) for line in lines)
+
+
+def _highest(lines: Sequence[Line]) -> float:
+    """Of the packets that stop motors, without those of the operator's own act."""
+    return max((cast("float", line.get("highest_stop_m", 0.0)) for line in lines), default=0.0)
+
+
+_PAGE: Final = """\
+# Trials with faults
+
+    ./dev exec python -m bench.faults --runs {runs} --seed {first}
+    ./dev exec python -m bench.faults --only {first}
+
+Whole trials of [real-flight.md](real-flight.md), each with one or two things wrong: the simulated drone's faults
+([sim-drone.md](sim-drone.md)), an operator who aborts or stops the motors, another ground station that interferes,
+gains that do not fly. Without arguments, as `.ci/run` has it, the first command flies a sample of 20; `--only SEED`
+flies one run again and prints all that is known of it. This page is written by `--out docs`.
+
+A run is drawn from its seed: autopilot, gains, what sets in, in which state of the trial, how long after its
+beginning and for how long (a fifth of a second to for good). Consecutive seeds go through everything in every state.
+The vehicle is the simulated drone behind a UDP socket on the loopback interface, in the body of `twin` with its
+scatter; the program is `MavlinkVehicle` as it flies. Both live in the drone's time, which waits for the program's
+threads, so a busy machine changes nothing but the duration; a run that is flown again differs by some milliseconds.
+
+What the program does is judged without asking it. A tap at the drone's antenna reads every packet that the ground
+sends, whether the drone hears it or not, and knows the drone's true height at that moment. The states in the tables
+are told from these packets. Afterwards the judgement (`bench/hazards/expected.py`, written from the table in
+real-flight.md) asks:
+
+- Is the trial worth what the table says for what set in, when it did, and for how long it lasted?
+- Does the drone truly hold its safe gains, disarmed on the ground? Or was it quarantined, for a reason that the table
+  knows? A program that says “safe” must be right, and quarantine without need is wrong too.
+- Did no packet that stops motors leave while the drone was more than 0.15 m above the ground, but for the operator's
+  separate act?
+- Did it take off on other gains than those that were read back? Was Land sent first, or the safe gains, as the table
+  has it; was Land repeated every second while the link was lost; was anything sent before a heartbeat was heard?
+- Was every limit of time kept: the record, 40 s to land, 5 s to disarm, 60 s without a link?
+
+## Result
+
+{right} of {runs} runs (seeds {seeds}; {autopilots}) ended as asked.{wrong}
+
 The trials: {outcomes}. The vehicles afterwards: {vehicles} (a vehicle that could not be opened was never in the
 program's hands). {stops} packets that stop motors were sent, the highest, those of the operator's own act aside, with
 the drone {highest} m above the ground.
@@ -155,7 +245,7 @@ What came of runs in which nothing else set in:
 All of it was mended, and is flown again by `tests/bench/test_faults.py`:
 
 - A stop or a refusal between the staging of the gains and arming left these gains on the vehicle until it was closed.
-- An autopilot that restarted while gains were staged was flown on its own, and the record was taken for the staged ones'.
+- An autopilot that restarted while gains were staged was flown on its own; the record was taken for the staged ones'.
 - With a position that jumps now and then, a vehicle on the ground was never at rest for two seconds: it was quarantined
   after 40 s.
 - Gains that overshoot to the ceiling of the vehicle's own flight plan passed for a landing that the vehicle began by
