@@ -63,7 +63,7 @@ _SPREAD: Final = 0.05
 
 _DELAYS_S: Final[Mapping[Stage, float]] = {
     Stage.CONNECT: 0.2,
-    Stage.PREFLIGHT: 3.0,
+    Stage.PREFLIGHT: 0.04,
     Stage.SET_GAINS: 6.0,
     Stage.ARM: 1.6,
     Stage.TAKEOFF: 0.6,
