@@ -44,14 +44,14 @@ async def events(
         if not known:
             yield ServerSentEvent(event="reset", id=str(sent), data={})
         for change in await asyncio.to_thread(_backlog, database, sent):
-            yield _event(change)
+            yield _event(live, change)
             sent = change.id
         async for item in stream:
             if isinstance(item, Change):
                 if item.id <= sent:
                     continue
                 sent = item.id
-            yield _event(item)
+            yield _event(live, item)
 
 
 def _start(database: Database, last_event_id: str | None) -> tuple[int, bool]:
@@ -69,7 +69,7 @@ def _backlog(database: Database, event_id: int) -> list[Change]:
     return list(changes_after(database, event_id))
 
 
-def _event(item: Change | LiveItem) -> ServerSentEvent:
+def _event(live: Live, item: Change | LiveItem) -> ServerSentEvent:
     match item:
         case Change():
             return ServerSentEvent(
@@ -80,4 +80,4 @@ def _event(item: Change | LiveItem) -> ServerSentEvent:
         case LinkState():
             return ServerSentEvent(event="worker", data={"worker": item.worker})
         case Telemetry() | FlightPhase() | VehicleStatus():
-            return ServerSentEvent(event=item.type, data=item)
+            return ServerSentEvent(event=item.type, raw_data=live.hub.text(item))

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.live.memory import Memory
-from app.live.messages import FlightPhase, Shown, Telemetry, VehicleStatus
+from app.live.messages import FlightPhase, Shown, Telemetry, VehicleStatus, encode
 
 WAITING_CHANGES: Final = 2000
 """Changes a stream may lag behind before it is ended; its client comes back with the last id and misses none."""
 WAITING_TELEMETRY: Final = 100
 """Live messages a stream may lag behind before the oldest are dropped: more than 3 s of one flight and its vehicle."""
+
+WRITTEN: Final = 2 * WAITING_TELEMETRY
+"""Live messages whose JSON is kept: every stream sends the same, and to write it again for each delays an abort."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +79,7 @@ class Hub:
     def __init__(self) -> None:
         self._subscriptions: set[Subscription] = set()
         self._memory = Memory()
+        self._written: dict[int, tuple[Shown, str]] = {}
         self._open = True
 
     @contextmanager
@@ -105,6 +109,15 @@ class Hub:
                 self._memory.forget_all()
         for subscription in self._subscriptions:
             subscription.push(item)
+
+    def text(self, item: Shown) -> str:
+        """Its JSON, written once for all streams."""
+        known = self._written.get(id(item))
+        if known is None:  # the item is kept with its text, so that its id is nobody else's meanwhile
+            known = self._written[id(item)] = item, encode(item).decode().rstrip()
+            if len(self._written) > WRITTEN:
+                del self._written[next(iter(self._written))]
+        return known[1]
 
     def close(self) -> None:
         """End every stream, so that the server can stop at once."""

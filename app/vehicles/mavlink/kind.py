@@ -143,5 +143,4 @@ MAVLINK: Final = VehicleKind(
     conflicts=_conflicts,
     simulates=is_simulated,
     suits=_experiments,
-    served=False,
 )
