@@ -68,8 +68,10 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
         believed = ", ".join(("a loopback address", *sorted(simulation_hosts)))
         problems.append(Problem("simulated", f"is not believed of {address}: only {believed} can be simulated"))
     problems += _second_source_problems(str(options["second_source"]), str(options["scored_source"]))
-    if options["signing_key"] and options["autopilot"] == "paparazzi":
-        problems.append(Problem("signing_key", "cannot be had: Paparazzi speaks MAVLink 1, which has no signatures"))
+    if options["signing_key_file"] and options["autopilot"] == "paparazzi":
+        problems.append(
+            Problem("signing_key_file", "cannot be had: Paparazzi speaks MAVLink 1, which has no signatures")
+        )
     if options["clock_speed"] != 1.0 and not options["simulated"]:
         problems.append(Problem("clock_speed", "must be 1: a real vehicle's time is that of life"))
     return tuple(problems)
@@ -129,8 +131,8 @@ MAVLINK: Final = VehicleKind(
             name="scored_source", title="Whose altitude is scored: vehicle or mocap", unit="", default="vehicle"
         ),
         VehicleOption(
-            name="signing_key",
-            title="ArduCopter, PX4: MAVLink 2 signing, as 64 hexadecimal digits or a file of them; empty: unsigned",
+            name="signing_key_file",
+            title="ArduCopter, PX4: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
             unit="",
             default="",
         ),

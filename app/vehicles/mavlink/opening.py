@@ -30,14 +30,14 @@ def open_radio(options: Options, clock: Clock | None, *, overhear: Callable[[Rec
     be opened, InputError for a signing key that cannot be read or used."""
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
-    key = str(options["signing_key"])
+    key_file = str(options["signing_key_file"])
     link = Link(
         addresses.parse(str(options["address"])),
         profile.dialect,
         clock=clock,
         target_system=int(options["system_id"]) or None,
         tlog=_log_path(str(options["log_folder"])),
-        signing_key=signing.read_key(key) if key else None,
+        signing_key=signing.read_key(Path(key_file)) if key_file else None,
     )
     aim = Aim(
         system=0,

@@ -1,8 +1,8 @@
 """What a trial leaves: its samples as a trajectory, and in words how it ended."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from app.vehicles.mavlink.signals import Keep
 from app.vehicles.mocap.recording import Scored
 
 SOURCE: Final = "mavlink"
-_Value = TypeVar("_Value")
 _SCORED: Final = "altitude_m"
 _OTHER: Final = "altitude_2_m"
 
@@ -63,8 +62,3 @@ def reason_of(trial: Trial) -> str:
     dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
     flag = f"{dropped} of its samples jumped and were dropped." if dropped else ""
     return " ".join(part for part in (said, flag) if part)
-
-
-def settings_of(options: Mapping[str, _Value]) -> dict[str, _Value]:
-    """The options as a record tells them: without the secret among them."""
-    return {name: value for name, value in options.items() if name != "signing_key"}

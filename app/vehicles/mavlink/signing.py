@@ -34,17 +34,15 @@ def parse_key(text: str) -> bytes:
     return key
 
 
-def read_key(text: str) -> bytes:
-    """The key that `text` writes, or that is written in the file it names. Raises InputError for neither."""
-    if len(text.strip()) == 2 * KEY_BYTES and not Path(text).exists():
-        return parse_key(text)
+def read_key(file: Path) -> bytes:
+    """The key that is written in that file. Raises InputError."""
     try:
-        return parse_key(Path(text).expanduser().read_text(encoding="ascii"))
+        return parse_key(file.expanduser().read_text(encoding="ascii"))
     except (OSError, ValueError) as error:
         raise InputError(
             "The signing key cannot be read.",
-            problems=(Problem("signing_key", f"names a file that cannot be read ({type(error).__name__})"),),
-            hint=f"Give {2 * KEY_BYTES} hexadecimal digits, or a file that holds them.",
+            problems=(Problem("signing_key_file", f"names a file that cannot be read ({type(error).__name__})"),),
+            hint=f"Name a file with {2 * KEY_BYTES} hexadecimal digits that the program may read.",
         ) from error
 
 

@@ -362,15 +362,14 @@ class MavlinkVehicle:
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
             reason=" ".join(part for part in (reason, both.remark) if part),
-            settings={**records.settings_of(self._options), **both.settings},
+            settings={**self._options, **both.settings},
         )
 
     def _not_begun(self, ground: Ground, reason: str) -> FlightRecord:
         """Aborted before anything was commanded: the one instant on the ground."""
         sample = Keep(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
-        settings = records.settings_of(self._options)
-        return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=settings)
+        return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=self._options)
 
     # ---- trust
 

@@ -13,7 +13,6 @@ from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.dialects import PAPARAZZI, number, text
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.records import settings_of
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.open import open_vehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -257,23 +256,19 @@ def test_a_vehicle_that_does_not_sign_is_not_heard_where_signatures_are_wanted(t
     key = tmp_path / "key.txt"
     key.write_text("3f" * 32 + "\n", encoding="ascii")
     with Hangar("ardupilot") as hangar, pytest.raises(VehicleError, match="No heartbeat was heard"):
-        hangar.vehicle(signing_key=str(key))
+        hangar.vehicle(signing_key_file=str(key))
 
 
 def test_a_signing_key_that_cannot_be_read_is_refused_without_being_told() -> None:
     with Hangar("ardupilot") as hangar, pytest.raises(InputError, match="signing key") as refusal:
-        hangar.vehicle(signing_key="nowhere/secret.txt")
+        hangar.vehicle(signing_key_file="nowhere/secret.txt")
     assert "secret" not in f"{refusal.value} {refusal.value.problems}"
-
-
-def test_a_record_does_not_tell_the_signing_key() -> None:
-    assert settings_of({"signing_key": "3f" * 32, "radius_m": 5.0}) == {"radius_m": 5.0}
 
 
 @pytest.mark.parametrize(
     ("options", "field", "reason"),
     [
-        ({"signing_key": "3f" * 32}, "signing_key", "Paparazzi speaks MAVLink 1"),
+        ({"signing_key_file": "key.txt"}, "signing_key_file", "Paparazzi speaks MAVLink 1"),
         ({"scored_source": "gps"}, "scored_source", "must be vehicle or mocap, got gps"),
         ({"scored_source": "mocap"}, "scored_source", "needs a second_source"),
         ({"second_source": "camera"}, "second_source", "must be natnet:HOST?body=ID"),
