@@ -1,4 +1,5 @@
 import { IconOctagonFilled } from "@tabler/icons-react";
+import { Link } from "react-router";
 import type { FlyingCampaign, useAbort } from "../api/flying";
 import { withUnit } from "../lib/format";
 import { readingOf } from "../lib/live";
@@ -17,7 +18,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
         {flying.name} · flight {flying.trialNumber}
       </span>
       <span className={classes["pulse"]} aria-hidden />
-      <span className={`${classes["readings"]} numbers`}>
+      <Link to={`/fly/${flying.trialId}`} className={`${classes["readings"]} numbers`} title="Open the fly screen">
         {time === undefined ? (
           <span>{live?.phase === "staging" ? "setting gains" : "flying"}</span>
         ) : (
@@ -26,7 +27,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
             <span>{withUnit(time, "s", 1)}</span>
           </>
         )}
-      </span>
+      </Link>
       <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
         <IconOctagonFilled size={20} aria-hidden />
         {asked ? "ABORTING" : "ABORT"}

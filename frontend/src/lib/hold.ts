@@ -2,7 +2,7 @@
 
 export const HOLD_MS = 2000;
 /** A page that hung for longer cannot know that the finger stayed down. */
-const BLIND_MS = 600;
+const BLIND_MS = 1000;
 
 export interface Hold {
   sinceMs: number;
