@@ -1,0 +1,304 @@
+"""How soon an abort is on the wire: from the request to the server until the first packet that carries it out.
+
+    ./dev exec python -m bench.abort [--seconds 35]
+
+A real server, its worker and two simulated drones, each a process of its own, as people run them. Between each vehicle
+and its link a tap hands every packet on and takes down when the operating system received it. 20 clients follow the
+event stream all the while. Flights are aborted over HTTP at random instants after their take-off; in between, Land is
+ordered of whatever stands on the ground. Prints the figures; exits 1 when the 99th percentile of either is above 50 ms,
+when one never came on the wire, or when a client saw no telemetry.
+"""
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import os
+import random
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, Final
+
+import httpx2
+import numpy as np
+
+from app.vehicles.mavlink.dialects import PAPARAZZI, Message, number, text
+from bench.link import LOOPBACK, SO_TIMESTAMPNS
+
+LIMIT_S: Final = 0.05
+CLIENTS: Final = 20
+VEHICLES: Final = 2
+DRONE_SPEED: Final = 5.0
+SAFE_KP: Final = 283.0
+TRIED: Final = {"kp": 300, "ki": 20, "kd": 90}
+PATIENCE_S: Final = 60.0
+ORDERS_EVERY_S: Final = 0.4
+"""Each is written down afterwards, which costs the worker more than to pass it on."""
+SEED: Final = 20261121
+
+Frames = list[tuple[int, bytes]]
+"""What the ground sent, and when that was received, ns since 1970."""
+
+
+# ---- the tap
+
+
+def tap(pipe: Connection) -> None:
+    """A process: hand on what comes from either side, and keep the ground's packets with their times."""
+    with contextlib.ExitStack() as stack:
+        ground, drone = (stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2))
+        for side in (ground, drone):
+            side.bind((LOOPBACK, 0))
+        ground.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+        pipe.send((ground.getsockname()[1], drone.getsockname()[1]))
+        to_ground, to_drone = pipe.recv()
+        frames: Frames = []
+        while not pipe.poll():
+            for side in select.select([ground, drone], [], [], 0.1)[0]:
+                if side is drone:
+                    ground.sendto(drone.recv(4096), (LOOPBACK, to_ground))
+                    continue
+                frame, ((_, _, stamp),), _, _ = ground.recvmsg(4096, 64)
+                drone.sendto(frame, (LOOPBACK, to_drone))
+                seconds, nanoseconds = struct.unpack("@qq", stamp)
+                frames.append((seconds * 10**9 + nanoseconds, frame))
+        pipe.recv()
+        pipe.send(frames)
+
+
+@dataclass(frozen=True, slots=True)
+class Drone:
+    """A simulated drone behind a tap."""
+
+    address: str
+    pipe: Connection
+
+    def frames(self) -> Frames:
+        """Everything that the ground sent; the tap ends."""
+        self.pipe.send("end")
+        sent: Frames = self.pipe.recv()
+        return sent
+
+
+@contextlib.contextmanager
+def tapped_drone() -> Iterator[Drone]:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=tap, args=(theirs,), daemon=True)
+    process.start()
+    tap_for_ground, tap_for_drone = ours.recv()
+    local, body = free_port(), free_port()
+    ours.send((local, body))
+    link = f"udp:{LOOPBACK}:{tap_for_drone}@{body}"
+    command = ("sim-drone", "--vehicle", "twin", "--link", link, "--speed", str(DRONE_SPEED))
+    with program(*command, until="Paparazzi"):
+        yield Drone(f"udp:{LOOPBACK}:{tap_for_ground}@{local}", ours)
+    process.join(1.0)
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def program(*arguments: str, until: str) -> Iterator[str]:
+    """`gainline …` from its line that contains `until`, which is given, to the end of the block."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app.cli", *arguments],
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert process.stdout is not None
+    while until not in (line := process.stdout.readline()):
+        assert line, f"gainline {arguments[0]} ended"
+    try:
+        yield line
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(PATIENCE_S)
+
+
+# ---- the clients
+
+
+def watch(url: str, pipe: Connection) -> None:
+    """A process: CLIENTS streams, each read to the end; tells when all are open, and how many telemetry messages the
+    slowest had."""
+    counts = [0] * CLIENTS
+    opened = threading.Barrier(CLIENTS + 1)
+    done = threading.Event()
+
+    def follow(index: int) -> None:
+        with contextlib.suppress(httpx2.HTTPError), httpx2.stream("GET", f"{url}/api/events", timeout=5.0) as answer:
+            opened.wait(PATIENCE_S)
+            for line in answer.iter_lines():
+                counts[index] += line == "event: telemetry"
+                if done.is_set():
+                    return
+
+    for index in range(CLIENTS):
+        threading.Thread(target=follow, args=(index,), daemon=True).start()
+    opened.wait(PATIENCE_S)
+    pipe.send("open")
+    pipe.recv()
+    pipe.send(min(counts))
+    done.set()
+
+
+# ---- what is asked
+
+
+@dataclass(slots=True)
+class Asked:
+    """When something was asked for, ns since 1970, of each vehicle."""
+
+    aborts: list[tuple[int, int]] = field(default_factory=list)
+    orders: list[tuple[int, int]] = field(default_factory=list)
+
+
+class Operator:
+    """One person with one vehicle: flights, each aborted soon after its take-off, until the time is over."""
+
+    def __init__(self, url: str, index: int, address: str, asked: Asked) -> None:
+        self._api = httpx2.Client(base_url=f"{url}/api", timeout=PATIENCE_S)
+        self._index, self._asked = index, asked
+        self._randomness = random.Random(SEED + index)
+        options = {"address": address, "simulated": True}
+        self._vehicle = self._post("/vehicles", {"name": f"Drone {index}", "kind": "mavlink", "options": options})["id"]
+        self._post(f"/vehicles/{self._vehicle}/connect")
+        self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")
+        chosen = {"kind": "mavlink", "id": self._vehicle}
+        self._campaign = self._post("/campaigns", {"name": "Aborts", "vehicle": chosen, "definition": {}})["id"]
+        self._until(f"/campaigns/{self._campaign}", lambda campaign: campaign["state"] == "ready")
+
+    def order_landings(self, seconds: float) -> None:
+        until_s = time.monotonic() + seconds
+        while time.monotonic() < until_s:
+            time.sleep(self._randomness.uniform(0.5, 1.5) * ORDERS_EVERY_S)
+            self._asked.orders.append((self._index, time.time_ns()))
+            assert self._post(f"/vehicles/{self._vehicle}/land", {"reason": "bench"})["accepted"]
+
+    def abort_flights(self, seconds: float) -> None:
+        until_s = time.monotonic() + seconds
+        while time.monotonic() < until_s:
+            trial = self._post(f"/campaigns/{self._campaign}/trials", {"gains": TRIED})["id"]
+            self._post(f"/trials/{trial}/fly")
+            self._until(f"/trials/{trial}", lambda found: found["state"] == "flying")
+            time.sleep(2.5 + self._randomness.uniform(0.0, 1.0))  # it stands, arms, and is told to take off
+            self._asked.aborts.append((self._index, time.time_ns()))
+            assert self._post(f"/trials/{trial}/abort", {"reason": "bench"})["accepted"]
+            self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")
+
+    def _post(self, path: str, body: object = None) -> Any:
+        answer = self._api.post(path, json=body)
+        assert answer.is_success, answer.text
+        return answer.json()
+
+    def _until(self, path: str, fits: Callable[[Any], bool]) -> None:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not fits(found := self._api.get(path).json()):
+            assert time.monotonic() < deadline_s, found
+            time.sleep(0.1)
+
+
+# ---- the figures
+
+
+def delays_s(
+    asked: list[tuple[int, int]], sent: Mapping[int, Frames], carries: Callable[[Message], bool]
+) -> list[float]:
+    """From each request to the first packet after it that carries it out; infinite where there is none within 2 s."""
+    codec = PAPARAZZI.codec(system=1, component=1)
+    wanted = {
+        index: [at_ns for at_ns, frame in frames if any(carries(message) for message in codec.parse(frame))]
+        for index, frames in sent.items()
+    }
+    found = []
+    for index, asked_ns in asked:
+        delay_s = min((at_ns - asked_ns for at_ns in wanted[index] if at_ns >= asked_ns), default=10**18) * 1e-9
+        found.append(delay_s if delay_s < 2.0 else float("inf"))
+    return found
+
+
+def ends_a_flight(message: Message) -> bool:
+    """The first safe gain, with which an abort begins."""
+    return message.get_type() == "PARAM_SET" and (text(message, "param_id"), number(message, "param_value")) == (
+        "gui_v_kp",
+        SAFE_KP,
+    )
+
+
+def is_landing(message: Message) -> bool:
+    return message.get_type() == "SCRIPT_ITEM"
+
+
+def judge(what: str, delays: list[float]) -> bool:
+    """Print the figures; whether they are above the limit."""
+    median_s, high_s = np.quantile(delays, [0.5, 0.99], method="higher") if delays else (np.inf, np.inf)
+    print(
+        f"{what}: {len(delays)}, p50 {median_s * 1e3:.1f} ms, p99 {high_s * 1e3:.1f} ms (limit {LIMIT_S * 1e3:.0f}), "
+        f"max {max(delays, default=np.inf) * 1e3:.1f} ms"
+    )
+    return bool(high_s > LIMIT_S)
+
+
+def together(work: list[Callable[[], None]]) -> None:
+    threads = [threading.Thread(target=each) for each in work]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def main() -> int:
+    arguments = argparse.ArgumentParser(prog="bench.abort")
+    arguments.add_argument("--seconds", type=float, default=35.0, help="of flights")
+    seconds = arguments.parse_args().seconds
+    asked = Asked()
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        drones = [stack.enter_context(tapped_drone()) for _ in range(VEHICLES)]
+        line = stack.enter_context(program("serve", "--port", "0", "--data-dir", str(folder), until="ready at"))
+        url = line.rpartition(" ")[2].strip()
+        wait_for_worker(url)
+        operators = [Operator(url, index, drone.address, asked) for index, drone in enumerate(drones)]
+        context = multiprocessing.get_context("spawn")
+        clients, theirs = context.Pipe()
+        context.Process(target=watch, args=(url, theirs), daemon=True).start()
+        clients.recv()
+        together([lambda each=each: each.order_landings(seconds / 3.0) for each in operators])  # type: ignore[misc]
+        together([lambda each=each: each.abort_flights(seconds) for each in operators])  # type: ignore[misc]
+        clients.send("count")
+        heard = clients.recv()
+        sent = {index: drone.frames() for index, drone in enumerate(drones)}
+    failed = judge("aborts of flights, 20 clients watching", delays_s(asked.aborts, sent, ends_a_flight))
+    failed |= judge("Land ordered on the ground", delays_s(asked.orders, sent, is_landing))
+    print(f"telemetry messages of the slowest client: {heard}, of {len(asked.aborts)} flights")
+    return int(failed or heard == 0)
+
+
+def wait_for_worker(url: str) -> None:
+    deadline_s = time.monotonic() + PATIENCE_S
+    while json.loads(httpx2.get(f"{url}/api/health", timeout=PATIENCE_S).text)["worker"] != "running":
+        assert time.monotonic() < deadline_s
+        time.sleep(0.1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
