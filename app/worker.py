@@ -9,6 +9,7 @@ everything else.
 import os
 import platform
 import signal
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -46,6 +47,9 @@ ACTS_AT_ONCE: Final = 8
 SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
 REPRODUCTIONS_AT_ONCE: Final = 1
 LOOK_ANYWAY_S: Final = 1.0
+SWITCH_EVERY_S: Final = 0.001
+"""How long a thread that keeps books may make the one that passes aborts on wait for the interpreter; Python's own 5 ms
+add up over several."""
 RETRY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
@@ -96,6 +100,7 @@ def run_supervised_worker(settings: Settings) -> None:
 def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting: Callable[[], bool]) -> None:
     prepare_data_dir(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
+    sys.setswitchinterval(SWITCH_EVERY_S)
     with exclusive(settings.data_dir / "worker.lock", keep_waiting=keep_waiting):
         require_current(settings.database_file)
         Worker(settings, ending, airspace).work()

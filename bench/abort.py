@@ -1,6 +1,6 @@
 """How soon an abort is on the wire: from the request to the server until the first packet that carries it out.
 
-    ./dev exec python -m bench.abort [--seconds 35]
+    ./dev exec python -m bench.abort [--seconds 25]
 
 A real server, its worker and two simulated drones, each a process of its own, as people run them. Between each vehicle
 and its link a tap hands every packet on and takes down when the operating system received it. 20 clients follow the
@@ -268,7 +268,7 @@ def together(work: list[Callable[[], None]]) -> None:
 
 def main() -> int:
     arguments = argparse.ArgumentParser(prog="bench.abort")
-    arguments.add_argument("--seconds", type=float, default=35.0, help="of flights")
+    arguments.add_argument("--seconds", type=float, default=25.0, help="of flights")
     seconds = arguments.parse_args().seconds
     asked = Asked()
     with contextlib.ExitStack() as stack:
@@ -282,7 +282,7 @@ def main() -> int:
         clients, theirs = context.Pipe()
         context.Process(target=watch, args=(url, theirs), daemon=True).start()
         clients.recv()
-        together([lambda each=each: each.order_landings(seconds / 3.0) for each in operators])  # type: ignore[misc]
+        together([lambda each=each: each.order_landings(seconds / 4.0) for each in operators])  # type: ignore[misc]
         together([lambda each=each: each.abort_flights(seconds) for each in operators])  # type: ignore[misc]
         clients.send("count")
         heard = clients.recv()
