@@ -171,7 +171,7 @@ class _Judgement:
         motorless_s = self.within(self.of("no-lift-off"), *AIR)
         if motorless_s > 0.0:
             yield Cause("F4/F6", "aborted", had_to=motorless_s > 3.0 + LIFT_OFF_S[self.case.autopilot])
-        if self.within(self.silent, Stage.TAKEOFF) > 0.2 or self.of(OTHER_MODE, OTHER_LANDING):
+        if self.of(OTHER_MODE, OTHER_LANDING):
             yield Cause("F4", "aborted")
         if self.of(OTHER_MODE):
             yield Cause("F10", "invalid")

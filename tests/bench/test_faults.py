@@ -172,6 +172,8 @@ FOUND: Final = [
     (case(Mishap("abort", Stage.SET_GAINS, 2.0)), "aborted", "safe"),
     # a restart while the gains were staged: the trial flew on the autopilot's own
     (case(Mishap("reboot", Stage.SET_GAINS, 3.0), autopilot="px4", waits_s=8.0), "refused", "safe"),
+    # seed 20261388: a lift-off that could not be seen, for the link was lost, passed for none
+    (case(Mishap("link-lost", Stage.TAKEOFF, 0.53, 1.34)), "invalid", "safe"),
     # seed 20262209: gains that overshoot to the flight plan's own ceiling passed for a landing of its own
     (
         replace(case(Mishap("wild-gains", Stage.CONNECT, 0.0)), gains={"kp": 100, "ki": 300, "kd": 10}),

@@ -131,7 +131,7 @@ def _take_off(trial: Trial, event: Event) -> Step:
         return enter(trial, State.RECORD, now_s), ()
     if isinstance(event, Refused):
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
-    if now_s - trial.since_s > trial.plan.lift_off_s:
+    if now_s - trial.since_s > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):
         why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
     return trial, ()

@@ -308,6 +308,13 @@ def test_a_vehicle_that_does_not_lift_off_is_disarmed_after_1_5_s() -> None:
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "aborted")
 
 
+def test_a_lift_off_that_cannot_be_seen_is_a_lost_link_not_a_missing_lift_off() -> None:
+    walk = Walk().arm().pass_s(0.6)
+    walk.mute = True
+    walk.pass_s(1.2)
+    assert (walk.state, walk.trial.failure, walk.gains_sent) == (State.LINK_LOST, Failure.LINK, [])
+
+
 def test_a_vehicle_that_lifts_off_too_late_is_landed_on_its_safe_gains() -> None:
     walk = taking_off().pass_s(0.9)
     walk.climb_rate_m_s = 0.3
