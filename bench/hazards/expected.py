@@ -265,7 +265,8 @@ class _Judgement:
         may_be_suspect = any(each.kind in SUSPECT and each.begun_s <= max(left) for each in self.flown.struck)
         if first is Order.GAIN and not may_be_suspect:
             yield "gains were sent before Land, though nothing spoke against them"
-        if self.flown.outcome == "aborted" and first is Order.LAND:
+        is_lost = self.stages.first_s(Stage.LINK_LOST) is not None
+        if self.flown.outcome == "aborted" and first is Order.LAND and not is_lost:
             yield "Land was sent before the safe gains, though the gains were suspect"
         lands = [at_s for at_s, order in following if order is Order.LAND]
         if first is Order.GAIN and (not lands or lands[0] - max(left) > 0.3 + SLACK_S):
