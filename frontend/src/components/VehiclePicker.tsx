@@ -1,4 +1,4 @@
-import { Button, Radio } from "@mantine/core";
+import { Anchor, Button, Radio } from "@mantine/core";
 import { Link } from "react-router";
 import type { Vehicle, VehicleKindInfo } from "../api/types";
 import { autopilotTitle, vehicleWords } from "../lib/fleet";
@@ -61,7 +61,9 @@ export function VehiclePicker({ kinds, registered, others, kind, vehicleId, erro
             {vehicle.name}
           </Button>
         ))}
-        <Link to="/vehicles/new">Register a vehicle</Link>
+        <Anchor component={Link} to="/vehicles/new">
+          Register a vehicle
+        </Anchor>
       </div>
     </div>
   );

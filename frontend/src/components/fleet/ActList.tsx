@@ -1,4 +1,4 @@
-import { Button } from "@mantine/core";
+import { Button, Skeleton } from "@mantine/core";
 import { useActs } from "../../api/fleet";
 import { ACTS } from "../../lib/fleet";
 import { Panel } from "../Panel";
@@ -13,14 +13,14 @@ export function ActList({ vehicleId }: { vehicleId: number }) {
   return (
     <Panel title="What it was asked" className={classes["wide"]}>
       <Trouble error={acts.error} />
+      {acts.isPending && <Skeleton height={120} aria-busy="true" />}
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
       <section className={`${classes["scroll"]} sideways`} aria-label="What it was asked" tabIndex={0}>
         <table className={classes["table"]}>
           <thead>
             <tr>
-              <th scope="col">When</th>
               <th scope="col">What</th>
-              <th scope="col">By</th>
+              <th scope="col">When</th>
               <th scope="col">Outcome</th>
             </tr>
           </thead>
@@ -28,13 +28,13 @@ export function ActList({ vehicleId }: { vehicleId: number }) {
             {items.map((act) => (
               <tr key={act.id}>
                 <td>
-                  <Time at={act.requested_at} />
-                </td>
-                <td>
                   {ACTS[act.kind]}
                   {act.reason && <small>{act.reason}</small>}
                 </td>
-                <td>{act.by || "–"}</td>
+                <td>
+                  <Time at={act.requested_at} />
+                  {act.by && <small>by {act.by}</small>}
+                </td>
                 <td>
                   {act.state}
                   {act.problem && <small>{act.problem}</small>}

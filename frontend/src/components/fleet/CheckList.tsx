@@ -19,7 +19,6 @@ export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicl
               <th scope="col">Item</th>
               <th scope="col">Result</th>
               <th scope="col">Found</th>
-              <th scope="col">Needed</th>
             </tr>
           </thead>
           <tbody>
@@ -40,8 +39,10 @@ export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicl
                     </span>
                   )}
                 </td>
-                <td>{found}</td>
-                <td>{needed}</td>
+                <td>
+                  {found}
+                  <small>needed: {needed}</small>
+                </td>
               </tr>
             ))}
           </tbody>

@@ -1,4 +1,4 @@
-import { Button } from "@mantine/core";
+import { Anchor, Button, Skeleton } from "@mantine/core";
 import { Link } from "react-router";
 import { useLedger } from "../../api/fleet";
 import type { GivenGains } from "../../api/types";
@@ -18,6 +18,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
   return (
     <Panel title="Gains it was given" className={classes["wide"]}>
       <Trouble error={ledger.error} />
+      {ledger.isPending && <Skeleton height={120} aria-busy="true" />}
       {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>None yet: it was never connected.</p>}
       {lines.length > 0 && (
         // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
@@ -25,7 +26,6 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
           <table className={classes["table"]}>
             <thead>
               <tr>
-                <th scope="col">When</th>
                 <th scope="col">For</th>
                 <th scope="col">Asked {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
                 <th scope="col">Read back</th>
@@ -60,17 +60,19 @@ function Line({ line }: { line: GivenGains }) {
   return (
     <tr>
       <td>
-        <Time at={line.asked_at} />
-      </td>
-      <td>
         {campaign_id !== null && trial_id !== null ? (
-          <Link to={`/campaigns/${campaign_id}/flights/${trial_id}`}>{PURPOSES[line.purpose]}</Link>
+          <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`}>
+            {PURPOSES[line.purpose]}
+          </Anchor>
         ) : (
           PURPOSES[line.purpose]
         )}
+        <small>
+          <Time at={line.asked_at} />
+        </small>
       </td>
       <td className="numbers">{gainsInBrackets(line.asked)}</td>
-      <td className={differs ? classes["bad"] : "numbers"}>
+      <td className={`numbers ${differs ? classes["bad"] : ""}`}>
         {read_back === null ? NOTHING : gainsInBrackets(read_back)}
       </td>
       <td>{line.outcome}</td>

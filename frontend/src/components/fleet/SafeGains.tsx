@@ -74,7 +74,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           )}{" "}
           Every flight ends with the safe gains.
         </p>
-        <div className={classes["row"]}>
+        <div className={classes["buttons"]}>
           <Button
             variant="default"
             disabled={!vehicle.actions.includes("restore")}
@@ -132,7 +132,7 @@ function SafeGainsForm({ vehicle, onDone }: { vehicle: Vehicle; onDone: () => vo
           onChange={(event) => setStatement(event.currentTarget.value)}
         />
         <Trouble error={edit.error} shown={fields} />
-        <div className={classes["row"]}>
+        <div className={classes["buttons"]}>
           <Button
             type="submit"
             disabled={read.length < Object.keys(gains).length || statement.trim() === ""}

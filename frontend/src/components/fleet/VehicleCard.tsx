@@ -1,4 +1,4 @@
-import { Button } from "@mantine/core";
+import { Anchor, Button } from "@mantine/core";
 import { IconPlugConnected } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useAskVehicle } from "../../api/fleet";
@@ -17,19 +17,26 @@ import classes from "./VehicleCard.module.css";
 export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.registered ? vehicle.id : null);
   const ask = useAskVehicle(vehicle.id);
+  const held = Object.keys(vehicle.held ?? {}).length > 0 ? gainsInBrackets(vehicle.held ?? {}) : "";
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
     <li className={classes["card"]} data-state={vehicle.state}>
       <div className={classes["what"]}>
         <h3 className={classes["name"]}>
           <VehicleBadge isReal={vehicle.is_real} />
-          {vehicle.registered ? <Link to={`/vehicles/${vehicle.id}`}>{vehicle.name}</Link> : vehicle.name}
+          {vehicle.registered ? (
+            <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
+              {vehicle.name}
+            </Anchor>
+          ) : (
+            vehicle.name
+          )}
           <StateBadge words={vehicleWords(vehicle)} />
         </h3>
         <dl className={`${classes["facts"]} numbers`}>
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
-          {vehicle.held !== null && <Fact title="Holds" value={gainsInBrackets(vehicle.held)} />}
+          {held !== "" && <Fact title="Holds" value={held} />}
           <Fact
             title={`Safe ${Object.keys(vehicle.safe_gains).join(", ")}`}
             value={gainsInBrackets(vehicle.safe_gains)}
