@@ -19,6 +19,8 @@ from bench.hazards.wire import Order
 
 GROUND: Final = (Stage.PREFLIGHT, Stage.SET_GAINS)
 SILENT: Final = ("link-lost", "wrong-system", "reboot")
+DEAF: Final = ("link-lost", "reboot")
+"""The vehicle hears nothing, either."""
 SUSPECT: Final = (ABORT, WILD_GAINS, "no-lift-off")
 HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "px4": 1.0}
 BATTERY_S: Final[Mapping[str, float]] = {"paparazzi": 1.2, "ardupilot": 0.5, "px4": 0.2}
@@ -171,7 +173,8 @@ class _Judgement:
         motorless_s = self.within(self.of("no-lift-off"), *AIR)
         if motorless_s > 0.0:
             yield Cause("F4/F6", "aborted", had_to=motorless_s > 3.0 + LIFT_OFF_S[self.case.autopilot])
-        if self.of(OTHER_MODE, OTHER_LANDING):
+        unheard = any(covers(self.of(*DEAF), (at_s, at_s)) for at_s in self.stages.ordered(Order.TAKE_OFF))
+        if unheard or self.of(OTHER_MODE, OTHER_LANDING):
             yield Cause("F4", "aborted")
         if self.of(OTHER_MODE):
             yield Cause("F10", "invalid")
