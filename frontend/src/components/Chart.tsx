@@ -74,7 +74,10 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
   useEffect(() => {
     const target = element.current;
     if (target === null || !drawn) return;
-    const observer = new ResizeObserver(() => void loadPlotly().then((plotly) => plotly.Plots.resize(target)));
+    // A page that was left resizes its charts to nothing, and by then there may be none to resize.
+    const observer = new ResizeObserver(
+      () => void loadPlotly().then((plotly) => target.offsetParent !== null && plotly.Plots.resize(target)),
+    );
     observer.observe(target);
     return () => observer.disconnect();
   }, [drawn]);

@@ -1,0 +1,227 @@
+"""The fly screen with a REAL vehicle: a simulated drone over loopback UDP, registered as real and flown by hand."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.dashboard import PHONE, TABLET, Dashboard
+from tests.runtime.drones import SAFE, TRIED, Drone
+
+DRONE_SPEED = 5.0
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with served(tmp_path_factory.mktemp("field") / "data") as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def vehicle_id(server: Server, browser: Browser) -> Iterator[int]:
+    """A drone on loopback, registered as REAL and connected."""
+    with Drone(speed=DRONE_SPEED) as drone, browser.new_context(base_url=server.url) as context:
+        office = Dashboard(context.new_page(), server.url)
+        office.page.goto("/")
+        expect(office.page.get_by_text("Live", exact=True)).to_be_visible(timeout=120_000)
+        registered = office.post(
+            "/vehicles",
+            {
+                "name": "Number 1",
+                "kind": "mavlink",
+                "options": {"address": drone.address},
+                "safe_gains_confirmed": True,
+                "statement": "Ada has seen it fly on these",
+            },
+        )
+        assert registered["is_real"]
+        office.post(f"/vehicles/{registered['id']}/connect")
+        in_state(office, registered["id"], "ready")
+        yield registered["id"]
+
+
+@pytest.fixture
+def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
+    return open_dashboard(server.url)
+
+
+@pytest.fixture
+def trial_id(dashboard: Dashboard, vehicle_id: int) -> Iterator[int]:
+    """A trial of gains other than the safe ones, in a campaign of its own, the fly screen open."""
+    in_state(dashboard, vehicle_id, "ready")
+    made = dashboard.post(
+        "/campaigns", {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle_id}, "definition": {}}
+    )
+    dashboard.when_ready(made["id"])
+    trial: int = dashboard.post(f"/campaigns/{made['id']}/trials", {"gains": TRIED})["id"]
+    dashboard.open(f"/fly/{trial}")
+    yield trial
+    if state_of(dashboard, trial) in {"staged", "flying"}:
+        dashboard.post(f"/trials/{trial}/abort")
+
+
+def in_state(dashboard: Dashboard, vehicle_id: int, state: str) -> None:
+    dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["state"] == state)
+
+
+def state_of(dashboard: Dashboard, trial_id: int) -> str:
+    state: str = dashboard.get(f"/trials/{trial_id}")["state"]
+    return state
+
+
+def stage(dashboard: Dashboard) -> None:
+    """Take control as Ada, and have the gains set."""
+    dashboard.page.get_by_label("Your name").fill("Ada")
+    dashboard.page.get_by_role("button", name=re.compile("^Take (control|over)$")).click()
+    dashboard.button("Stage").click()
+    expect(dashboard.page.get_by_label("read back")).to_have_count(len(TRIED))
+    expect(hold_button(dashboard.page)).to_be_enabled()
+
+
+def hold_button(page: Page) -> Locator:
+    return page.get_by_role("button", name=re.compile("^(Hold to fly|Hold on)"))
+
+
+def hold(page: Page, seconds: float) -> None:
+    middle_of(page, hold_button(page))
+    page.mouse.down()
+    page.wait_for_timeout(1000 * seconds)
+    page.mouse.up()
+
+
+def hold_until_it_flies(dashboard: Dashboard, trial_id: int) -> None:
+    """A page that hung meanwhile does not count a hold: then it is held once more."""
+    for _ in range(5):
+        hold(dashboard.page, 2.6)
+        for _ in range(50):
+            if dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is not None:
+                return
+            dashboard.page.wait_for_timeout(100)
+    raise AssertionError("it was held five times and did not fly")
+
+
+def middle_of(page: Page, target: Locator) -> tuple[float, float]:
+    """Where the pointer then is."""
+    box = target.bounding_box()
+    assert box is not None
+    place = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(*place)
+    return place
+
+
+def word(dashboard: Dashboard) -> Locator:
+    return dashboard.page.get_by_role("heading", level=1)
+
+
+def line_of(dashboard: Dashboard) -> Locator:
+    """What every page says of the vehicle."""
+    return dashboard.page.get_by_role("region", name=re.compile("^Vehicle "))
+
+
+def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
+    stage(dashboard)
+    assert dashboard.get(f"/vehicles/{vehicle_id}")["control"]["operator"] == "Ada"
+    expect(line_of(dashboard)).to_contain_text("[300 20 90]safe [283 13 82]")
+    hold_until_it_flies(dashboard, trial_id)
+    expect(word(dashboard)).to_have_text("Recording")
+    dashboard.until(lambda: (live := dashboard.trace("Live curve", "live")) is not None and len(live["x"]) > 40)
+    dashboard.page.get_by_label("What to do now").get_by_role("button", name=re.compile("^ABORT")).click()
+    expect(word(dashboard)).to_have_text("Aborted")
+    expect(dashboard.page.get_by_role("link", name="Next flight")).to_be_visible()
+    trial = dashboard.get(f"/trials/{trial_id}")
+    assert (trial["state"], trial["read_back"]) == ("aborted", TRIED)
+    in_state(dashboard, vehicle_id, "ready")
+    assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
+    expect(line_of(dashboard)).to_contain_text("[283 13 82]safe")
+
+
+def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
+    dashboard: Dashboard, vehicle_id: int, trial_id: int
+) -> None:
+    stage(dashboard)
+    hold_until_it_flies(dashboard, trial_id)
+    expect(dashboard.page.get_by_text("Suggested: valid")).to_be_visible(timeout=60_000)
+    expect(word(dashboard)).to_have_text("Landed")
+    assert state_of(dashboard, trial_id) == "captured"
+    dashboard.button("Count it as valid").click()
+    dashboard.page.get_by_role("link", name="Next flight").click()
+    expect(dashboard.panel("Flight 1")).to_be_visible()
+    assert state_of(dashboard, trial_id) == "valid"
+
+
+def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
+    stage(dashboard)
+    hold(dashboard.page, 1.2)
+    hold_button(dashboard.page).focus()
+    for key in ("Enter", "Space"):
+        dashboard.page.keyboard.down(key)
+        dashboard.page.wait_for_timeout(2500)
+        dashboard.page.keyboard.up(key)
+    asked = dashboard.page.request.post(f"{dashboard.url}/api/trials/{trial_id}/take-off")
+    assert asked.status == 403
+    assert state_of(dashboard, trial_id) == "staged"
+    dashboard.button("Unstage: safe gains back").click()
+    expect(dashboard.button("Stage")).to_be_enabled()
+    assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
+
+
+def test_one_operator_is_in_control_and_a_take_over_is_seen(
+    open_dashboard: Opener, dashboard: Dashboard, vehicle_id: int, trial_id: int
+) -> None:
+    stage(dashboard)
+    second = open_dashboard(dashboard.url)
+    second.open(f"/fly/{trial_id}")
+    expect(second.page.get_by_text("Ada is in control.")).to_be_visible()
+    expect(hold_button(second.page)).to_be_disabled()
+    second.page.get_by_label("Your name").fill("Ben")
+    second.button("Take over").click()
+    expect(hold_button(second.page)).to_be_enabled()
+    expect(dashboard.page.get_by_text("Ben is in control.")).to_be_visible()
+    expect(hold_button(dashboard.page)).to_be_disabled()
+    second.button("Unstage: safe gains back").click()
+    in_state(dashboard, vehicle_id, "ready")
+
+
+def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_not_before(
+    dashboard: Dashboard, vehicle_id: int, trial_id: int
+) -> None:
+    page = dashboard.page
+    knob = page.get_by_role("button", name="Motors off – the drone falls")
+    expect(knob).to_be_disabled()
+    stage(dashboard)
+    hold_until_it_flies(dashboard, trial_id)
+    expect(word(dashboard)).to_have_text("Recording")
+    knob.click()
+    slide(page, knob, 150)
+    assert orders(dashboard, vehicle_id) == []
+    slide(page, knob, 400)
+    dashboard.until(lambda: orders(dashboard, vehicle_id) == ["motors off"])
+    dashboard.until(lambda: state_of(dashboard, trial_id) not in {"staged", "flying"})
+
+
+def orders(dashboard: Dashboard, vehicle_id: int) -> list[str]:
+    """What it was told beside its flights."""
+    acts = dashboard.get(f"/vehicles/{vehicle_id}/acts")["items"]
+    return [act["kind"] for act in acts if act["kind"] in {"land", "motors off"}]
+
+
+def slide(page: Page, knob: Locator, by_px: float) -> None:
+    x, y = middle_of(page, knob)
+    page.mouse.down()
+    page.mouse.move(x + by_px, y, steps=8)
+    page.mouse.up()
+
+
+def test_it_all_fits_on_a_tablet_and_never_scrolls_sideways(
+    open_dashboard: Opener, dashboard: Dashboard, vehicle_id: int, trial_id: int
+) -> None:
+    for viewport in (TABLET, PHONE):
+        tab = open_dashboard(dashboard.url, viewport=viewport)
+        tab.open(f"/fly/{trial_id}")
+        expect(tab.button("Stage")).to_be_visible()
+        assert tab.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+        if viewport is TABLET:
+            assert tab.page.evaluate("(m => m.scrollHeight <= m.clientHeight)(document.querySelector('main'))")
+            assert tab.page.evaluate("document.documentElement.scrollHeight <= window.innerHeight")
