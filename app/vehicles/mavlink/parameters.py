@@ -97,7 +97,7 @@ def _list(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[int, Pa
     """What comes by itself, until all has come or nothing more does."""
     heard: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
-    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.patience_s / PATIENCE_S and not _is_complete(heard):
+    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.patience and not _is_complete(heard):
         if found := _listed(radio.listen(radio.patience_s)):
             heard |= found
             last_s = radio.clock.now_s()

@@ -14,7 +14,7 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.measurements import Heartbeat, Position
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles.base import Requirement
-from app.vehicles.mavlink.radio import PATIENCE_S, Radio
+from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.sources import Lookout
 
 HEARTBEAT_S: Final = 5.0
@@ -60,8 +60,9 @@ class Watched:
 
 def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
     """Wait for the heartbeat of an autopilot of the right make, sending nothing. Raises VehicleError when none comes
-    within 5 s, or another vehicle's than the `pinned` one's."""
-    until_s = radio.clock.now_s() + HEARTBEAT_S
+    within 5 s (longer where the vehicle's clock is fast), or another vehicle's than the `pinned` one's."""
+    within_s = HEARTBEAT_S * radio.patience
+    until_s = radio.clock.now_s() + within_s
     makes: set[int] = set()
     while radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
@@ -72,7 +73,7 @@ def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
             makes.add(heartbeat.autopilot)
     others = f" Others were heard: MAVLink's autopilots {sorted(makes)}." if makes else ""
     raise VehicleError(
-        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Listened {HEARTBEAT_S:g} s at {address} for {radio.profile.title} "
+        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Listened {within_s:g} s at {address} for {radio.profile.title} "
         f"(dialect {radio.profile.dialect.name}).{others}",
         hint="See that the vehicle is on, sends to this computer's port, and has the autopilot that was named.",
     )
@@ -121,7 +122,7 @@ def require_disarmed(radio: Radio) -> None:
 
 def prepare(radio: Radio, telemetry_hz: float) -> None:
     """Ask for telemetry, and set what a take-off needs. Raises VehicleError when it is refused."""
-    if why := radio.perform(radio.profile.prepare(radio.aim, telemetry_hz)):
+    if why := radio.set_up(radio.profile.prepare(radio.aim, telemetry_hz)):
         raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
 
 
@@ -180,7 +181,7 @@ def _heartbeat(radio: Radio) -> CheckItem:
     heartbeat = radio.seen.heartbeat
     make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
     version = f" {radio.seen.version}" if radio.seen.version else ""
-    oldest_s = _HEARTBEATS_MISSED * radio.profile.heartbeat_s * radio.patience_s / PATIENCE_S
+    oldest_s = _HEARTBEATS_MISSED * radio.profile.heartbeat_s * radio.patience
     return CheckItem(
         name="heartbeat",
         title="Heartbeat",
@@ -266,7 +267,7 @@ def _failsafe(radio: Radio, requirement: Requirement) -> CheckItem:
     return CheckItem(
         name=f"failsafe {requirement.parameter}",
         title=f"Its own failsafe {requirement.parameter}",
-        passed=bool(value),
+        passed=value is not None and requirement.is_met(value),
         found="not told" if value is None else f"{value:g}" if value else "off",
         needed=requirement.what,
         hint="Switch it on in the autopilot: when the link is lost, nothing else brings it down.",

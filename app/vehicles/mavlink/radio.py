@@ -81,6 +81,11 @@ class Radio:
         self._overhear = overhear
 
     @property
+    def patience(self) -> float:
+        """How many times longer than a real vehicle this one is waited for."""
+        return self.patience_s / PATIENCE_S
+
+    @property
     def block(self) -> str:
         """The block of its flight plan that the vehicle is in, by name; empty where it does not tell."""
         names = {number: name for name, number in self.aim.blocks.items()}
@@ -116,9 +121,9 @@ class Radio:
                         return heard.measurement
         return None
 
-    def perform(self, steps: tuple[Step, ...]) -> str:
+    def set_up(self, steps: tuple[Step, ...]) -> str:
         """Carry out steps on the ground, waiting for them; why they were refused, or nothing. Raises LinkError."""
-        conversation = Conversation(Action.ARM, steps, self)
+        conversation = Conversation(Action.ARM, steps, self, told="be set up")
         while True:
             ended = conversation.proceed(self.listen(self.patience_s / 10.0))
             if ended is not None:
@@ -126,10 +131,11 @@ class Radio:
 
 
 class Conversation:
-    """Steps under way: each begins when the one before it was answered; nothing here waits."""
+    """Steps under way: each begins when the one before it was answered; nothing here waits. `told` says what the
+    vehicle was told, where that is not the action."""
 
-    def __init__(self, action: Action, steps: tuple[Step, ...], radio: Radio) -> None:
-        self._action, self._radio = action, radio
+    def __init__(self, action: Action, steps: tuple[Step, ...], radio: Radio, *, told: str = "") -> None:
+        self._action, self._radio, self._told = action, radio, told or action
         self._steps = list(steps)
         self._sent_s = 0.0
         self._attempts = 0
@@ -167,10 +173,10 @@ class Conversation:
     def _refused(self, measurement: Measurement | None) -> Refused:
         why = measurement.why if isinstance(measurement, Reply) else ""
         said = f" It said: {' / '.join(self._radio.seen.spoken)}." if self._radio.seen.spoken else ""
-        return Refused(self._action, f"The vehicle refused to {self._action} ({why}).{said}", self._radio.clock.now_s())
+        return Refused(self._action, f"The vehicle refused to {self._told} ({why}).{said}", self._radio.clock.now_s())
 
     def _unanswered(self) -> Refused:
-        why = f"The vehicle did not answer when it was to {self._action}."
+        why = f"The vehicle did not answer when it was to {self._told}."
         return Refused(self._action, why, self._radio.clock.now_s())
 
 

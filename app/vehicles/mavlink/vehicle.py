@@ -15,7 +15,7 @@ from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.gains import GainStore
 from app.vehicles.mavlink.gauges import Gauges
 from app.vehicles.mavlink.machine import Plan
-from app.vehicles.mavlink.opening import limits_of, open_radio, patience_of
+from app.vehicles.mavlink.opening import limits_of, open_radio
 from app.vehicles.mavlink.orders import StandingOrder
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.signals import Action, Keep
@@ -65,6 +65,7 @@ class MavlinkVehicle:
         self._options = dict(options)
         self._state = State.CONNECT
         self._why = self._asked = self._plan_problem = ""
+        self._pinned = identity
         self._datum_m = 0.0
         self._flight: Flight | None = None
         self._order: StandingOrder | None = None
@@ -73,7 +74,7 @@ class MavlinkVehicle:
         self._gauges = Gauges(self._radio)
         try:
             self._gains = GainStore(self._radio, safe_gains)
-            self._connect(identity)
+            self._connect()
             if not observes:
                 self._require_ready()
         except BaseException:
@@ -218,20 +219,21 @@ class MavlinkVehicle:
         self._radio.link.log_to(path)
 
     def release(self) -> None:
-        """A person has looked at it: out of observation, once it is disarmed and holds its safe gains, read back.
-        Raises VehicleError when it is not heard, is armed, or does not hold them; it stays as it was then."""
-        if self._state not in IN_DOUBT:
-            return
+        """A person has looked at it, also at who it is now: out of observation, once it is disarmed and holds its safe
+        gains, read back. Raises VehicleError when it is not heard, is armed, or does not hold them; it stays as it was
+        then."""
         self._await_heartbeat()
         self._set_up()
-        self._enter(State.IDLE)
+        if self._state in IN_DOUBT:
+            self._enter(State.IDLE)
+        self._pinned = self.identity
         self._why = self._asked = ""
         self._order = None
 
     # ---- connecting
 
-    def _connect(self, identity: Identity | None) -> None:
-        preflight.meet(self._radio, str(self._options["address"]), identity)
+    def _connect(self) -> None:
+        preflight.meet(self._radio, str(self._options["address"]), self._pinned)
         self._plan_problem = preflight.learn(self._radio)
         self._enter(State.PREFLIGHT)
         self._listen(0.0)
@@ -244,8 +246,6 @@ class MavlinkVehicle:
             return
         self._enter(State.SET_GAINS)
         self._enter(State.IDLE)
-        if why := preflight.changed(self._radio, identity):
-            self._observe(why)
 
     def _set_up(self) -> None:
         """Raises VehicleError when the vehicle is armed, refuses, or does not take its safe gains."""
@@ -266,15 +266,17 @@ class MavlinkVehicle:
     def _await_heartbeat(self) -> None:
         asked_s = self._radio.clock.now_s()
         while self._radio.seen.heartbeat_s < asked_s:
-            if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * patience_of(self._options):
+            if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * self._radio.patience:
                 raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
             self._listen(_LISTEN_S)
 
     def _listen(self, timeout_s: float) -> None:
-        """Between flights: a vehicle that somebody else arms is only observed from then on."""
+        """Between flights: a vehicle that somebody else arms, or that tells another version than the pinned one, is
+        only observed from then on."""
         self._radio.listen(timeout_s)
-        if preflight.is_armed(self._radio) and self._state not in IN_DOUBT:
-            self._observe(preflight.ARMED)
+        why = preflight.ARMED if preflight.is_armed(self._radio) else preflight.changed(self._radio, self._pinned)
+        if why and self._state not in IN_DOUBT:
+            self._observe(why)
 
     # ---- flying
 
@@ -335,10 +337,16 @@ class MavlinkVehicle:
         )
 
     def _give_back(self) -> None:
-        """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified."""
-        if self._state not in IN_DOUBT and (problem := self._gains.give_back()):
-            self._enter(State.QUARANTINE)
-            self._why = f"Its safe gains could not be verified: {problem}"
+        """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified. One
+        that is armed by now keeps what it has, and is observed."""
+        if self._state in IN_DOUBT:
+            return
+        try:
+            self.restore()
+        except VehicleError as error:
+            if self._state not in IN_DOUBT:
+                self._enter(State.QUARANTINE)
+                self._why = f"Its safe gains could not be verified: {error}"
 
     # ---- records
 

@@ -96,6 +96,36 @@ def test_the_version_is_asked_of_autopilots_that_answer_and_a_new_one_is_a_conce
             assert vehicle.concern == ""
 
 
+def test_a_new_version_that_is_told_only_later_is_a_concern_until_a_person_has_looked() -> None:
+    """Paparazzi tells its version every few seconds, unasked."""
+    with Hangar() as hangar, connected(hangar, replace(PINNED, version="5.8.0")) as vehicle:
+        attend_until(vehicle, lambda: bool(vehicle.concern))
+        assert vehicle.concern == f"Its firmware is now version {vehicle.identity.version}; it was 5.8.0."
+        with pytest.raises(SafeGainsError, match="only observed"):
+            vehicle.stage(TUNED)
+        vehicle.release()
+        vehicle.attend(2.0)
+        assert (vehicle.concern, vehicle.stage(TUNED)) == ("", TUNED)
+
+
+def test_a_release_verifies_the_gains_also_of_a_vehicle_that_seems_to_be_in_order() -> None:
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        vehicle.stage(TUNED)
+        vehicle.release()
+        assert (vehicle.condition().held, vehicle.read_gains()) == (SAFE, SAFE)
+
+
+def test_a_vehicle_that_is_armed_while_it_is_staged_is_given_nothing_more() -> None:
+    with Hangar() as hangar, connected(hangar) as vehicle:
+        hangar.drone.autopilot._enter(START_ENGINE)  # type: ignore[attr-defined]  # as by remote control
+        assert becomes(
+            lambda: bool(vehicle._radio.listen(0.1)) and vehicle.condition().armed is True
+        )  # while it writes
+        written = list(hangar.writes)
+        vehicle._give_back()
+        assert (vehicle.condition().step, hangar.writes) == ("observing", written)
+
+
 def test_another_vehicle_than_the_pinned_one_is_not_taken_for_it() -> None:
     with (
         Hangar() as hangar,

@@ -346,3 +346,20 @@ def test_paparazzi_tells_every_change_of_block() -> None:
         "Takeoff",
         "land",
     ]
+
+
+@pytest.mark.parametrize(
+    ("profile", "parameter", "protects", "does_not"),
+    [
+        (ARDUPILOT, "FS_GCS_ENABLE", {5.0}, {0.0, 1.0, 2.0}),
+        (ARDUPILOT, "FENCE_ENABLE", {1.0}, {0.0}),
+        (PX4, "NAV_DLL_ACT", {3.0}, {0.0, 1.0, 5.0, 6.0}),
+        (PX4, "GF_ACTION", {2.0, 3.0, 5.0}, {0.0, 1.0, 4.0}),
+        (PX4, "GF_MAX_VER_DIST", {5.0, 10.0}, {0.0}),
+    ],
+)
+def test_only_a_failsafe_that_brings_the_vehicle_down_with_its_motors_running_will_do(
+    profile: Profile, parameter: str, protects: set[float], does_not: set[float]
+) -> None:
+    requirement = next(each for each in profile.requirements if each.parameter == parameter)
+    assert {value for value in protects | does_not if requirement.is_met(value)} == protects

@@ -55,7 +55,7 @@ class ArduPilot:
         ),
     )
     requirements: Final = (
-        Requirement("FS_GCS_ENABLE", "land when the ground station is lost (5)"),
+        Requirement("FS_GCS_ENABLE", "land when the ground station is lost (5)", frozenset({5.0})),
         Requirement("FENCE_ENABLE", "keep inside its fence (1)"),
     )
 

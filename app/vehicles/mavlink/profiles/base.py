@@ -73,10 +73,14 @@ GainSet = tuple[GainParameter, ...]
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A failsafe that has to be on before a flight: a parameter that must not be zero."""
+    """A failsafe that has to be on before a flight: a parameter with one of these values, or any but zero."""
 
     parameter: str
     what: str
+    values: frozenset[float] = frozenset()
+
+    def is_met(self, value: float) -> bool:
+        return value in self.values if self.values else value != 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,8 +48,10 @@ class Px4:
         ),
     )
     requirements: Final = (
-        Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)"),
-        Requirement("GF_ACTION", "act when it leaves its fence"),
+        Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)", frozenset({3.0})),
+        Requirement(
+            "GF_ACTION", "hold, return or land when it leaves its fence (2, 3 or 5)", frozenset({2.0, 3.0, 5.0})
+        ),
         Requirement("GF_MAX_VER_DIST", "have a fence, in metres above home"),
     )
 
