@@ -161,6 +161,8 @@ All of it was mended, and is flown again by `tests/bench/test_faults.py`:
   after 40 s.
 - Gains that overshoot to the ceiling of the vehicle's own flight plan passed for a landing that the vehicle began by
   itself: it was landed on these gains, and nothing was learnt of them.
+- A lift-off that could not be seen, because the link was lost at that moment, passed for none, and the gains were
+  blamed for it.
 
 What the runs do not have: sideways movement, radios that lose single packets, autopilots of other makes, hardware.
 """
