@@ -25,7 +25,8 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         <p>{vehicle.concern}</p>
       </div>
       <p>
-        It is only observed now. Land it if it flies, see that its motors have stopped, look at it, then release it.
+        It is only observed now. Land it if it flies, stop its motors if they still turn on the ground, look at it, then
+        release it.
       </p>
       <div className={classes["row"]}>
         <Button
