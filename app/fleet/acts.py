@@ -88,7 +88,7 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: As
 
 def _requested(session: Session, row: VehicleRow, kind: ActKind, asker: Asker, *, reason: str = "") -> VehicleActRow:
     check_action(ACTIONS, kind, row.state, row.name)
-    if kind == ActKind.CONNECT:
+    if kind != ActKind.DISCONNECT:
         require_near(row, asker)
     by = "" if kind in _LOOKS_ONLY else require_no_other(row, asker)
     require_idle(session, row)
@@ -157,25 +157,25 @@ def forget_connections(session: Session) -> None:
         move_vehicle(row, VehicleState.DISCONNECTED)
 
 
-def request_reconnections(session: Session) -> list[int]:
-    """At a worker's start: the acts that connect again those vehicles that were wanted connected. Gives their ids."""
-    rows = repository.registered_in(session, VehicleState.DISCONNECTED, VehicleState.QUARANTINED)
-    return [
-        _add(session, row, ActKind.CONNECT, by=BY_WORKER).id
-        for row in rows
-        if row.wanted_connected and repository.act_under_way(session, row.id) is None
-    ]
+def request_reconnections(session: Session, *, real: bool = True) -> list[int]:
+    """At a worker's start: the acts that connect again those vehicles that were wanted connected. Gives their ids.
+    `real`: whether real ones may be, which they may only for a server that nobody else reaches."""
+    return [_add(session, row, ActKind.CONNECT, by=BY_WORKER).id for row in _wanted(session, real=real)]
 
 
-def wanted_links(session: Session) -> list[LinkedVehicle]:
-    """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it."""
+def wanted_links(session: Session, *, real: bool = True) -> list[LinkedVehicle]:
+    """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it.
+    `real` as in `request_reconnections`."""
+    rows = _wanted(session, real=real)
+    return [_linked(row) for row in rows if repository.flight_under_way(session, row.id) is None]
+
+
+def _wanted(session: Session, *, real: bool) -> list[VehicleRow]:
     rows = repository.registered_in(session, VehicleState.DISCONNECTED, VehicleState.QUARANTINED)
     return [
-        _linked(row)
+        row
         for row in rows
-        if row.wanted_connected
-        and repository.act_under_way(session, row.id) is None
-        and repository.flight_under_way(session, row.id) is None
+        if row.wanted_connected and (real or not row.is_real) and repository.act_under_way(session, row.id) is None
     ]
 
 
@@ -200,14 +200,19 @@ def vehicle_connected(
     held: Mapping[str, float] | None = None,
 ) -> None:
     """The link is open. The vehicle is ready, or quarantined when there is a `concern`, be it one from before; its
-    identity is pinned the first time. `held`: its gains, where it said them."""
+    identity is pinned the first time, its version the first time that it tells one. `held`: its gains, where it said
+    them."""
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
-    if row.identity is None:
-        row.identity = asdict(identity)
+    _pin(row, identity)
     if held is not None:
         hold_gains(row, held)
     _move_to(row, VehicleState.QUARANTINED if row.concern else VehicleState.READY)
+
+
+def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
+    """Who answers, where that is not known yet; some tell their version only after a while."""
+    _pin(repository.get_one(session, vehicle_id), identity)
 
 
 def vehicle_gone(session: Session, vehicle_id: int, *, concern: str = "") -> None:
@@ -267,6 +272,11 @@ def _linked(row: VehicleRow) -> LinkedVehicle:
         safe_gains=dict(row.safe_gains),
         identity=None if row.identity is None else Identity(**row.identity),
     )
+
+
+def _pin(row: VehicleRow, identity: Identity) -> None:
+    if row.identity is None or not row.identity["version"]:
+        row.identity = asdict(identity)
 
 
 def _move_to(row: VehicleRow, state: VehicleState) -> None:

@@ -60,10 +60,11 @@ def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle
 
 def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: Asker) -> Vehicle:
     """Raises ConflictError when somebody else was faster or is in control, or the vehicle is not at rest; InputError
-    naming what cannot be used."""
+    naming what cannot be used, NotAllowedError for a real vehicle on an exposed server."""
     row = repository.get_one(session, vehicle_id)
     check_version(edit.version, row.version, row.name, _differences(row, edit))
     _require_own(row)
+    require_near(row, asker)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     by = require_no_other(row, asker)
@@ -88,6 +89,7 @@ def promote_gains(
     """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
     check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
     _require_own(row)
+    require_near(row, asker)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     _set_safe_gains(session, row, gains, statement=reason, by=require_no_other(row, asker))
@@ -116,7 +118,6 @@ def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: Asker
             f"{row.name} is connected; its link's settings cannot change under it.",
             hint="Disconnect it, change them, and connect it again.",
         )
-    require_near(row, asker)
     if kind.is_real_with(options, asker.simulation_hosts) != row.is_real:
         raise InputError(
             f"{row.name} is {'REAL' if row.is_real else 'simulated'} and stays so: that tells its flights apart.",

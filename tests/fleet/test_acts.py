@@ -256,16 +256,53 @@ def test_a_connection_that_a_person_asked_for_and_that_failed_is_not_tried_again
         assert acts.request_reconnections(session) == []
 
 
-def test_a_real_vehicle_is_not_connected_over_a_server_that_others_reach(
+def test_a_real_vehicle_is_asked_nothing_but_to_be_let_go_over_a_server_that_others_reach(
     settings: Settings, client: TestClient, database: Database
 ) -> None:
-    real, simulated = register(client, "Real", real=True), register(client, "Simulated")
+    met, doubted = create_connected(client, database, "Real", real=True), register(client, "Doubted", real=True)
+    connect(client, database, doubted, concern="its motors run")
+    simulated = register(client, "Simulated")
+    asked = [(register(client, "Away", real=True), "connect", {}), (doubted, "release", {"statement": "seen by Ada"})]
+    asked += [(met, kind, {}) for kind in ("check", "restore", "parameters")]
     exposed = settings.model_copy(update={"host": "0.0.0.0"})
     with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000") as network:
-        refused = network.post(f"/api/vehicles/{real['id']}/connect")
-        assert refused.status_code == 403
-        assert "Real is a real vehicle, and this server can be reached over the network" in refused.json()["detail"]
+        for vehicle, kind, body in asked:
+            refused = network.post(f"/api/vehicles/{vehicle['id']}/{kind}", json=body)
+            assert refused.status_code == 403, kind
+            assert "is a real vehicle, and this server can be reached over the network" in refused.json()["detail"]
+        edit = {"version": met["version"], "safe_gains": {"kp": 300, "ki": 13, "kd": 82}, "statement": "Ada says so"}
+        assert network.patch(f"/api/vehicles/{met['id']}", json=edit).status_code == 403
+        assert network.post(f"/api/vehicles/{met['id']}/disconnect").status_code == 202
         assert network.post(f"/api/vehicles/{simulated['id']}/connect").status_code == 202
+
+
+def test_a_worker_beside_a_server_that_others_reach_connects_no_real_vehicle_again(
+    client: TestClient, database: Database
+) -> None:
+    simulated = create_connected(client, database, "Simulated")
+    create_connected(client, database, "Real", real=True)
+    with database.write() as session:
+        acts.forget_connections(session)
+        assert [link.name for link in acts.wanted_links(session, real=False)] == ["Simulated"]
+        assert [link.name for link in acts.wanted_links(session)] == ["Simulated", "Real"]
+        assert len(acts.request_reconnections(session, real=False)) == 1
+    assert newest(client, simulated)["by"] == "the worker"
+
+
+def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
+    client: TestClient, database: Database
+) -> None:
+    """Paparazzi tells its version every few seconds: often after it was connected."""
+    vehicle = register(client)
+
+    def connected_as(version: str, concern: str = "") -> str:
+        with database.write() as session:
+            identity = Identity(system_id=1, autopilot="paparazzi", version=version)
+            acts.vehicle_connected(session, vehicle["id"], identity, concern=concern)
+            acts.vehicle_gone(session, vehicle["id"])
+        return str(seen(client, vehicle)["identity"]["version"])
+
+    assert [connected_as(version) for version in ("", "5.18", "", "5.20")] == ["", "5.18", "5.18", "5.18"]
 
 
 def test_an_order_past_the_database_is_written_down_afterwards(client: TestClient, database: Database) -> None:
