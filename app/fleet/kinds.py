@@ -8,7 +8,7 @@ from app.vehicles.open import VEHICLE_KINDS
 def can_fly(row: VehicleRow) -> bool:
     """Whether the program can fly it, rather than take records of flights made elsewhere."""
     kind = VEHICLE_KINDS.get(row.kind)
-    return kind is not None and kind.can_fly and (kind.served or row.registered)
+    return kind is not None and kind.can_fly
 
 
 def experiments_of(row: VehicleRow) -> list[str]:

@@ -57,7 +57,7 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         title=described.title,
         is_real=described.is_real,
         safe_gains=dict(default_gains),
-        state=VehicleState.READY if described.can_fly and described.served else VehicleState.DISCONNECTED,
+        state=VehicleState.READY if described.can_fly else VehicleState.DISCONNECTED,
     )
     session.add(row)
     session.flush()

@@ -33,8 +33,7 @@ class VehicleKind:
     none, and is opened for each flight. It raises VehicleError when nobody answers, or another than `identity` (None:
     whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
     `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
-    says whether a vehicle of a real kind is a simulation all the same. The dashboard offers and flies those that are
-    `served`.
+    says whether a vehicle of a real kind is a simulation all the same.
     """
 
     name: str
@@ -49,7 +48,6 @@ class VehicleKind:
     conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
     simulates: Callable[[Options, Hosts], bool] = _never
     suits: Callable[[Options], tuple[str, ...]] | None = None
-    served: bool = True
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""
