@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from app.db.models import FlightRow
 from app.db.session import Database
-from app.live.messages import FlightPhase, Telemetry
+from app.live.messages import FlightPhase, Shown
 from app.settings import Settings
 from app.trials.flights import BEGINS_WITHIN
 from app.trials.flying import Airspace
@@ -22,7 +22,7 @@ from app.trials.tasks import FlightDeck
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.trials.states import make_vehicle_real
 
-Watch = Callable[[Telemetry | FlightPhase], None]
+Watch = Callable[[Shown], None]
 
 
 class Airfield:
@@ -30,7 +30,7 @@ class Airfield:
 
     def __init__(self, database: Database, settings: Settings) -> None:
         self.airspace = Airspace()
-        self.heard: list[Telemetry | FlightPhase] = []
+        self.heard: list[Shown] = []
         self.watch: Watch = lambda _said: None
         self.deck = FlightDeck(
             database, settings.data_dir, self.airspace, self._hear, worker="tests", closing=threading.Event()
@@ -45,7 +45,7 @@ class Airfield:
         for cockpit in self.deck._hangar._waiting:
             os.kill(cockpit._process.pid or 0, signal.SIGKILL)
 
-    def _hear(self, said: Telemetry | FlightPhase) -> None:
+    def _hear(self, said: Shown) -> None:
         self.heard.append(said)
         self.watch(said)
 
@@ -191,7 +191,7 @@ def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
     refuse(database, "INSERT ON trajectory")
     spool = settings.data_dir / "spool"
 
-    def lose_the_spool(said: Telemetry | FlightPhase) -> None:
+    def lose_the_spool(said: Shown) -> None:
         if isinstance(said, FlightPhase) and said.phase == "landed" and spool.exists():
             for path in spool.iterdir():
                 path.unlink()
