@@ -261,15 +261,16 @@ class _Judgement:
         left = [end_s for _, end_s in self.stages.spans(*AIR) if end_s < self.stages.over_s]
         if not left:
             return
-        following = [(at_s, order) for at_s, order in self.stages.orders if at_s >= max(left)]
+        told = (Order.GAIN, Order.LAND, Order.MOTORS_OFF)
+        following = [(at_s, order) for at_s, order in self.stages.orders if at_s >= max(left) and order in told]
         first = following[0][1] if following else None
         if first is Order.MOTORS_OFF:
             return
         may_be_suspect = any(each.kind in SUSPECT and each.begun_s <= max(left) for each in self.flown.struck)
         if first is Order.GAIN and not may_be_suspect:
             yield "gains were sent before Land, though nothing spoke against them"
-        is_lost = self.stages.first_s(Stage.LINK_LOST) is not None
-        if self.flown.outcome == "aborted" and first is Order.LAND and not is_lost:
+        is_aborted = self.flown.outcome == "aborted" and not self.of(MOTORS_OFF)
+        if is_aborted and first is Order.LAND and self.stages.at(max(left)) is Stage.ABORT_LAND:
             yield "Land was sent before the safe gains, though the gains were suspect"
         lands = [at_s for at_s, order in following if order is Order.LAND]
         if first is Order.GAIN and (not lands or lands[0] - max(left) > 0.3 + SLACK_S):
