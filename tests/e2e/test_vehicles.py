@@ -1,0 +1,160 @@
+"""Vehicles that are registered one by one: a simulated drone on loopback UDP, from its form to its ledger."""
+
+import json
+import os
+import re
+import signal
+from collections.abc import Iterator
+from typing import Final
+
+import pytest
+from playwright.sync_api import Locator, expect
+
+from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.dashboard import Dashboard
+from tests.runtime.drones import SAFE, TRIED, Drone
+
+SAFE_IN_BRACKETS: Final = "[283 13 82]"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with served(tmp_path_factory.mktemp("fleet") / "data") as one:
+        yield one
+
+
+@pytest.fixture
+def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
+    return open_dashboard(server.url)
+
+
+def fact(dashboard: Dashboard, panel: str, title: str) -> Locator:
+    """The reading with that title."""
+    return dashboard.panel(panel).locator("dt", has_text=title).locator("xpath=following-sibling::dd")
+
+
+def state_word(dashboard: Dashboard, word: str) -> Locator:
+    return dashboard.page.get_by_role("main").get_by_text(word, exact=True)
+
+
+def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
+    page = dashboard.page
+    dashboard.open("/vehicles")
+    page.get_by_role("link", name="Register a vehicle").click()
+    address = page.get_by_role("textbox", name="Address")
+    page.get_by_label("Name").fill(name)
+    page.get_by_role("switch", name="It is a simulation on this computer").check()
+    address.fill("udp:nowhere")
+    dashboard.button("Register").click()
+    expect(address).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_text(re.compile("^must be udp:HOST:PORT"))).to_be_visible()
+    address.fill(drone.address)
+    dashboard.button("Register").click()
+    page.wait_for_url(re.compile(r"/vehicles/\d+$"))
+    return int(page.url.rsplit("/", 1)[1])
+
+
+def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dashboard: Dashboard) -> None:
+    page = dashboard.page
+    with Drone() as drone:
+        vehicle_id = register_by_hand(dashboard, "Bee", drone)
+        expect(page.get_by_role("heading", level=1)).to_have_text("Bee")
+        expect(state_word(dashboard, "Not connected")).to_be_visible()
+        dashboard.button("Connect").click()
+        expect(state_word(dashboard, "Ready")).to_be_visible()
+        expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
+        expect(fact(dashboard, "Connection", "Last heard")).to_have_text(re.compile(r"^0\.\d s$"))
+        expect(fact(dashboard, "Battery", "Voltage now")).to_have_text(re.compile(r"^1\d\.\d V$"))
+        expect(dashboard.panel("Gains").get_by_text("It holds its safe gains")).to_be_visible()
+
+        dashboard.button("Check now").click()
+        passed = dashboard.panel("Preflight check").get_by_text("passed", exact=True)
+        expect(passed.first).to_be_visible()
+        checks = dashboard.get(f"/vehicles/{vehicle_id}")["checks"]
+        expect(passed).to_have_count(len(checks))
+        assert all(check["passed"] for check in checks)
+
+        page.get_by_label("The battery that is in").fill("No. 3")
+        dashboard.button("Keep").click()
+        dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["battery"] == "No. 3")
+
+        given = dashboard.panel("Gains it was given").get_by_role("row").nth(1)
+        expect(given).to_contain_text("Safe gains at the connection")
+        expect(given.get_by_role("cell", name=SAFE_IN_BRACKETS, exact=True)).to_have_count(2)
+
+        dashboard.button("Disconnect").click()
+        expect(state_word(dashboard, "Not connected")).to_be_visible()
+        asked = dashboard.get(f"/vehicles/{vehicle_id}/acts")["items"]
+        assert [(act["kind"], act["state"]) for act in asked] == [
+            ("disconnect", "done"),
+            ("check", "done"),
+            ("connect", "done"),
+            ("safe gains", "done"),
+        ]
+
+
+def test_a_campaign_with_a_registered_vehicle_has_its_experiment(dashboard: Dashboard) -> None:
+    page = dashboard.page
+    options = {"autopilot": "px4", "address": "udpin:127.0.0.1:14998", "simulated": True}
+    vehicle = dashboard.post("/vehicles", {"name": "Moth", "kind": "mavlink", "options": options})
+    dashboard.open("/new")
+    expect(page.get_by_role("radio", name=re.compile("Moth"))).to_have_count(0)
+    dashboard.button("Moth").click()
+    expect(page.get_by_role("radio", name=re.compile("Moth"))).to_be_checked()
+    expect(page.get_by_label("Name")).to_have_value(re.compile("PX4.*, Moth$"))
+    dashboard.button("Create campaign").click()
+    page.wait_for_url(re.compile(r"/campaigns/\d+$"))
+    campaign = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
+    assert (campaign["vehicle"]["id"], campaign["definition"]["experiment"]) == (vehicle["id"], "takeoff-px4")
+
+
+def left_in_the_air(dashboard: Dashboard, server: Server, drone: Drone, name: str) -> int:
+    """A vehicle that nobody flies any more: its session was killed while it flew."""
+    options = {"address": drone.address, "simulated": True}
+    vehicle_id: int = dashboard.post("/vehicles", {"name": name, "kind": "mavlink", "options": options})["id"]
+    dashboard.post(f"/vehicles/{vehicle_id}/connect")
+    until_in_state(dashboard, vehicle_id, "ready")
+    made = dashboard.post("/campaigns", {"name": name, "vehicle": {"kind": "mavlink", "id": vehicle_id}})
+    campaign_id = dashboard.when_ready(made["id"])
+    trial = dashboard.post(f"/campaigns/{campaign_id}/trials", {"gains": TRIED})
+    dashboard.open(f"/vehicles/{vehicle_id}")
+    dashboard.post(f"/trials/{trial['id']}/fly")
+    expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^[1-3]\.\d\d m$"))
+    os.kill(json.loads((server.data_dir / f"vehicle-{vehicle_id}.lock").read_text())["pid"], signal.SIGKILL)
+    until_in_state(dashboard, vehicle_id, "quarantined")
+    return vehicle_id
+
+
+def slide_to_its_end(dashboard: Dashboard, knob: Locator) -> None:
+    knob.scroll_into_view_if_needed()
+    box = knob.bounding_box()
+    assert box is not None
+    x, y, mouse = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, dashboard.page.mouse
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x + 400, y, steps=8)
+    mouse.up()
+
+
+def until_in_state(dashboard: Dashboard, vehicle_id: int, state: str) -> None:
+    dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["state"] == state)
+
+
+def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
+    dashboard: Dashboard, server: Server
+) -> None:
+    page = dashboard.page
+    with Drone() as drone:
+        vehicle_id = left_in_the_air(dashboard, server, drone, "Wasp")
+        expect(page.get_by_role("heading", name="Quarantined: do not fly it")).to_be_visible()
+        expect(fact(dashboard, "Connection", "Motors")).to_have_text("armed")
+        dashboard.button("Land now").click()
+        expect(page.get_by_text(re.compile("told to land"))).to_be_visible()
+        expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^-?0\.[01]\d m$"), timeout=60_000)
+        slide_to_its_end(dashboard, page.get_by_role("button", name="Motors off – the drone falls"))
+        expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
+        page.get_by_label("Who has looked at it, and what was found").fill("Ada: it stands, nothing is broken")
+        dashboard.button("Release").click()
+        expect(state_word(dashboard, "Ready")).to_be_visible()
+        assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
+        expect(dashboard.panel("Gains it was given")).to_contain_text("Safe gains at the release")
