@@ -36,7 +36,7 @@ from app.live.watch import DatabaseWatch
 from app.locks import LockedError, exclusive
 from app.observability import configure_logs
 from app.pool import Pool
-from app.settings import Settings
+from app.settings import Settings, is_loopback
 from app.studies.service import REPRODUCTION_JOB
 from app.studies.tasks import Reproducer
 from app.trials.flying import Airspace
@@ -160,7 +160,15 @@ class Worker:
             live.publish(message)
 
         data_dir, closing = self._settings.data_dir, self._ending.event
-        sessions = SessionDeck(database, data_dir, self._airspace, publish, worker=self._name, closing=closing)
+        sessions = SessionDeck(
+            database,
+            data_dir,
+            self._airspace,
+            publish,
+            worker=self._name,
+            closing=closing,
+            real=is_loopback(self._settings.host),
+        )
         live = LiveServer(live_address(data_dir), abort=self._airspace.abort, order=sessions.order, hello=self._hello)
         deck = FlightDeck(
             database,

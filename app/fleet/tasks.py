@@ -32,6 +32,7 @@ from app.trials.flying import Airspace, Publish
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 RETRY_S: Final = 1.0
+GIVES_WAY_S: Final = 0.1
 LOOK_FOR_LINKS_EVERY_S: Final = 2.0
 AT_ONCE: Final = 16
 
@@ -55,7 +56,8 @@ class Berth:
 
 class SessionDeck:
     """Claims acts and carries them out, and has the sessions. `closing` ends the waiting for a database that takes
-    nothing. `order` and `session` may be called from any thread."""
+    nothing. `order` and `session` may be called from any thread. Without `real`, no real vehicle is connected again by
+    itself: others reach the server."""
 
     def __init__(
         self,
@@ -66,6 +68,7 @@ class SessionDeck:
         *,
         worker: str,
         closing: threading.Event,
+        real: bool = True,
     ) -> None:
         self._database = database
         self._data_dir = data_dir
@@ -73,6 +76,7 @@ class SessionDeck:
         self._publish = publish
         self._worker = worker
         self._closing = closing
+        self._real = real
         self._berths: dict[int, Berth] = {}
         self._look_due_s = 0.0
         self._seekers = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="link")
@@ -83,7 +87,7 @@ class SessionDeck:
         with self._database.write() as transaction:
             acts.withdraw_acts(transaction, "the worker ended")
             acts.forget_connections(transaction)
-            acts.request_reconnections(transaction)
+            acts.request_reconnections(transaction, real=self._real)
 
     def close(self) -> None:
         """When nothing is carried out any more: every vehicle is let go, with its safe gains."""
@@ -132,11 +136,12 @@ class SessionDeck:
 
     def _connect(self, task: ActTask) -> None:
         berth = self._berth(task.vehicle.vehicle_id)
-        if berth.seeking is not None:
-            berth.seeking.hang_up()
         try:
-            with berth.busy:
+            self._take(berth)
+            try:
                 said = self._opened(berth, task.vehicle)
+            finally:
+                berth.busy.release()
         except GainlineError as error:
             concern = str(error) if isinstance(error, SafeGainsError) else ""
             self._fail(task, str(error), also=lambda t: acts.vehicle_gone(t, task.vehicle.vehicle_id, concern=concern))
@@ -145,12 +150,21 @@ class SessionDeck:
 
     def _disconnect(self, task: ActTask) -> None:
         berth = self._berth(task.vehicle.vehicle_id)
-        with berth.busy:
+        self._take(berth)
+        try:
             session, berth.session = berth.session, None
             if session is not None:
                 session.close()
+        finally:
+            berth.busy.release()
         self._show(task.vehicle.vehicle_id, "gone")
         self._store_patiently(partial(_disconnected, task=task))
+
+    def _take(self, berth: Berth) -> None:
+        """The berth for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
+        while not berth.busy.acquire(timeout=GIVES_WAY_S):
+            if (seeking := berth.seeking) is not None:
+                seeking.hang_up()
 
     def _ask(self, task: ActTask) -> None:
         try:
@@ -176,24 +190,25 @@ class SessionDeck:
         """To be called every second or so: sessions that ended by themselves are taken out of the books, and vehicles
         that are wanted connected are looked for. Raises StorageError."""
         for vehicle_id, berth in tuple(self._berths.items()):
-            if berth.session is not None and not berth.session.alive:
-                self._let_go(vehicle_id, berth)
+            if (session := berth.session) is not None and not session.alive:
+                self._let_go(vehicle_id, berth, session)
         if time.monotonic() < self._look_due_s:
             return
         self._look_due_s = time.monotonic() + LOOK_FOR_LINKS_EVERY_S
         with self._database.read() as transaction:
-            wanted = acts.wanted_links(transaction)
+            wanted = acts.wanted_links(transaction, real=self._real)
         for vehicle in wanted:
             self._look_for(vehicle)
 
-    def _let_go(self, vehicle_id: int, berth: Berth) -> None:
+    def _let_go(self, vehicle_id: int, berth: Berth, gone: Session) -> None:
         try:
             with self._database.write() as transaction:
                 acts.vehicle_gone(transaction, vehicle_id)
         except ConflictError:
             return  # its flight is still in the books; later
         _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
-        berth.session = None
+        if berth.session is gone:  # and not one that was opened meanwhile
+            berth.session = None
         self._show(vehicle_id, "gone")
 
     def _look_for(self, vehicle: LinkedVehicle) -> None:
@@ -317,6 +332,8 @@ def _answered(transaction: Transaction, task: ActTask, answered: Answered) -> No
         acts.vehicle_released(transaction, vehicle_id, identity=answered.identity)
     elif answered.concern:
         acts.quarantine_vehicle(transaction, vehicle_id, answered.concern)
+    elif answered.identity is not None:
+        acts.pin_identity(transaction, vehicle_id, answered.identity)
     read_back = answered.held if task.kind in GIVES_GAINS and answered.held else None
     acts.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
 
