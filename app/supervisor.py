@@ -15,7 +15,7 @@ LONGEST_PAUSE_S: Final = 10.0
 HEALTHY_AFTER_S: Final = 20.0
 """A child that lived this long starts again after the shortest pause."""
 PATIENCE_S: Final = 60.0
-"""How long a child that was asked to stop may take to land what flies and record it: landing may take a vehicle 40 s."""
+"""How long a child that was asked to stop may take to land what flies and to record it: landing alone may take 40 s."""
 
 _log = structlog.get_logger(__name__)
 T = TypeVar("T")
