@@ -45,12 +45,22 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
         "overruled": f"/campaigns/{create_overruled(dashboard)}",
         "pitch": f"/campaigns/{create_pitch(dashboard)}",
         "flight": f"/campaigns/{under_way}/flights/{dashboard.trials(under_way)[2]['id']}",
+        "vehicles": "/vehicles",
+        "new-vehicle": "/vehicles/new",
+        "vehicle": f"/vehicles/{register(dashboard)}",
         "reproductions": "/reproductions",
         "jobs": "/jobs",
         "missing": "/no/such/page",
     }
     context.close()
     return paths
+
+
+def register(dashboard: Dashboard) -> int:
+    """A vehicle that nobody has connected yet."""
+    options = {"address": "udp:127.0.0.1:14997@14996", "simulated": True}
+    registered: int = dashboard.post("/vehicles", {"name": "Bee", "kind": "mavlink", "options": options})["id"]
+    return registered
 
 
 def create_overruled(dashboard: Dashboard) -> int:

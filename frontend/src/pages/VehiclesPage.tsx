@@ -26,11 +26,14 @@ export function VehiclesPage() {
       {vehicles.data && registered.length === 0 && <NoVehicles />}
       <div className={classes["stack"]}>
         {registered.length > 0 && (
-          <ul className={classes["list"]} aria-label="Registered vehicles">
-            {registered.map((vehicle) => (
-              <VehicleCard key={vehicle.id} vehicle={vehicle} />
-            ))}
-          </ul>
+          <section>
+            <h2 className={classes["section"]}>Registered, each with a link of its own</h2>
+            <ul className={classes["list"]} aria-label="Registered vehicles">
+              {registered.map((vehicle) => (
+                <VehicleCard key={vehicle.id} vehicle={vehicle} />
+              ))}
+            </ul>
+          </section>
         )}
         {shared.length > 0 && (
           <section>
