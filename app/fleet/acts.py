@@ -22,6 +22,7 @@ from app.db.types import utc_now
 from app.errors import ConflictError
 from app.fleet import repository
 from app.fleet.control import Asker, record_act, require_near, require_no_other
+from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, move_vehicle, require_idle
 from app.fleet.states import ACT_MOVES, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
@@ -268,7 +269,7 @@ def _linked(row: VehicleRow) -> LinkedVehicle:
         name=row.name,
         kind=row.kind,
         is_real=row.is_real,
-        options=dict(row.options),
+        options=settings_of(row),
         safe_gains=dict(row.safe_gains),
         identity=None if row.identity is None else Identity(**row.identity),
     )

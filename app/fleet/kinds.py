@@ -1,6 +1,7 @@
 """What a vehicle can do by its kind."""
 
 from app.db.models import VehicleRow
+from app.schemas import OptionValue
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS
 
@@ -17,6 +18,12 @@ def experiments_of(row: VehicleRow) -> list[str]:
     if kind is None:
         return []
     return list(kind.experiments_with(row.options) if row.registered else kind.experiments)
+
+
+def settings_of(row: VehicleRow) -> dict[str, OptionValue]:
+    """What a registered vehicle is registered with, complete."""
+    kind = VEHICLE_KINDS.get(row.kind)
+    return dict(row.options) if kind is None else kind.completed(row.options)
 
 
 def is_registered_one_by_one(kind: VehicleKind) -> bool:

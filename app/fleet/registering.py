@@ -10,7 +10,7 @@ from app.db.models import VehicleRow
 from app.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.fleet import repository
 from app.fleet.control import Asker, record_act, refuse_real, require_near, require_no_other
-from app.fleet.kinds import is_registered_one_by_one
+from app.fleet.kinds import is_registered_one_by_one, settings_of
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
 from app.fleet.states import ACTIONS, ActKind, VehicleState
@@ -110,8 +110,8 @@ def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, 
 
 def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: Asker) -> None:
     kind = VEHICLE_KINDS[row.kind]
-    options = kind.check({**row.options, **asked}, field="options", simulation_hosts=asker.simulation_hosts)
-    if options == row.options:
+    options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=asker.simulation_hosts)
+    if options == settings_of(row):
         return
     if row.state != VehicleState.DISCONNECTED:
         raise ConflictError(

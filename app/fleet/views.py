@@ -8,7 +8,7 @@ from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.fleet import repository
 from app.fleet.control import control_of
-from app.fleet.kinds import can_fly, experiments_of, needs_staging
+from app.fleet.kinds import can_fly, experiments_of, needs_staging, settings_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
 from app.fleet.states import ACTIONS
 from app.moves import allowed
@@ -31,7 +31,7 @@ def vehicle_view(row: VehicleRow) -> Vehicle:
         state=row.state,
         concern=row.concern,
         experiments=experiments_of(row),
-        options=row.options,
+        options=settings_of(row) if row.registered else row.options,
         identity=None if row.identity is None else Identity.model_validate(row.identity),
         safe_gains=row.safe_gains,
         held=row.held,
@@ -63,7 +63,7 @@ def campaign_vehicle(row: CampaignRow) -> CampaignVehicle:
 
 def options_of(row: CampaignRow) -> dict[str, OptionValue]:
     """The settings that a campaign flies with: a registered vehicle's own, else the campaign's."""
-    return dict(row.vehicle.options if row.vehicle.registered else row.vehicle_options)
+    return settings_of(row.vehicle) if row.vehicle.registered else dict(row.vehicle_options)
 
 
 def act_view(row: VehicleActRow) -> VehicleAct:

@@ -57,6 +57,10 @@ class VehicleKind:
         """Whether a vehicle with these options, complete and checked, is REAL."""
         return self.is_real and not self.simulates(options, simulation_hosts)
 
+    def completed(self, options: Options) -> dict[str, OptionValue]:
+        """Options as any version of the program stored them: later ones at their defaults, none that are gone."""
+        return {option.name: options.get(option.name, option.default) for option in self.options}
+
     def check(
         self, options: Mapping[str, object], *, field: str, simulation_hosts: Hosts = HERE
     ) -> dict[str, OptionValue]:

@@ -2,6 +2,7 @@
 
 from fastapi.testclient import TestClient
 
+from app.db.models import VehicleRow
 from app.db.session import Database
 from app.fleet import acts
 from app.fleet.states import VehicleState
@@ -29,6 +30,19 @@ def test_a_registered_vehicle_has_settings_of_its_own_and_is_not_connected(clien
     assert (vehicle["safe_gains"], vehicle["held"], vehicle["identity"]) == (DEFAULT_GAINS, None, None)
     assert vehicle["actions"] == ["connect", "edit"]
     assert seen(client, vehicle) == vehicle
+
+
+def test_a_vehicle_that_an_earlier_version_stored_has_the_later_settings_at_their_defaults(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = register(client, options={"simulated": True, "system_id": 7})
+    with database.write() as session:
+        row = session.get_one(VehicleRow, vehicle["id"])
+        kept = {name: value for name, value in row.options.items() if name != "telemetry_hz"}
+        row.options = {**kept, "given_up": 3.0}
+    assert seen(client, vehicle)["options"] == vehicle["options"]
+    with database.read() as session:
+        assert acts.linked_vehicle(session, vehicle["id"]).options == vehicle["options"]
 
 
 def test_a_vehicle_is_real_unless_it_is_registered_as_simulated_on_this_computer_or_a_named_host(

@@ -6,9 +6,7 @@ import classes from "./Fleet.module.css";
 /** What the last check found, every item of it. */
 export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicle }) {
   if (checks === null) {
-    return (
-      <p className={classes["quiet"]}>Not checked since it was connected. A flight is staged only after a check.</p>
-    );
+    return <p className={classes["quiet"]}>Not checked yet. All of this is looked at again before every flight.</p>;
   }
   return (
     <>

@@ -27,6 +27,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   const { safe_gains: safe } = vehicle;
   const live = status?.status.held ?? {};
   const held = inOrder(Object.keys(live).length > 0 ? live : (vehicle.held ?? {}), Object.keys(safe));
+  const isCurrent = status?.isCurrent ?? false;
   const isKnown = Object.keys(held).length > 0;
   if (editing) return <SafeGainsForm vehicle={vehicle} onDone={() => setEditing(false)} />;
   return (
@@ -56,12 +57,16 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
         </table>
         {isKnown && sameHeld(held, safe) && (
           <span className={classes["good"]}>
-            <IconCircleCheck size={18} aria-hidden /> It holds its safe gains
+            <IconCircleCheck size={18} aria-hidden />{" "}
+            {isCurrent ? "It holds its safe gains" : "When last read, it held its safe gains"}
           </span>
         )}
         {isKnown && !sameHeld(held, safe) && (
           <span className={classes["bad"]}>
-            <IconAlertTriangle size={18} aria-hidden /> It holds other gains than the safe ones
+            <IconAlertTriangle size={18} aria-hidden />{" "}
+            {isCurrent
+              ? "It holds other gains than the safe ones"
+              : "When last read, it held other gains than the safe ones"}
           </span>
         )}
         <p className={classes["quiet"]}>
