@@ -43,14 +43,17 @@ def judge(
 
 def landing_battery_v(record: Trajectory) -> float | None:
     """The battery's voltage at the end of a flight, V; None where it was not recorded."""
-    recorded = record.channels.get("battery_v")
-    return float(recorded[-1]) if recorded is not None and len(recorded) else None
+    return _battery_v(record, -1)
 
 
 def starting_battery_v(record: Trajectory) -> float | None:
     """The battery's voltage at the start of a flight, V; None where it was not recorded."""
+    return _battery_v(record, 0)
+
+
+def _battery_v(record: Trajectory, sample: int) -> float | None:
     recorded = record.channels.get("battery_v")
-    return float(recorded[0]) if recorded is not None and len(recorded) else None
+    return float(recorded[sample]) if recorded is not None and len(recorded) else None
 
 
 def verdict(

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, StopRule
-from app.core.stopping import judge, landing_battery_v, verdict
+from app.core.stopping import judge, landing_battery_v, starting_battery_v, verdict
 from app.core.strategies.base import Explanation, Proposal
 from tests.core.bowl import fly
 
@@ -92,11 +92,13 @@ def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "
     assert low.why.startswith("The last flight ended at 10.42 V; 10.5 V is the least.")
 
 
-def test_the_battery_is_read_at_the_end_of_a_record() -> None:
+def test_the_battery_is_read_at_both_ends_of_a_record() -> None:
     flight = fly(1, 30, 40)
-    assert landing_battery_v(flight.trajectory) is None
+    assert (starting_battery_v(flight.trajectory), landing_battery_v(flight.trajectory)) == (None, None)
     channels = {**flight.trajectory.channels, "battery_v": np.linspace(11.1, 10.4, len(flight.trajectory))}
-    assert landing_battery_v(replace(flight.trajectory, channels=channels)) == pytest.approx(10.4)
+    recorded = replace(flight.trajectory, channels=channels)
+    assert starting_battery_v(recorded) == pytest.approx(11.1)
+    assert landing_battery_v(recorded) == pytest.approx(10.4)
 
 
 def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
