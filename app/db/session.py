@@ -5,7 +5,6 @@ because somebody else wrote in between; one that takes the write lock first wait
 """
 
 import sqlite3
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -70,8 +69,6 @@ class Database:
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(**{_BEGIN: "IMMEDIATE"}), expire_on_commit=False)
         event.listen(self._writers, "after_flush", outbox.record_changes)
-        self._turn = threading.Lock()
-        """SQLite lets whoever asks at the right moment write, so one of many threads can wait for ever."""
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -82,17 +79,8 @@ class Database:
     @contextmanager
     def write(self) -> Iterator[Session]:
         """One transaction that holds the write lock: committed when the block ends, undone when it raises."""
-        with self._taking_turns(), translated(self.file), self._writers.begin() as session:
+        with translated(self.file), self._writers.begin() as session:
             yield session
-
-    @contextmanager
-    def _taking_turns(self) -> Iterator[None]:
-        if not self._turn.acquire(timeout=_BUSY_TIMEOUT_MS / 1000.0):
-            raise _trouble("is locked", self.file)
-        try:
-            yield
-        finally:
-            self._turn.release()
 
     def close(self) -> None:
         self.engine.dispose()
@@ -112,13 +100,10 @@ def translated(database_file: Path) -> Iterator[None]:
 def _storage_error(error: DBAPIError, database_file: Path) -> StorageError | None:
     """The storage trouble behind a driver's error, or None when it is of another kind."""
     message = str(error.orig).lower()
-    known = next((words for words in _TROUBLES if words in message), None)
-    return None if known is None else _trouble(known, database_file)
-
-
-def _trouble(words: str, database_file: Path) -> StorageError:
-    happened, hint = _TROUBLES[words]
-    return StorageError(happened.format(file=database_file), hint=hint.format(file=database_file))
+    for words, (happened, hint) in _TROUBLES.items():
+        if words in message:
+            return StorageError(happened.format(file=database_file), hint=hint.format(file=database_file))
+    return None
 
 
 _TROUBLES: Final = {
