@@ -87,6 +87,7 @@ def test_the_catalogue_offers_what_a_campaign_can_be_made_of(client: TestClient)
         "jsbsim": True,
         "twin": True,
         "lti": True,
+        "mavlink": True,
         "import": False,
     }
     assert catalogue["experiments"][0]["gains"][0] == {

@@ -296,7 +296,7 @@ class _Waiter:
         return found
 
     def wake(self) -> None:
-        with contextlib.suppress(BlockingIOError):  # full of wakes: it will wake
+        with contextlib.suppress(OSError):  # full of wakes, or closed by who waited
             self._button.send(b"!")
 
     def close(self) -> None:
