@@ -26,6 +26,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
@@ -282,8 +283,8 @@ def main() -> int:
         clients, theirs = context.Pipe()
         context.Process(target=watch, args=(url, theirs), daemon=True).start()
         clients.recv()
-        together([lambda each=each: each.order_landings(seconds / 4.0) for each in operators])  # type: ignore[misc]
-        together([lambda each=each: each.abort_flights(seconds) for each in operators])  # type: ignore[misc]
+        together([partial(each.order_landings, seconds / 4.0) for each in operators])
+        together([partial(each.abort_flights, seconds) for each in operators])
         clients.send("count")
         heard = clients.recv()
         sent = {index: drone.frames() for index, drone in enumerate(drones)}

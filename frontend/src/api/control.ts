@@ -6,6 +6,7 @@ import { problemOf } from "../lib/problems";
 import { dropLease, holdLease, leasesNow, type OwnLease } from "../live/leases";
 import { answer } from "./client";
 import { giveUpControl, takeControl } from "./generated";
+import { useVehicleChanged } from "./vehicles";
 
 const RENEW_MS = 5000;
 
@@ -48,29 +49,20 @@ export function useRenewedControl(): void {
   }, [queries]);
 }
 
-function useVehicleChanged(vehicleId: number): () => Promise<unknown> {
-  const queries = useQueryClient();
-  return () =>
-    Promise.all([
-      queries.invalidateQueries({ queryKey: ["vehicles"] }),
-      queries.invalidateQueries({ queryKey: ["vehicle", vehicleId] }),
-    ]);
-}
-
 export function useTakeControl(vehicleId: number) {
-  const changed = useVehicleChanged(vehicleId);
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: ({ operator, takeOver }: { operator: string; takeOver: boolean }) => ask(vehicleId, operator, takeOver),
     onSuccess: (lease) => holdLease(vehicleId, lease),
-    onSettled: changed,
+    onSettled: () => changed(vehicleId),
   });
 }
 
 export function useHandOver(vehicleId: number) {
-  const changed = useVehicleChanged(vehicleId);
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: () => answer(giveUpControl({ path: { vehicle_id: vehicleId } })),
     onSuccess: () => dropLease(vehicleId),
-    onSettled: changed,
+    onSettled: () => changed(vehicleId),
   });
 }

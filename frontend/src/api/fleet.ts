@@ -1,6 +1,6 @@
 /** What people do with vehicles, and what vehicles were asked and given. */
 
-import { useInfiniteQuery, useMutation, useQueryClient } from "@tanstack/react-query";
+import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { controlHeader } from "../live/leases";
 import { answer } from "./client";
 import {
@@ -17,20 +17,23 @@ import {
   restoreSafeGains,
   type VehicleEdit,
 } from "./generated";
+import { useVehicleChanged } from "./vehicles";
 
 const SHOWN = 20;
 
-function useChanged() {
-  const queries = useQueryClient();
-  return (vehicleId: number): Promise<unknown> =>
-    Promise.all([
-      queries.invalidateQueries({ queryKey: ["vehicles"] }),
-      queries.invalidateQueries({ queryKey: ["vehicle", vehicleId] }),
-    ]);
+interface PageQuery {
+  limit: number;
+  cursor?: string;
+}
+
+interface PageOf<Item> {
+  items: Item[];
+  total: number;
+  next_cursor: string | null;
 }
 
 export function useRegisterVehicle() {
-  const changed = useChanged();
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: (body: NewVehicle) => answer(registerVehicle({ body })),
     onSuccess: ({ id }) => changed(id),
@@ -38,7 +41,7 @@ export function useRegisterVehicle() {
 }
 
 export function useEditVehicle(vehicleId: number) {
-  const changed = useChanged();
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: (body: VehicleEdit) =>
       answer(editVehicle({ path: { vehicle_id: vehicleId }, body, headers: controlHeader(vehicleId) })),
@@ -47,7 +50,7 @@ export function useEditVehicle(vehicleId: number) {
 }
 
 export function useRelease(vehicleId: number) {
-  const changed = useChanged();
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: (statement: string) =>
       answer(
@@ -69,7 +72,7 @@ export type Asked = keyof typeof ACTS;
 
 /** Ask a vehicle for one of its acts; what comes of it is seen in the list of its acts. */
 export function useAskVehicle(vehicleId: number) {
-  const changed = useChanged();
+  const changed = useVehicleChanged();
   return useMutation({
     mutationFn: (act: Asked) =>
       answer(ACTS[act]({ path: { vehicle_id: vehicleId }, headers: controlHeader(vehicleId) })),
@@ -77,32 +80,20 @@ export function useAskVehicle(vehicleId: number) {
   });
 }
 
-export function useActs(vehicleId: number) {
+/** A list that is shown a page at a time, the newest first. */
+function useNewest<Item>(vehicleId: number, list: string, read: (query: PageQuery) => Promise<PageOf<Item>>) {
   return useInfiniteQuery({
-    queryKey: ["vehicle", vehicleId, "acts"],
-    queryFn: ({ pageParam }) =>
-      answer(
-        listActs({
-          path: { vehicle_id: vehicleId },
-          query: { limit: SHOWN, ...(pageParam === null ? {} : { cursor: pageParam }) },
-        }),
-      ),
+    queryKey: ["vehicle", vehicleId, list],
+    queryFn: ({ pageParam }) => read({ limit: SHOWN, ...(pageParam === null ? {} : { cursor: pageParam }) }),
     initialPageParam: null as string | null,
     getNextPageParam: ({ next_cursor }) => next_cursor,
   });
 }
 
+export function useActs(vehicleId: number) {
+  return useNewest(vehicleId, "acts", (query) => answer(listActs({ path: { vehicle_id: vehicleId }, query })));
+}
+
 export function useLedger(vehicleId: number) {
-  return useInfiniteQuery({
-    queryKey: ["vehicle", vehicleId, "ledger"],
-    queryFn: ({ pageParam }) =>
-      answer(
-        listGivenGains({
-          path: { vehicle_id: vehicleId },
-          query: { limit: SHOWN, ...(pageParam === null ? {} : { cursor: pageParam }) },
-        }),
-      ),
-    initialPageParam: null as string | null,
-    getNextPageParam: ({ next_cursor }) => next_cursor,
-  });
+  return useNewest(vehicleId, "ledger", (query) => answer(listGivenGains({ path: { vehicle_id: vehicleId }, query })));
 }

@@ -1,6 +1,6 @@
 /** What pages read of vehicles. Keys are what `lib/events.ts` makes doubtful. */
 
-import { useQuery } from "@tanstack/react-query";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
 import { listVehicles, type PageVehicle, type Vehicle } from "./generated";
 
@@ -32,4 +32,14 @@ export function useVehicles() {
 /** One vehicle out of the list of all, which every page has. */
 export function useVehicle(vehicleId: number | null): Vehicle | null {
   return useVehicles().data?.find(({ id }) => id === vehicleId) ?? null;
+}
+
+/** What an act on a vehicle makes doubtful: to be called once it is over. */
+export function useVehicleChanged() {
+  const queries = useQueryClient();
+  return (vehicleId: number): Promise<unknown> =>
+    Promise.all([
+      queries.invalidateQueries({ queryKey: ["vehicles"] }),
+      queries.invalidateQueries({ queryKey: ["vehicle", vehicleId] }),
+    ]);
 }
