@@ -26,7 +26,7 @@ from app.fleet.states import ACT_UNDER_WAY, ActKind, ActState, VehicleState
 from app.jobs.states import JobState
 from app.trials.states import UNDER_WAY, Ending, FlightMode, FlightState, TrialKind, TrialState
 
-Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle"]
+Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
 JsonObject = dict[str, Any]
 GainsJson = dict[str, float]
 OptionsJson = dict[str, bool | int | float | str]
@@ -197,6 +197,15 @@ class CampaignRow(Base, Reported):
         return "campaign", self.id, self.id
 
 
+class RehearsalRow(Base):
+    """A campaign on a simulation that rehearses one on a real vehicle."""
+
+    __tablename__ = "rehearsal"
+
+    rehearsal_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), primary_key=True)
+    campaign_id: Mapped[int] = mapped_column(ForeignKey("campaign.id", ondelete="CASCADE"), index=True)
+
+
 class TrajectoryRow(Base):
     """One recorded or predicted flight, packed by `app.trials.codec`. Written once; the database refuses changes."""
 
@@ -261,6 +270,41 @@ class TrialRow(Base, Reported):
 
     def reported_as(self) -> tuple[Topic, int, int | None]:
         return "trial", self.id, self.campaign_id
+
+
+class TrialPhotoRow(Base, Reported):
+    """A picture of a flight, as it was handed in."""
+
+    __tablename__ = "trial_photo"
+    __table_args__ = (_NEVER_REUSE_IDS,)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    trial_id: Mapped[int] = mapped_column(ForeignKey("trial.id", ondelete="CASCADE"), index=True)
+    media_type: Mapped[str]
+    data: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
+    added_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+    trial: Mapped[TrialRow] = relationship()
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "trial", self.trial_id, self.trial.campaign_id
+
+
+class ControllerCheckRow(Base, Reported):
+    """A recorded controller held against the replica, with all that its page draws."""
+
+    __tablename__ = "controller_check"
+    __table_args__ = (_NEVER_REUSE_IDS,)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    file_name: Mapped[str]
+    kind: Mapped[str]
+    passed: Mapped[bool]
+    result: Mapped[JsonObject] = mapped_column(deferred=True)
+    checked_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+    def reported_as(self) -> tuple[Topic, int, int | None]:
+        return "check", self.id, None
 
 
 _UNDER_WAY_SQL: Final = _is_one_of("state", sorted(UNDER_WAY))

@@ -9,6 +9,7 @@ export interface Change {
 export type QueryKey = readonly (string | number)[];
 
 export function doubtful(change: Change): QueryKey[] {
+  if (change.topic === "check") return [["checks"]];
   const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
   if (change.topic === "trial") keys.push(["trial", change.entity_id]);
