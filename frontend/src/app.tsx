@@ -1,16 +1,21 @@
+import { lazy } from "react";
 import { Route, Routes } from "react-router";
 import { AppFrame } from "./components/AppFrame";
 import { CampaignPage } from "./pages/CampaignPage";
 import { CampaignsPage } from "./pages/CampaignsPage";
-import { FlightPage } from "./pages/FlightPage";
-import { FlyPage } from "./pages/FlyPage";
-import { JobsPage } from "./pages/JobsPage";
-import { NewCampaignPage } from "./pages/NewCampaignPage";
-import { NewVehiclePage } from "./pages/NewVehiclePage";
 import { NotFoundPage } from "./pages/NotFoundPage";
-import { ReproductionsPage } from "./pages/ReproductionsPage";
-import { VehiclePage } from "./pages/VehiclePage";
-import { VehiclesPage } from "./pages/VehiclesPage";
+
+// What is not looked at first is fetched when it is.
+const FlightPage = lazy(async () => ({ default: (await import("./pages/FlightPage")).FlightPage }));
+const FlyPage = lazy(async () => ({ default: (await import("./pages/FlyPage")).FlyPage }));
+const JobsPage = lazy(async () => ({ default: (await import("./pages/JobsPage")).JobsPage }));
+const NewCampaignPage = lazy(async () => ({ default: (await import("./pages/NewCampaignPage")).NewCampaignPage }));
+const NewVehiclePage = lazy(async () => ({ default: (await import("./pages/NewVehiclePage")).NewVehiclePage }));
+const ReproductionsPage = lazy(async () => ({
+  default: (await import("./pages/ReproductionsPage")).ReproductionsPage,
+}));
+const VehiclePage = lazy(async () => ({ default: (await import("./pages/VehiclePage")).VehiclePage }));
+const VehiclesPage = lazy(async () => ({ default: (await import("./pages/VehiclesPage")).VehiclesPage }));
 
 export function App() {
   return (

@@ -1,5 +1,5 @@
 import { useQueryClient } from "@tanstack/react-query";
-import { useEffect, useRef } from "react";
+import { Suspense, useEffect, useRef } from "react";
 import { Link, Outlet, useMatch } from "react-router";
 import { useRenewedControl } from "../api/control";
 import { followEvents } from "../api/events";
@@ -103,7 +103,9 @@ export function AppFrame() {
         <ConnectionNotice />
       </header>
       <main id="main" className={classes["main"]} tabIndex={-1}>
-        <Outlet context={abort} />
+        <Suspense fallback={<div aria-busy="true" />}>
+          <Outlet context={abort} />
+        </Suspense>
       </main>
     </div>
   );
