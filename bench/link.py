@@ -58,6 +58,10 @@ class Vehicle:
     address: UdpAddress
     pipe: Connection
 
+    def begin(self) -> None:
+        """Stream from now on: what is sent before somebody listens is lost."""
+        self.pipe.send("begin")
+
     def end(self) -> tuple[int, Arrivals]:
         """How many samples it sent, and when commands arrived."""
         self.pipe.send("end")
@@ -68,7 +72,8 @@ class Vehicle:
 
 
 def fly(pipe: Connection, rate_hz: float) -> None:
-    """The vehicle's process: stream positions at `rate_hz`, and note what arrives, until told to end."""
+    """The vehicle's process: once told to begin, stream positions at `rate_hz`, and note what arrives, until told to
+    end."""
     codec = PAPARAZZI.codec(system=SYSTEM, component=190)
     arrived: list[tuple[int, bytes]] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
@@ -76,6 +81,7 @@ def fly(pipe: Connection, rate_hz: float) -> None:
         wire.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         pipe.send(wire.getsockname()[1])
         ground = (LOOPBACK, pipe.recv())
+        pipe.recv()
         start_s, sent = time.monotonic(), 0
         while not pipe.poll():
             wait_s = start_s + sent / rate_hz - time.monotonic()
@@ -96,7 +102,7 @@ def sample(step: int, rate_hz: float) -> dict[str, FieldValue]:
 
 @contextmanager
 def vehicle(rate_hz: float) -> Iterator[Vehicle]:
-    """A vehicle that streams from here on."""
+    """A vehicle that waits to stream."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((LOOPBACK, 0))
         local = probe.getsockname()[1]
@@ -154,6 +160,7 @@ def latencies_s(rate_hz: float, seconds: float, *, is_computing: bool) -> tuple[
     with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "flight.tlog"
         with Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log) as link:
+            drone.begin()
             with audience(link, is_computing=is_computing):
                 until_s = time.monotonic() + seconds
                 while time.monotonic() < until_s:
@@ -177,6 +184,7 @@ def recording_share(rate_hz: float, seconds: float) -> tuple[float, int, int]:
     with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "flight.tlog"
         with Link(drone.address, PAPARAZZI, clock=ScaledClock(), target_system=SYSTEM, tlog=log) as link:
+            drone.begin()
             start_s, used_s = time.monotonic(), time.process_time()
             while time.monotonic() - start_s < seconds:
                 recorded += [each.message for each in link.receive(0.05)]
