@@ -97,7 +97,12 @@ def plainly(command: Callable[P, None]) -> Callable[P, None]:
 @plainly
 def serve(
     host: Annotated[
-        str | None, typer.Option(help="Address to listen on.  [default: GAINLINE_HOST, else 127.0.0.1]")
+        str | None,
+        typer.Option(
+            help="Address to listen on. 0.0.0.0 lets other devices in, a tablet for instance: whoever reaches this "
+            "machine over the network can then see, change and delete every campaign and start simulated flights, and "
+            "real vehicles do not fly.  [default: GAINLINE_HOST, else 127.0.0.1]"
+        ),
     ] = None,
     port: Annotated[
         int | None,

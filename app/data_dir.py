@@ -2,6 +2,7 @@
 
 import errno
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from app.errors import Problem, StorageError
@@ -22,3 +23,13 @@ def prepare_data_dir(folder: Path) -> None:
             problems=(Problem("--data-dir", f"{error.strerror or error}"),),
             hint="Choose a folder that this user may write, with --data-dir or GAINLINE_DATA_DIR.",
         ) from error
+
+
+def folder_bytes(folder: Path) -> int:
+    """What the files below a folder hold; those that go meanwhile are not counted."""
+    total = 0
+    for path, _, names in os.walk(folder):
+        for name in names:
+            with suppress(FileNotFoundError):
+                total += os.lstat(Path(path) / name).st_size
+    return total

@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
-from app.api import catalogue, errors, events, figures
+from app.api import catalogue, errors, events, figures, system
 from app.api.headers import HeadersMiddleware
 from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
@@ -54,7 +54,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.database = database
-    own = (catalogue.router, campaigns, trials, records, fleet, jobs, reproductions, figures.router, events.router)
+    own = (
+        catalogue.router,
+        system.router,
+        campaigns,
+        trials,
+        records,
+        fleet,
+        jobs,
+        reproductions,
+        figures.router,
+        events.router,
+    )
     for router in own:
         app.include_router(router)
     errors.install(app)

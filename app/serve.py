@@ -17,8 +17,10 @@ from app.db.migrate import migrate
 from app.errors import AddressError, AlreadyRunningError, Problem
 from app.locks import LockedError, exclusive
 from app.main import create_app
+from app.network import addresses_elsewhere, exposure, web_address
 from app.observability import configure_logs
-from app.settings import Settings, is_loopback
+from app.qr import qr_text
+from app.settings import Settings
 from app.supervisor import Supervisor
 from app.worker import run_supervised_worker
 
@@ -67,23 +69,6 @@ def listen(host: str, port: int) -> socket.socket:
         raise _no_address(host, port, error) from error
 
 
-def web_address(host: str, port: int) -> str:
-    """What to type into a browser on this machine."""
-    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - compared, not bound
-    return f"http://[{shown}]:{port}" if ":" in shown else f"http://{shown}:{port}"
-
-
-def exposure(host: str) -> str | None:
-    """What listening on this host opens to others; None on loopback."""
-    if is_loopback(host):
-        return None
-    return (
-        f"Warning: listening on {host}, so anybody who can reach this machine over the network can see, change and "
-        "delete every campaign and start simulated flights: Gainline has no accounts yet. "
-        "Real vehicles fly only from a server on loopback (--host 127.0.0.1)."
-    )
-
-
 class _Server(uvicorn.Server):
     """Uvicorn, which says when it is ready, and ends the open event streams before it waits for them."""
 
@@ -108,6 +93,7 @@ def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], 
     def ready() -> None:
         _log.info("ready", address=address)
         announce(f"Gainline is ready at {address}")
+        _announce_elsewhere(settings.host, listener.getsockname()[1], announce)
 
     def closing() -> None:
         application.state.live.close()
@@ -120,6 +106,15 @@ def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], 
         timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
     )
     _Server(config, ready=ready, closing=closing).run(sockets=[listener])
+
+
+def _announce_elsewhere(host: str, port: int, announce: Callable[[str], None]) -> None:
+    """Say where a tablet finds the dashboard, to a person with a code to point its camera at."""
+    addresses = addresses_elsewhere(host, port)
+    for address in addresses:
+        announce(f"On a tablet: {address.url}" + (f" ({address.interface})" if address.interface else ""))
+    if addresses and sys.stdout.isatty():
+        announce(qr_text(addresses[0].url))
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:

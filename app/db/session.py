@@ -91,15 +91,15 @@ def translated(database_file: Path) -> Iterator[None]:
     """Tell apart what a person can do something about. Raises StorageError for these, the rest passes."""
     try:
         yield
-    except DBAPIError as error:
+    except (DBAPIError, sqlite3.Error) as error:
         if (known := _storage_error(error, database_file)) is not None:
             raise known from error
         raise
 
 
-def _storage_error(error: DBAPIError, database_file: Path) -> StorageError | None:
+def _storage_error(error: DBAPIError | sqlite3.Error, database_file: Path) -> StorageError | None:
     """The storage trouble behind a driver's error, or None when it is of another kind."""
-    message = str(error.orig).lower()
+    message = str(error.orig if isinstance(error, DBAPIError) else error).lower()
     for words, (happened, hint) in _TROUBLES.items():
         if words in message:
             return StorageError(happened.format(file=database_file), hint=hint.format(file=database_file))

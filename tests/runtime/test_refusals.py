@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.serve import exposure, web_address
+from app.network import exposure, web_address
 from tests.runtime.processes import PATIENCE_S, Serving, environment, stream
 
 

@@ -1,0 +1,124 @@
+"""This server itself: where other devices reach it, what it holds, and a copy of all of it to keep elsewhere."""
+
+import shutil
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Annotated, BinaryIO, Final, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import StreamingResponse
+from pydantic import BaseModel
+
+from app import __version__
+from app.api.deps import CurrentDatabase, CurrentSettings, Live
+from app.data_dir import folder_bytes
+from app.db.backup import take_backup
+from app.db.migrate import revision_of
+from app.errors import InputError, Problem
+from app.network import EXPOSES, addresses_elsewhere, exposure, is_in_container
+from app.qr import qr_svg
+
+router = APIRouter(prefix="/api/system", tags=["system"])
+
+_SQLITE: Final = "application/vnd.sqlite3"
+_CHUNK_BYTES: Final = 2**20
+
+
+class AddressInfo(BaseModel):
+    """`interface` is empty where the server was told to listen on a name or on one address."""
+
+    url: str
+    interface: str
+
+
+class System(BaseModel):
+    """`addresses` are those under which other devices reach this server, the likeliest first: none on loopback, and
+    `in_container` its own, which need not be the host's. `exposes` ends the sentence "It listens on …, so"."""
+
+    version: str
+    worker: Literal["running", "absent"]
+    host: str
+    is_exposed: bool
+    in_container: bool
+    exposes: str
+    addresses: list[AddressInfo]
+    data_dir: str
+    data_bytes: int
+    free_bytes: int
+    database_bytes: int
+    database_revision: str
+
+
+@router.get("")
+def get_system(request: Request, settings: CurrentSettings, database: CurrentDatabase, live: Live) -> System:
+    """Version, address, room on the disk: what one is asked for when something is wrong."""
+    return System(
+        version=__version__,
+        worker="running" if live.worker_running else "absent",
+        host=settings.host,
+        is_exposed=exposure(settings.host) is not None,
+        in_container=is_in_container(),
+        exposes=EXPOSES,
+        addresses=_addresses(request, settings),
+        data_dir=str(settings.data_dir.resolve()),
+        data_bytes=folder_bytes(settings.data_dir),
+        free_bytes=shutil.disk_usage(settings.data_dir).free,
+        database_bytes=database.file.stat().st_size,
+        database_revision=revision_of(database.file) or "none",
+    )
+
+
+@router.get(
+    "/qr.svg",
+    response_class=Response,
+    responses={200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}},
+)
+def get_address_code(
+    request: Request,
+    settings: CurrentSettings,
+    address: Annotated[str, Query(max_length=300, description="the `url` of one of the server's addresses")],
+) -> Response:
+    """One of the server's addresses as a QR code, for the camera of a tablet."""
+    if address not in {each.url for each in _addresses(request, settings)}:
+        raise InputError(
+            "Other devices do not reach this server there.",
+            problems=(Problem("address", "is none of the server's addresses"),),
+            hint="GET /api/system lists them; on loopback there are none.",
+        )
+    return Response(qr_svg(address), media_type="image/svg+xml")
+
+
+@router.get(
+    "/backup",
+    response_class=StreamingResponse,
+    responses={200: {"content": {_SQLITE: {"schema": {"type": "string", "format": "binary"}}}}},
+)
+def get_backup(database: CurrentDatabase) -> StreamingResponse:
+    """The whole database as it is at this moment, as one SQLite file; flights and computations go on meanwhile.
+
+    Only for programs and the dashboard itself: a page of another site cannot ask for it.
+    """
+    copy = take_backup(database.file)
+    size = copy.seek(0, 2)
+    copy.seek(0)
+    name = f"gainline-{datetime.now(UTC):%Y-%m-%dT%H%MZ}.sqlite3"
+    headers = {
+        "Content-Disposition": f'attachment; filename="{name}"',
+        "Content-Length": str(size),
+        # Not packed on the way: its records are packed already, and a browser shows how much is still to come.
+        "Content-Encoding": "identity",
+        "Cross-Origin-Resource-Policy": "same-origin",
+    }
+    return StreamingResponse(_chunks(copy), media_type=_SQLITE, headers=headers)
+
+
+def _addresses(request: Request, settings: CurrentSettings) -> list[AddressInfo]:
+    _, port = request.scope["server"]
+    found = addresses_elsewhere(settings.host, port)
+    return [AddressInfo(url=each.url, interface=each.interface) for each in found]
+
+
+def _chunks(file: BinaryIO) -> Iterator[bytes]:
+    with file:
+        while chunk := file.read(_CHUNK_BYTES):
+            yield chunk

@@ -1,0 +1,71 @@
+"""Where other devices reach this server, and what that opens to them."""
+
+import ipaddress
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import ifaddr
+
+from app.settings import is_loopback
+
+EXPOSES: Final = (
+    "anybody who can reach this machine over the network can see, change and delete every campaign and start simulated "
+    "flights: Gainline has no accounts yet. Real vehicles fly only from a server on loopback (--host 127.0.0.1)."
+)
+"""What listening beyond loopback means, as the rest of a sentence."""
+
+_EVERYWHERE: Final = {"0.0.0.0": 4, "::": 6}  # noqa: S104 - compared, not bound
+_INTERNAL: Final = ("docker", "br-", "veth", "virbr")
+"""Interfaces that lead to containers and virtual machines on this machine, and to no tablet."""
+
+
+@dataclass(frozen=True)
+class Address:
+    """What to type into a browser on another device; `interface` is empty where a host was asked for by name."""
+
+    url: str
+    interface: str
+
+
+def web_address(host: str, port: int) -> str:
+    """What to type into a browser on this machine."""
+    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - compared, not bound
+    return f"http://[{shown}]:{port}" if ":" in shown else f"http://{shown}:{port}"
+
+
+def exposure(host: str) -> str | None:
+    """What listening on this host opens to others; None on loopback."""
+    return None if is_loopback(host) else f"Warning: listening on {host}, so {EXPOSES}"
+
+
+def addresses_elsewhere(host: str, port: int) -> list[Address]:
+    """The addresses under which other devices reach a server that listens there, the likeliest first; none on loopback.
+
+    In a container they are the container's own, which lead nowhere from outside unless it shares the host's network.
+    """
+    if is_loopback(host):
+        return []
+    version = _EVERYWHERE.get(host)
+    if version is None:
+        return [Address(web_address(host, port), "")]
+    found = sorted(_own_addresses(version), key=lambda one: one[0].is_link_local)
+    return [Address(web_address(str(address), port), interface) for address, interface in found]
+
+
+def is_in_container() -> bool:
+    """Whether this process runs in a container of Docker or Podman."""
+    return any(Path(mark).exists() for mark in ("/.dockerenv", "/run/.containerenv"))
+
+
+def _own_addresses(version: int) -> Iterator[tuple[ipaddress.IPv4Address | ipaddress.IPv6Address, str]]:
+    for adapter in ifaddr.get_adapters():
+        if adapter.nice_name.startswith(_INTERNAL):
+            continue
+        for each in adapter.ips:
+            address = ipaddress.ip_address(each.ip if isinstance(each.ip, str) else each.ip[0])
+            # A link-local address of version 6 wants an interface named by the other device.
+            unusable = address.is_loopback or (address.version == 6 and address.is_link_local)
+            if address.version == version and not unusable:
+                yield address, adapter.nice_name
