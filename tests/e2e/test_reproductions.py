@@ -61,8 +61,8 @@ def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, own_serv
 def test_on_a_phone_the_pages_are_behind_a_menu(open_dashboard: Opener, shared_server: Server) -> None:
     dashboard = open_dashboard(shared_server.url, viewport=PHONE)
     dashboard.open("/")
-    dashboard.button("Pages").click()
-    dashboard.page.get_by_role("menuitem", name="Jobs").click()
+    dashboard.button("More pages").click()
+    dashboard.page.get_by_role("navigation", name="Pages").get_by_role("link", name="Jobs").click()
     expect(dashboard.page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
 
 

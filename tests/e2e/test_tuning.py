@@ -148,11 +148,10 @@ def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard
     page = dashboard.page
     dashboard.open("/new")
     recommended = dashboard.get("/catalogue")["strategies"][0]
-    expect(page.get_by_role("combobox", name="Strategy")).to_have_value(recommended["title"])
-    page.get_by_role("combobox", name="Start from").click()
-    page.get_by_role("option", name="Best of another campaign").click()
-    page.get_by_role("combobox", name="Campaign", exact=True).fill("Donor of the warm")
-    page.get_by_role("option", name=re.compile("^Donor of the warm start")).click()
+    expect(page.get_by_role("combobox", name="Strategy")).to_have_value(recommended["name"])
+    page.get_by_role("combobox", name="Start from").select_option("Best of another campaign")
+    page.get_by_role("searchbox", name="Campaign").fill("Donor of the warm")
+    page.get_by_role("button", name=re.compile("^Donor of the warm start")).click()
     best = dashboard.get(f"/campaigns/{donor}")["best"]
     expect(page.get_by_text(f"kp {best['gains']['kp']}")).to_be_visible()
     page.get_by_role("textbox", name="Name").fill("Warm start")
@@ -166,9 +165,8 @@ def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard
 def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dashboard) -> None:
     page = dashboard.page
     dashboard.open("/new")
-    page.get_by_role("combobox", name="Experiment").click()
     experiment = next(one for one in dashboard.get("/catalogue")["experiments"] if one["name"] == "pitch-tracking")
-    page.get_by_role("option", name=experiment["title"]).click()
+    page.get_by_role("combobox", name="Experiment").select_option(experiment["title"])
     expect(page.get_by_role("radio")).to_have_count(1)
     page.get_by_role("textbox", name="Name").fill("F-16 by hand")
     dashboard.button("Create campaign").click()

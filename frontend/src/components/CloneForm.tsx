@@ -1,4 +1,4 @@
-import { Button, Select, Switch } from "@mantine/core";
+import { Button, Switch } from "@mantine/core";
 import { IconCopy } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
@@ -7,6 +7,7 @@ import { useCatalogue } from "../api/queries";
 import type { Campaign } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { kindsFor, registeredFor } from "../lib/newCampaign";
+import { Choice } from "./Choice";
 import { Help } from "./Help";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
@@ -26,15 +27,14 @@ export function CloneForm({ campaign }: { campaign: Campaign }) {
   const choice = chosen === undefined ? { kind: vehicle } : { kind: chosen.kind, id: chosen.id };
   return (
     <div className={classes["clone"]}>
-      <Select
+      <Choice
         label="Same settings again, on"
-        allowDeselect={false}
         data={[
           ...registered.map(({ id, name }) => ({ value: String(id), label: name })),
           ...kinds.map(({ name, title }) => ({ value: name, label: title })),
         ]}
         value={vehicle}
-        onChange={(key) => setVehicle(key ?? vehicle)}
+        onChange={setVehicle}
       />
       {campaign.best !== null && (
         <div className={classes["warm"]}>

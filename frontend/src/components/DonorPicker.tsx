@@ -1,10 +1,10 @@
-import { Select } from "@mantine/core";
+import { TextInput, UnstyledButton } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { useState } from "react";
 import { useCampaigns } from "../api/queries";
 import type { CampaignSummary } from "../api/types";
 import { plusMinus } from "../lib/uncertainty";
-import classes from "./AdvancedFields.module.css";
+import classes from "./DonorPicker.module.css";
 import { GainList } from "./GainList";
 import { useUnits } from "./useUnits";
 
@@ -15,43 +15,82 @@ interface Props {
   onChange: (donor: CampaignSummary | null) => void;
 }
 
+const OFFERED = 6;
+
 /** The campaign whose best gains are flown first; found by its name. */
 export function DonorPicker({ experiment, donor, error, onChange }: Props) {
-  const [search, setSearch] = useState("");
+  const [search, setSearch] = useState(donor?.name ?? "");
   const [sought] = useDebouncedValue(search.trim(), 200);
-  const unit = useUnits(experiment).error;
-  const asked = donor !== null && sought === donor.name ? "" : sought;
-  const found = useCampaigns({ search: asked, state: [], vehicle: [], sort: "-updated" });
+  const found = useCampaigns({ search: sought, state: [], vehicle: [], sort: "-updated" });
   const usable = (found.data?.pages.flatMap((page) => page.items) ?? []).filter(
     (campaign) => campaign.best !== null && campaign.experiment === experiment,
   );
-  const offered = donor === null || usable.some(({ id }) => id === donor.id) ? usable : [donor, ...usable];
+  const choose = (chosen: CampaignSummary): void => {
+    setSearch(chosen.name);
+    onChange(chosen);
+  };
   return (
     <div className={classes["donor"]}>
-      <Select
+      <TextInput
         label="Campaign"
+        type="search"
         placeholder="Search by name"
-        searchable
-        clearable
-        nothingFoundMessage="No campaign with a valid flight has such a name"
-        data={offered.map(({ id, name, vehicle }) => ({ value: String(id), label: `${name} · ${vehicle.title}` }))}
-        filter={({ options }) => options}
-        value={donor === null ? null : String(donor.id)}
-        searchValue={search}
-        onSearchChange={setSearch}
+        autoComplete="off"
+        value={search}
         error={error}
-        onChange={(id) => onChange(offered.find((one) => String(one.id) === id) ?? null)}
+        onChange={(event) => {
+          setSearch(event.currentTarget.value);
+          onChange(null);
+        }}
+        onKeyDown={(event) => {
+          if (event.key !== "Enter" || donor !== null) return;
+          event.preventDefault();
+          if (usable[0] !== undefined && sought === search.trim()) choose(usable[0]);
+        }}
       />
-      {donor?.best && (
-        <p className={`${classes["taken"]} numbers`}>
-          Its best, flight {donor.best.trial_number} on {donor.vehicle.title}:{" "}
-          <strong>
-            <GainList gains={donor.best.gains} experiment={experiment} />
-          </strong>
-          , error {plusMinus(donor.best.mean, donor.best.standard_error, unit)} (± standard error). They are flown
-          first; then it shows whether the vehicles are alike enough to build on what was learned there.
-        </p>
-      )}
+      {donor === null && found.data !== undefined && <Offers campaigns={usable} onChoose={choose} />}
+      {donor?.best && <Taken donor={donor} best={donor.best} experiment={experiment} />}
     </div>
+  );
+}
+
+interface OffersProps {
+  campaigns: readonly CampaignSummary[];
+  onChoose: (campaign: CampaignSummary) => void;
+}
+
+function Offers({ campaigns, onChoose }: OffersProps) {
+  if (campaigns.length === 0) return <p role="status">No campaign of this experiment has a valid flight and such a name.</p>;
+  return (
+    <ul className={classes["offers"]} aria-label="Campaigns to start from">
+      {campaigns.slice(0, OFFERED).map((campaign) => (
+        <li key={campaign.id}>
+          <UnstyledButton className={classes["offer"] ?? ""} onClick={() => onChoose(campaign)}>
+            {campaign.name} · {campaign.vehicle.title}
+          </UnstyledButton>
+        </li>
+      ))}
+      {campaigns.length > OFFERED && <li className={classes["rest"]}>More: type more of the name.</li>}
+    </ul>
+  );
+}
+
+interface TakenProps {
+  donor: CampaignSummary;
+  best: NonNullable<CampaignSummary["best"]>;
+  experiment: string;
+}
+
+function Taken({ donor, best, experiment }: TakenProps) {
+  const unit = useUnits(experiment).error;
+  return (
+    <p className={`${classes["taken"]} numbers`}>
+      Its best, flight {best.trial_number} on {donor.vehicle.title}:{" "}
+      <strong>
+        <GainList gains={best.gains} experiment={experiment} />
+      </strong>
+      , error {plusMinus(best.mean, best.standard_error, unit)} (± standard error). They are flown first; then it shows
+      whether the vehicles are alike enough to build on what was learned there.
+    </p>
   );
 }

@@ -1,6 +1,7 @@
-import { Popover, UnstyledButton } from "@mantine/core";
+import { UnstyledButton } from "@mantine/core";
 import { IconHelpCircle } from "@tabler/icons-react";
-import type { ReactNode } from "react";
+import { type ReactNode, useId, useState } from "react";
+import { createPortal } from "react-dom";
 import classes from "./Help.module.css";
 
 interface Props {
@@ -11,16 +12,36 @@ interface Props {
 
 /** An explanation on demand; a finger's width to hit, a letter's width to look at. */
 export function Help({ question, children }: Props) {
+  const id = useId();
+  const [open, setOpen] = useState(false);
   return (
-    <Popover width={290} position="bottom" withArrow shadow="md" trapFocus returnFocus>
-      <Popover.Target>
-        <UnstyledButton className={classes["ask"]} aria-label={question} title={question}>
-          <IconHelpCircle size={17} aria-hidden />
-        </UnstyledButton>
-      </Popover.Target>
-      <Popover.Dropdown className={classes["answer"]} aria-label={question}>
-        {children}
-      </Popover.Dropdown>
-    </Popover>
+    <>
+      <UnstyledButton
+        className={classes["ask"]}
+        aria-label={question}
+        aria-haspopup="dialog"
+        title={question}
+        popoverTarget={id}
+      >
+        <IconHelpCircle size={17} aria-hidden />
+      </UnstyledButton>
+      {createPortal(
+        <div
+          id={id}
+          popover="auto"
+          role="dialog"
+          aria-label={question}
+          tabIndex={-1}
+          className={classes["answer"]}
+          onToggle={(event) => {
+            setOpen(event.newState === "open");
+            if (event.newState === "open") event.currentTarget.focus();
+          }}
+        >
+          {open && children}
+        </div>,
+        document.body,
+      )}
+    </>
   );
 }

@@ -1,49 +1,63 @@
-import { ActionIcon, Menu } from "@mantine/core";
-import { IconMenu2 } from "@tabler/icons-react";
-import { Link, NavLink, useLocation } from "react-router";
+import { UnstyledButton } from "@mantine/core";
+import { IconChevronDown, IconMenu2 } from "@tabler/icons-react";
+import { useRef } from "react";
+import { NavLink, useLocation } from "react-router";
 import classes from "./MainNav.module.css";
 
+/** In the row where there is room for it; every page is in the menu of a small screen, the others are under "More". */
 const PAGES = [
-  { to: "/", title: "Campaigns" },
-  { to: "/vehicles", title: "Vehicles" },
-  { to: "/reproductions", title: "Reproductions" },
-  { to: "/jobs", title: "Jobs" },
+  { to: "/", title: "Campaigns", inRow: true },
+  { to: "/vehicles", title: "Vehicles", inRow: true },
+  { to: "/reproductions", title: "Reproductions", inRow: false },
+  { to: "/jobs", title: "Jobs", inRow: false },
 ] as const;
 
-/** The pages: in a row where there is room, in a menu on a small screen and while something flies. */
+interface PageLinkProps {
+  to: string;
+  title: string;
+  onClick?: () => void;
+}
+
+function PageLink({ to, title, onClick }: PageLinkProps) {
+  return (
+    <NavLink to={to} end className={classes["link"] ?? ""} onClick={onClick}>
+      {title}
+    </NavLink>
+  );
+}
+
+/** The pages: what is used most in a row, the rest behind a button; all behind it on a small screen or in flight. */
 export function MainNav() {
   const { pathname } = useLocation();
+  const menu = useRef<HTMLUListElement>(null);
+  const inMenu = PAGES.some(({ to, inRow }) => to === pathname && !inRow);
   return (
     <nav aria-label="Pages" className={classes["nav"]}>
       <ul className={classes["row"]}>
-        {PAGES.map(({ to, title }) => (
-          <li key={to}>
-            <NavLink to={to} end className={classes["link"] ?? ""}>
-              {title}
-            </NavLink>
+        {PAGES.filter(({ inRow }) => inRow).map((page) => (
+          <li key={page.to}>
+            <PageLink {...page} />
           </li>
         ))}
       </ul>
-      <Menu position="bottom-start" withinPortal={false}>
-        <Menu.Target>
-          <ActionIcon color="gray" aria-label="Pages" title="Pages" className={classes["menu"] ?? ""}>
-            <IconMenu2 size={22} color="var(--ink)" />
-          </ActionIcon>
-        </Menu.Target>
-        <Menu.Dropdown>
-          {PAGES.map(({ to, title }) => (
-            <Menu.Item
-              key={to}
-              component={Link}
-              to={to}
-              className={classes["item"] ?? ""}
-              data-here={pathname === to || undefined}
-            >
-              {title}
-            </Menu.Item>
-          ))}
-        </Menu.Dropdown>
-      </Menu>
+      <UnstyledButton
+        className={classes["more"] ?? ""}
+        data-here={inMenu || undefined}
+        aria-label="More pages"
+        title="More pages"
+        popoverTarget="pages"
+      >
+        <span className={classes["word"]}>More</span>
+        <IconChevronDown size={18} aria-hidden className={classes["word"]} />
+        <IconMenu2 size={22} aria-hidden className={classes["icon"]} />
+      </UnstyledButton>
+      <ul id="pages" popover="auto" ref={menu} className={classes["menu"]}>
+        {PAGES.map((page) => (
+          <li key={page.to} data-in-row={page.inRow || undefined}>
+            <PageLink {...page} onClick={() => menu.current?.hidePopover()} />
+          </li>
+        ))}
+      </ul>
     </nav>
   );
 }

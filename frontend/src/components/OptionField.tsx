@@ -1,6 +1,7 @@
-import { Select, Switch, TextInput } from "@mantine/core";
+import { Switch, TextInput } from "@mantine/core";
 import type { OptionInfo } from "../api/types";
 import type { OptionValue } from "../lib/newCampaign";
+import { Choice } from "./Choice";
 import { Entry } from "./Entry";
 
 interface Props {
@@ -36,9 +37,8 @@ export function OptionField({ option, value, error, onChange }: Props) {
   }
   if (choices.length > 0) {
     return (
-      <Select
+      <Choice
         label={title}
-        allowDeselect={false}
         data={choices.map((choice) => ({ value: String(choice), label: shown(choice) }))}
         value={String(now)}
         error={error}

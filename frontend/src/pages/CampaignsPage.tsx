@@ -1,4 +1,4 @@
-import { Button, SegmentedControl, Select, Skeleton, TextInput } from "@mantine/core";
+import { Button, SegmentedControl, Skeleton, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -6,6 +6,7 @@ import { Link } from "react-router";
 import { useCampaigns, useCatalogue } from "../api/queries";
 import type { Sort } from "../api/types";
 import { CampaignCard } from "../components/CampaignCard";
+import { Choice } from "../components/Choice";
 import { FirstCampaign } from "../components/FirstCampaign";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
@@ -24,11 +25,11 @@ export function CampaignsPage() {
   useTitle("Campaigns");
   const [search, setSearch] = useState("");
   const [state, setState] = useState<StateFilter>("all");
-  const [vehicle, setVehicle] = useState<string | null>(null);
+  const [vehicle, setVehicle] = useState("");
   const [sort, setSort] = useState<Sort>("-updated");
   const [sought] = useDebouncedValue(search.trim(), 200);
   const kinds = useCatalogue().data?.vehicle_kinds ?? [];
-  const filtered = sought !== "" || state !== "all" || vehicle !== null;
+  const filtered = sought !== "" || state !== "all" || vehicle !== "";
   const campaigns = useCampaigns({ search: sought, state: statesFor(state), vehicle: vehicle ? [vehicle] : [], sort });
   const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
   const total = campaigns.data?.pages[0]?.total ?? 0;
@@ -57,21 +58,16 @@ export function CampaignsPage() {
           onChange={(value) => setState(value as StateFilter)}
           data={STATE_FILTERS}
         />
-        <Select
+        <Choice
           aria-label="Vehicle"
-          placeholder="Every vehicle"
-          clearable
-          data={kinds.map(({ name, title }) => ({ value: name, label: title }))}
+          data={[
+            { value: "", label: "Every vehicle" },
+            ...kinds.map(({ name, title }) => ({ value: name, label: title })),
+          ]}
           value={vehicle}
           onChange={setVehicle}
         />
-        <Select
-          aria-label="Order"
-          allowDeselect={false}
-          data={SORTS}
-          value={sort}
-          onChange={(value) => setSort((value ?? "-updated") as Sort)}
-        />
+        <Choice aria-label="Order" data={SORTS} value={sort} onChange={setSort} />
       </search>
       <Trouble error={campaigns.error} />
       {campaigns.isPending && (
@@ -90,7 +86,7 @@ export function CampaignsPage() {
               onClick={() => {
                 setSearch("");
                 setState("all");
-                setVehicle(null);
+                setVehicle("");
               }}
             >
               Show all campaigns

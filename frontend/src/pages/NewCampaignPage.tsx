@@ -1,4 +1,4 @@
-import { Accordion, Button, Select, Skeleton, TextInput } from "@mantine/core";
+import { Accordion, Button, Skeleton, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate, useSearchParams } from "react-router";
@@ -7,6 +7,7 @@ import { useCatalogue } from "../api/queries";
 import type { Catalogue, Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { AdvancedFields } from "../components/AdvancedFields";
+import { Choice } from "../components/Choice";
 import { DonorPicker } from "../components/DonorPicker";
 import { Entry } from "../components/Entry";
 import { Trouble } from "../components/Trouble";
@@ -94,13 +95,12 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       }}
     >
       {catalogue.experiments.length > 1 && (
-        <Select
+        <Choice
           label="Experiment"
           data={catalogue.experiments.map(({ name, title }) => ({ value: name, label: title }))}
           value={form.experiment}
-          allowDeselect={false}
           error={reasons["definition.experiment"]}
-          onChange={(value) => setForm(withExperiment(form, catalogue, value ?? form.experiment))}
+          onChange={(value) => setForm(withExperiment(form, catalogue, value))}
         />
       )}
       <VehiclePicker
@@ -121,23 +121,20 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         onChange={(event) => set({ name: event.currentTarget.value })}
       />
       <div className={classes["pair"]}>
-        <Select
+        <Choice
           label="Start from"
           data={startsFor(catalogue, form.experiment).map((value) => ({ value, label: STARTS[value] }))}
           value={form.start}
-          allowDeselect={false}
           error={reasons["start.kind"]}
-          onChange={(value) => set({ start: (value ?? "default") as StartKind })}
+          onChange={(value) => set({ start: value })}
         />
-        <Select
+        <Choice
           label="Strategy"
           description={`${form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
-          inputWrapperOrder={["label", "input", "description", "error"]}
           data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
           value={form.strategy}
-          allowDeselect={false}
           error={reasons["strategy"]}
-          onChange={(value) => set({ strategy: value ?? form.strategy, strategyOptions: {} })}
+          onChange={(value) => set({ strategy: value, strategyOptions: {} })}
         />
       </div>
       {form.start === "campaign" && (

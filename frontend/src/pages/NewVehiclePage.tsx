@@ -1,10 +1,11 @@
-import { Accordion, Button, Checkbox, Select, Skeleton, Switch, TextInput } from "@mantine/core";
+import { Accordion, Button, Checkbox, Skeleton, Switch, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
 import { useRegisterVehicle } from "../api/fleet";
 import { useCatalogue } from "../api/queries";
 import type { Catalogue } from "../api/types";
+import { Choice } from "../components/Choice";
 import { Entry } from "../components/Entry";
 import { OptionField } from "../components/OptionField";
 import { Trouble } from "../components/Trouble";
@@ -81,13 +82,12 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         onChange={(event) => set({ name: event.currentTarget.value })}
       />
       <div className={classes["pair"]}>
-        <Select
+        <Choice
           label="Autopilot"
-          data={[...AUTOPILOTS]}
+          data={AUTOPILOTS}
           value={autopilotOf(form)}
-          allowDeselect={false}
           error={reasons["options.autopilot"]}
-          onChange={(value) => setForm(withAutopilot(form, catalogue, value ?? autopilotOf(form)))}
+          onChange={(value) => setForm(withAutopilot(form, catalogue, value))}
         />
         <TextInput
           label="Address"

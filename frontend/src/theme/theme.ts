@@ -60,11 +60,10 @@ export const theme = createTheme({
     Button: { defaultProps: { size: "md" }, styles: { root: { minHeight: TOUCH_TARGET_PX } } },
     ActionIcon: { defaultProps: { size: TOUCH_TARGET_PX, variant: "subtle" } },
     TextInput: tall,
-    Select: tall,
+    InputBase: tall,
     Textarea: { defaultProps: { size: "md" } },
     FileInput: tall,
-    // Words that fade in or unfold cannot be read meanwhile; and nothing here gains by it.
-    Popover: { defaultProps: { transitionProps: { duration: 0 } } },
+    // Words that unfold cannot be read meanwhile; and nothing here gains by it.
     Accordion: { defaultProps: { transitionDuration: 0 } },
   },
 });
