@@ -45,7 +45,7 @@ def frozen_digest(row: CampaignRow) -> str:
         "definition": definition_of(row).digest(),
         "vehicle": row.vehicle.kind,
         "options": row.vehicle_options,
-        "safe_gains": row.vehicle.safe_gains,
+        "safe_gains": row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains,
         **({"vehicle_id": row.vehicle.id} if row.vehicle.registered else {}),
     }
     return hashlib.sha256(json.dumps(frozen, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

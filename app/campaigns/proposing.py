@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.definitions import definition_of
+from app.campaigns.rehearsals import tell_rehearsed
 from app.campaigns.states import MOVES, CampaignState, Outcome
 from app.core.advice import Advice, advise
 from app.core.calibration import known
@@ -256,6 +257,7 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
     """Finish a campaign; what has not flown is cancelled."""
     move_campaign(campaign, CampaignState.FINISHED)
     campaign.outcome, campaign.stop_reason = outcome, reason
+    tell_rehearsed(session, campaign)
     flight = history.flight_under_way(session, campaign.id)
     cancel_unflown(history.trials_of(session, campaign.id), flight, "the campaign was finished")
 

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns.schemas import Sort
 from app.campaigns.states import CampaignState
-from app.db.models import CampaignRow, ProposalRow, VehicleRow
+from app.db.models import CampaignRow, ProposalRow, RehearsalRow, VehicleRow
 from app.db.paging import Position, instant
 from app.db.types import UtcDateTime
 from app.errors import NotFoundError
@@ -100,6 +100,16 @@ def unflown_on(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
     return session.scalars(
         select(CampaignRow).where(CampaignRow.vehicle_id == vehicle_id, CampaignRow.definition_digest.is_(None))
     ).all()
+
+
+def rehearsals(session: Session, campaign_id: int) -> Sequence[CampaignRow]:
+    """The campaigns that rehearse this one, the newest first."""
+    joined = select(CampaignRow).join(RehearsalRow, RehearsalRow.rehearsal_id == CampaignRow.id)
+    return session.scalars(joined.where(RehearsalRow.campaign_id == campaign_id).order_by(CampaignRow.id.desc())).all()
+
+
+def rehearsed_id(session: Session, rehearsal_id: int) -> int | None:
+    return session.scalar(select(RehearsalRow.campaign_id).where(RehearsalRow.rehearsal_id == rehearsal_id))
 
 
 def get_proposal_or_none(session: Session, proposal_id: int) -> ProposalRow | None:

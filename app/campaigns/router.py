@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, status
 
 from app.api.deps import Act, Asking, CursorText, Id, Limit, Reader, Writer, json_only
-from app.campaigns import promoting, service
+from app.campaigns import promoting, rehearsing, service
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -84,6 +84,13 @@ def archive_campaign(act: Act, campaign_id: Id) -> Campaign:
 def clone_campaign(act: Act, campaign_id: Id, body: Clone | None = None) -> Campaign:
     """A new campaign with the same definition, linked to this one."""
     return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
+
+
+@router.post("/{campaign_id}/rehearsal", status_code=status.HTTP_201_CREATED)
+def rehearse_campaign(act: Act, campaign_id: Id) -> Campaign:
+    """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation, made unless there is one that
+    is under way or passed."""
+    return act(Campaign, lambda session: rehearsing.rehearse(session, campaign_id))
 
 
 @router.post("/{campaign_id}/promote")

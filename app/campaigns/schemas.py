@@ -150,6 +150,18 @@ class TrialCounts(BaseModel):
     lost: int
 
 
+RehearsalState = Literal["not needed", "missing", "under way", "passed", "failed"]
+
+
+class Rehearsal(BaseModel):
+    """Whether a campaign on a real vehicle was flown on a simulation first, which has to be `passed` before anything is
+    staged. `campaign_id` is the rehearsal's own campaign; `reason` says why it stands so."""
+
+    state: RehearsalState
+    campaign_id: int | None
+    reason: str
+
+
 class Campaign(BaseModel):
     """One vehicle, one experiment, one strategy, and what came of it."""
 
@@ -165,6 +177,8 @@ class Campaign(BaseModel):
     ]
     vehicle: CampaignVehicle
     parent_id: int | None
+    rehearsal: Rehearsal
+    rehearses: Annotated[int | None, Field(description="the campaign that this one is the rehearsal of")]
     best: BestTrial | None
     verdict: Annotated[Word | None, Field(description=VERDICT)]
     trials: TrialCounts

@@ -9,6 +9,7 @@ from app.campaigns import repository
 from app.campaigns.definitions import check_campaign, frozen_digest, stored
 from app.campaigns.donors import with_donor
 from app.campaigns.proposing import cancel_outdated, end_campaign, move_campaign, request_proposal
+from app.campaigns.rehearsals import tell_rehearsed
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -87,8 +88,37 @@ def get_campaign(session: Session, campaign_id: int) -> Campaign:
 
 def create_campaign(session: Session, new: NewCampaign) -> Campaign:
     """A draft whose first gains are being computed. Raises InputError naming every field that cannot be used."""
-    row = _add(session, new.name, new.definition, new.vehicle, parent_id=None)
+    row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
     return campaign_view(session, row)
+
+
+def add_campaign(
+    session: Session,
+    name: str,
+    asked: Definition,
+    choice: VehicleChoice,
+    *,
+    parent_id: int | None,
+    safe_gains: dict[str, float] | None = None,
+) -> CampaignRow:
+    """A draft whose first gains are being computed. A rehearsal has the `safe_gains` of the vehicle that it is for;
+    every other campaign gets those of its own at its first flight. Raises InputError naming what cannot be used."""
+    definition, options, vehicle = _checked(session, asked, choice)
+    row = CampaignRow(
+        name=name,
+        state=CampaignState.DRAFT,
+        experiment=definition.experiment,
+        strategy=definition.strategy,
+        definition=stored(definition),
+        vehicle=vehicle,
+        vehicle_options=options,
+        parent_id=parent_id,
+        safe_gains=safe_gains,
+    )
+    session.add(row)
+    session.flush()
+    request_proposal(session, row)
+    return row
 
 
 def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
@@ -99,7 +129,7 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     definition = Definition.model_validate(origin.definition)
     if clone.warm_start:
         definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})
-    row = _add(session, name, definition, vehicle, parent_id=origin.id)
+    row = add_campaign(session, name, definition, vehicle, parent_id=origin.id)
     return campaign_view(session, row)
 
 
@@ -183,7 +213,7 @@ def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
 def begin_flying(row: CampaignRow) -> None:
     """A trial lifts off, or a record of one arrives: from the first one on the definition is frozen."""
     if row.definition_digest is None:
-        row.safe_gains = dict(row.vehicle.safe_gains)
+        row.safe_gains = row.safe_gains or dict(row.vehicle.safe_gains)
         row.definition_digest = frozen_digest(row)
     move_campaign(row, CampaignState.FLYING)
 
@@ -198,6 +228,7 @@ def end_flying(session: Session, row: CampaignRow) -> None:
 def history_changed(session: Session, row: CampaignRow) -> None:
     """A flight counts now that did not, or the other way round: everything computed from the flights is outdated."""
     row.updated_at = utc_now()
+    tell_rehearsed(session, row)
     cancel_outdated(session, row)
     request_proposal(session, row)
 
@@ -207,26 +238,6 @@ def safe_gains_changed(session: Session, vehicle_id: int) -> None:
     for row in repository.unflown_on(session, vehicle_id):
         cancel_outdated(session, row)
         request_proposal(session, row)
-
-
-def _add(
-    session: Session, name: str, asked: Definition, choice: VehicleChoice, *, parent_id: int | None
-) -> CampaignRow:
-    definition, options, vehicle = _checked(session, asked, choice)
-    row = CampaignRow(
-        name=name,
-        state=CampaignState.DRAFT,
-        experiment=definition.experiment,
-        strategy=definition.strategy,
-        definition=stored(definition),
-        vehicle=vehicle,
-        vehicle_options=options,
-        parent_id=parent_id,
-    )
-    session.add(row)
-    session.flush()
-    request_proposal(session, row)
-    return row
 
 
 def _choice_of(row: CampaignRow) -> VehicleChoice:

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.proposing import PROPOSAL_JOB, is_stale
+from app.campaigns.rehearsals import is_free_to_fly, rehearsal_of, rehearsed_by
 from app.campaigns.schemas import (
     Advice,
     Campaign,
@@ -18,6 +19,7 @@ from app.campaigns.schemas import (
     GainChange,
     NextFlight,
     Proposal,
+    Rehearsal,
     SparkCurve,
     StopVerdict,
     TrialCounts,
@@ -52,6 +54,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     trials = history.trials_of(session, row.id)
     flight = history.flight_under_way(session, row.id)
     now = standing_of(row, trials)
+    rehearsal = rehearsal_of(session, row)
     return Campaign(
         id=row.id,
         version=row.version,
@@ -63,11 +66,13 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         definition_digest=row.definition_digest,
         vehicle=fleet.campaign_vehicle(row),
         parent_id=row.parent_id,
+        rehearsal=rehearsal,
+        rehearses=rehearsed_by(session, row),
         best=best_trial(trials, now),
         verdict=_word(now),
         trials=_counts(trials),
         flying=_flying(flight, trials),
-        next_action=_next_action(row, trials),
+        next_action=_next_action(row, trials, rehearsal),
         actions=_actions(session, row, flight),
         created_at=row.created_at,
         updated_at=row.updated_at,
@@ -79,10 +84,13 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
     by_campaign: Mapping[int, list[TrialRow]] = defaultdict(list)
     for trial in history.trials_of(session, *(row.id for row in rows)):
         by_campaign[trial.campaign_id].append(trial)
-    return [_summary(row, by_campaign[row.id]) for row in rows]
+    sparks = _sparks(session, by_campaign)
+    return [_summary(row, by_campaign[row.id], rehearsal_of(session, row), sparks[row.id]) for row in rows]
 
 
-def _summary(row: CampaignRow, trials: Sequence[TrialRow]) -> CampaignSummary:
+def _summary(
+    row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal, spark: list[SparkCurve]
+) -> CampaignSummary:
     valid = [trial for trial in trials if trial.state == TrialState.VALID]
     now = standing_of(row, trials)
     return CampaignSummary(
@@ -97,8 +105,8 @@ def _summary(row: CampaignRow, trials: Sequence[TrialRow]) -> CampaignSummary:
         best=best_trial(trials, now),
         first_error=valid[0].error if valid else None,
         verdict=_word(now),
-        next_action=_next_action(row, trials),
-        spark=_sparks(trials),
+        next_action=_next_action(row, trials, rehearsal),
+        spark=spark,
         updated_at=row.updated_at,
     )
 
@@ -206,12 +214,14 @@ def _flying(flight: FlightRow | None, trials: Sequence[TrialRow]) -> FlyingTrial
     return FlyingTrial(trial_id=flight.trial_id, trial_number=number)
 
 
-def _next_action(row: CampaignRow, trials: Sequence[TrialRow]) -> str:
+def _next_action(row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal) -> str:
     """One recommended action, in a few words."""
     if row.state in _NEXT_ACTIONS:
         return _NEXT_ACTIONS[row.state]
     if (waiting := history.unclassed(trials)) is not None:
         return f"Say whether flight {waiting.number} counts"
+    if not is_free_to_fly(rehearsal):
+        return "Go on with the rehearsal" if rehearsal.state == "under way" else "Rehearse on the simulation"
     which = "first" if row.state == CampaignState.READY else "next"
     return f"Fly the {which} trial" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"
 
@@ -224,19 +234,26 @@ def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> li
     return [action for action in allowed(ACTIONS, row.state) if action not in impossible]
 
 
-def _sparks(trials: Sequence[TrialRow]) -> list[SparkCurve]:
-    """The first flight, the best, and the latest, in their order."""
-    flown = [trial for trial in trials if trial.curve and trial.state in {TrialState.VALID, TrialState.CAPTURED}]
+def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> Mapping[int, list[SparkCurve]]:
+    """Of each campaign the first flight, the best, and the latest, in their order; none of one without any."""
+    chosen = {campaign: _sparking(trials) for campaign, trials in by_campaign.items()}
+    curves = history.curves_of(session, [trial for trials in chosen.values() for trial in trials])
+    found: Mapping[int, list[SparkCurve]] = defaultdict(list)
+    for campaign, trials in chosen.items():
+        best = history.best_of(trials)
+        found[campaign].extend(_spark(trial, curves[trial.id], best) for trial in trials if trial.id in curves)
+    return found
+
+
+def _spark(trial: TrialRow, curve: Sequence[Sequence[float]], best: TrialRow | None) -> SparkCurve:
+    time_s, values = ([point[axis] for point in curve] for axis in (0, 1))
+    return SparkCurve(trial_number=trial.number, best=trial is best, time_s=time_s, values=values)
+
+
+def _sparking(trials: Sequence[TrialRow]) -> list[TrialRow]:
+    recorded = [trial for trial in trials if trial.trajectory_id is not None]
+    flown = [trial for trial in recorded if trial.state in {TrialState.VALID, TrialState.CAPTURED}]
     best = history.best_of(flown)
     chosen = {trial.number for trial in (*flown[:1], *([best] if best is not None else []))}
     chosen |= {trial.number for trial in flown[-(SPARKS - len(chosen)) :]}
-    return [
-        SparkCurve(
-            trial_number=trial.number,
-            best=trial is best,
-            time_s=[point[0] for point in trial.curve or []],
-            values=[point[1] for point in trial.curve or []],
-        )
-        for trial in flown
-        if trial.number in chosen
-    ]
+    return [trial for trial in flown if trial.number in chosen]

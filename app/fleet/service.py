@@ -13,13 +13,13 @@ from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import BusyError, ConflictError, InputError, Problem
 from app.fleet import repository
-from app.fleet.kinds import can_fly, is_registered_one_by_one, needs_staging
+from app.fleet.kinds import can_fly, experiments_of, is_registered_one_by_one, needs_staging
 from app.fleet.schemas import Vehicle, VehicleChoice
 from app.fleet.states import ACTIONS, MOVES, VehicleState
 from app.fleet.views import campaign_vehicle, options_of, vehicle_view
 from app.moves import check_action, check_move
 from app.schemas import Page
-from app.vehicles.open import get_kind
+from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 __all__ = [
     "campaign_vehicle",
@@ -35,6 +35,7 @@ __all__ = [
     "require_idle",
     "require_ready",
     "settle_vehicle",
+    "simulation_for",
 ]
 
 
@@ -76,6 +77,21 @@ def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, defaul
         ours, its = ", ".join(default_gains), ", ".join(row.safe_gains)
         raise _no_choice("id", f"{row.name} has the gains {its}; this experiment tunes {ours}")
     return row
+
+
+def simulation_for(session: Session, experiment: str, gains: Gains) -> VehicleChoice | None:
+    """What flies an experiment without anything real: a simulation that is shared by campaigns, the most detailed one
+    first, else a registered vehicle that is simulated and has the same `gains`, one that is connected before others."""
+    for kind in VEHICLE_KINDS.values():
+        if kind.can_fly and not kind.is_real and experiment in kind.experiments:
+            return VehicleChoice(kind=kind.name)
+    simulated = [
+        row
+        for row in repository.registered_in(session, *VehicleState)
+        if not row.is_real and experiment in experiments_of(row) and row.safe_gains.keys() == gains.keys()
+    ]
+    found = min(simulated, key=lambda row: (row.state == VehicleState.DISCONNECTED, row.id), default=None)
+    return None if found is None else VehicleChoice(kind=found.kind, id=found.id)
 
 
 def _no_choice(field: str, reason: str) -> InputError:

@@ -6,6 +6,7 @@ from contextlib import suppress
 
 from sqlalchemy.orm import Session
 
+from app.campaigns import rehearsals
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
@@ -78,6 +79,7 @@ def request_flight(
             f"{vehicle.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
             hint="Stage the trial; its operator then takes off on the fly page.",
         )
+    rehearsals.require_rehearsed(session, campaign)
     fleet.require_ready(session, vehicle, mode)
     require_no_other(vehicle, asker)
     now = utc_now()

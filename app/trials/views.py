@@ -4,24 +4,21 @@ from collections.abc import Iterable, Sequence
 
 from sqlalchemy.orm import Session
 
+from app.campaigns.rehearsals import is_free_to_fly, rehearsal_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.campaigns.statistics import standing_of
-from app.core.confirming import Standing
 from app.core.experiments import get_experiment
+from app.core.thinning import kept
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.moves import allowed
 from app.schemas import Gate, Interval
 from app.trials import repository
-from app.trials.comparisons import comparisons
+from app.trials.comparisons import Field, comparisons
 from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
-from app.trials.scoring import thinned
 from app.trials.states import ACTIONS, UNDER_WAY, FlightState, TrialState
-
-Scored = tuple[int, float]
-"""Number and error of a valid trial."""
 
 
 def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
@@ -33,9 +30,10 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     """Some trials of a campaign."""
     session.flush()
     flights = repository.latest_flights(session, [row.id for row in rows])
-    scored = repository.scored(session, campaign.id)
     now = standing_of(campaign, repository.of_campaigns(session, (campaign.id,)))
-    return [_view(campaign, row, scored, flights.get(row.id), now) for row in rows]
+    field = Field(repository.scored(session, campaign.id), now)
+    rehearsed = is_free_to_fly(rehearsal_of(session, campaign))
+    return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
 def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
@@ -43,7 +41,7 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
     assert row.trajectory is not None
     output = get_experiment(campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
-    kept = thinned(trajectory.time_s, leading, points)
+    chosen = kept(trajectory.time_s, leading, points)
     return TrajectoryOut(
         trial_id=row.id,
         source=trajectory.source,
@@ -51,13 +49,17 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
         checksum=row.trajectory.checksum,
         samples=len(trajectory),
         units=_units(trajectory.channels),
-        time_s=trajectory.time_s[kept].tolist(),
-        channels={name: values[kept].tolist() for name, values in trajectory.channels.items()},
+        time_s=trajectory.time_s[chosen].tolist(),
+        channels={name: values[chosen].tolist() for name, values in trajectory.channels.items()},
     )
 
 
 def _view(
-    campaign: CampaignRow, row: TrialRow, scored: Sequence[Scored], flight: FlightRow | None, now: Standing | None
+    campaign: CampaignRow,
+    row: TrialRow,
+    field: Field,
+    flight: FlightRow | None,
+    rehearsed: bool,
 ) -> Trial:
     interval = None if row.predicted_interval is None else Interval.model_validate(row.predicted_interval)
     return Trial(
@@ -74,10 +76,10 @@ def _view(
         predicted_error=row.predicted_error,
         predicted_interval=interval,
         inside_interval=_is_inside(interval, row),
-        group=_group(row, now),
-        comparisons=comparisons(row, scored, now),
+        group=_group(row, field),
+        comparisons=comparisons(row, field),
         overshoot_m=row.overshoot_m,
-        verdict=verdict(row, scored, get_experiment(campaign.experiment).error_unit, _flown_before(row, now)),
+        verdict=verdict(row, field, get_experiment(campaign.experiment).error_unit, _flown_before(row, field)),
         reason=row.reason,
         note=row.note,
         gate=Gate.model_validate(row.gate),
@@ -91,7 +93,7 @@ def _view(
         settings=row.settings or {},
         created_at=row.created_at,
         flown_at=row.flown_at,
-        actions=_actions(campaign, row, flight),
+        actions=_actions(campaign, row, flight, rehearsed),
     )
 
 
@@ -101,31 +103,28 @@ def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
     return interval.lower <= row.error <= interval.upper
 
 
-def _group(row: TrialRow, now: Standing | None) -> GroupBrief | None:
-    if now is None:
+def _group(row: TrialRow, field: Field) -> GroupBrief | None:
+    same = field.group_with(row.gains)
+    if same is None or field.scatter is None:
         return None
-    same = next((group for group in now.groups if group.gains == row.gains), None)
-    if same is None:
-        return None
-    return GroupBrief(mean=same.mean, standard_error=same.standard_error(now.scatter), n=same.size)
+    return GroupBrief(mean=same.mean, standard_error=same.standard_error(field.scatter), n=same.size)
 
 
-def _flown_before(row: TrialRow, now: Standing | None) -> list[int]:
+def _flown_before(row: TrialRow, field: Field) -> list[int]:
     """The earlier flights of a trial that repeats their gains on purpose; none for any other trial."""
-    if now is None or row.kind not in {"baseline", "repeat"}:
+    same = field.group_with(row.gains)
+    if same is None or row.kind not in {"baseline", "repeat"}:
         return []
-    return [
-        number for group in now.groups if group.gains == row.gains for number in group.numbers if number < row.number
-    ]
+    return [number for number in same.numbers if number < row.number]
 
 
-def verdict(row: TrialRow, scored: Sequence[Scored], unit: str, again: Sequence[int] = ()) -> str:
+def verdict(row: TrialRow, field: Field, unit: str, again: Sequence[int] = ()) -> str:
     """The flight against the best before it and against its prediction, in a sentence. One that repeats the gains of
     the flights `again` was not to be better than any, so it is not held against the best."""
     match row.state:
         case TrialState.VALID if row.error is not None:
-            before = min(((error, number) for number, error in scored if number < row.number), default=None)
-            said = f" {_once_more(again)}" if again else f": {_compared(row.error, before, unit)}"
+            compared = _compared(row.error, field.best_before(row.number), unit)
+            said = f" {_once_more(again)}" if again else f": {compared}"
             return f"{row.error:.3f} {unit}{said}{_against_prediction(row, unit)}."
         case TrialState.ABORTED:
             return f"Aborted: {row.reason}"
@@ -204,8 +203,9 @@ def _flight(row: FlightRow | None) -> FlightBrief | None:
     )
 
 
-def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None) -> list[str]:
-    """The states' table, narrowed by what the vehicle can do and by a flight that is under way."""
+def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
+    """The states' table, narrowed by what the vehicle can do, by a flight that is under way, and by a rehearsal that a
+    real vehicle lacks."""
     vehicle = campaign.vehicle
     under_way = flight is not None and flight.state in UNDER_WAY
     impossible = set()
@@ -213,7 +213,7 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None) -> 
         impossible |= {"fly", "stage"}
     if fleet.needs_staging(vehicle):
         impossible.add("fly")
-    if not vehicle.registered:
+    if not vehicle.registered or not rehearsed:
         impossible.add("stage")
     if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING or flight.stand_down:
         impossible |= {"take-off", "unstage"}

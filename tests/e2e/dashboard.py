@@ -134,6 +134,11 @@ class Dashboard:
             self.post(f"/campaigns/{campaign_id}/trials", {"proposal_id": proposal["id"], "fly": {"speed": None}})
             self.until(partial(self._classed, campaign_id, number))
 
+    def rehearse(self, campaign_id: int, flights: int) -> None:
+        """Fly the campaign on its simulation, over the API, until its rehearsal has passed."""
+        self.fly_headless(self.post(f"/campaigns/{campaign_id}/rehearsal")["id"], flights)
+        self.until(lambda: self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "passed")
+
     def _classed(self, campaign_id: int, number: int) -> bool:
         return any(trial["number"] == number and trial["state"] == "valid" for trial in self.trials(campaign_id))
 

@@ -51,10 +51,12 @@ def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
 def trial_id(dashboard: Dashboard, vehicle_id: int) -> Iterator[int]:
     """A trial of gains other than the safe ones, in a campaign of its own, the fly screen open."""
     in_state(dashboard, vehicle_id, "ready")
+    once = {"stop": {"kind": "budget", "max_flights": 1}}
     made = dashboard.post(
-        "/campaigns", {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle_id}, "definition": {}}
+        "/campaigns", {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle_id}, "definition": once}
     )
     dashboard.when_ready(made["id"])
+    dashboard.rehearse(made["id"], 1)
     trial: int = dashboard.post(f"/campaigns/{made['id']}/trials", {"gains": TRIED})["id"]
     dashboard.open(f"/fly/{trial}")
     yield trial

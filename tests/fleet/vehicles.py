@@ -4,10 +4,11 @@ from typing import Any
 
 import httpx2
 
-from app.db.models import VehicleRow
+from app.db.models import TrialRow, VehicleRow
 from app.db.session import Database
 from app.fleet import acts
 from app.fleet.states import VehicleState
+from app.trials.states import TrialState
 from app.vehicles.base import Identity
 from tests.builders import WORKER, Json, get, run_jobs
 
@@ -43,16 +44,41 @@ def create_connected(client: httpx2.Client, database: Database, name: str = "Dro
     return connect(client, database, register(client, name, real=real))
 
 
-def create_campaign_on(client: httpx2.Client, database: Database, vehicle: Json, **fields: object) -> Json:
-    """One whose first gains are known."""
+def create_campaign_on(
+    client: httpx2.Client, database: Database, vehicle: Json, *, rehearsed: bool = True, **fields: object
+) -> Json:
+    """One whose first gains are known, and which was rehearsed where that is needed."""
     answer = client.post(
         "/api/campaigns", json={"name": "Real", "vehicle": {"kind": vehicle["kind"], "id": vehicle["id"]}, **fields}
     )
     assert answer.status_code == 201, answer.text
     run_jobs(database)
+    if rehearsed and vehicle["is_real"]:
+        put_rehearsal(client, database, answer.json())
     campaign: Json = get(client, f"/api/campaigns/{answer.json()['id']}")
     assert campaign["state"] == "ready"
     return campaign
+
+
+def put_rehearsal(client: httpx2.Client, database: Database, campaign: Json) -> None:
+    """One that passed, with flights that nobody has flown."""
+    made = client.post(f"/api/campaigns/{campaign['id']}/rehearsal")
+    assert made.status_code == 201, made.text
+    run_jobs(database)
+    with database.write() as session:
+        for number in (1, 2, 3):
+            session.add(
+                TrialRow(
+                    campaign_id=made.json()["id"],
+                    number=number,
+                    state=TrialState.VALID,
+                    kind="step",
+                    gains=DEFAULT_GAINS,
+                    gate={"passed": True, "checks": []},
+                    error=0.1,
+                    seed=number,
+                )
+            )
 
 
 def seen(client: httpx2.Client, vehicle: Json) -> Json:

@@ -104,7 +104,18 @@ class Registered:
         )
         self.serving.proposal(created["id"])
         identity: int = created["id"]
+        if created["rehearsal"]["state"] != "not needed":
+            self._rehearse(identity)
         return identity
+
+    def _rehearse(self, campaign_id: int) -> None:
+        """Fly it on its simulation, as often as is asked for."""
+        rehearsal = self.serving.post(f"/campaigns/{campaign_id}/rehearsal")["id"]
+        while self.serving.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "under way":
+            proposal = self.serving.proposal(rehearsal)
+            order = {"proposal_id": proposal["id"], "fly": {"speed": None}}
+            self.serving.trial(self.serving.post(f"/campaigns/{rehearsal}/trials", order)["id"], "valid")
+        assert self.serving.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "passed"
 
     def planned(self, campaign_id: int) -> int:
         """A trial of gains other than the safe ones."""

@@ -166,6 +166,13 @@ export type Campaign = {
      * Parent Id
      */
     parent_id: number | null;
+    rehearsal: Rehearsal;
+    /**
+     * Rehearses
+     *
+     * the campaign that this one is the rehearsal of
+     */
+    rehearses: number | null;
     best: BestTrial | null;
     /**
      * Verdict
@@ -1894,6 +1901,27 @@ export type RecordBrief = {
 };
 
 /**
+ * Rehearsal
+ *
+ * Whether a campaign on a real vehicle was flown on a simulation first, which has to be `passed` before anything is
+ * staged. `campaign_id` is the rehearsal's own campaign; `reason` says why it stands so.
+ */
+export type Rehearsal = {
+    /**
+     * State
+     */
+    state: 'not needed' | 'missing' | 'under way' | 'passed' | 'failed';
+    /**
+     * Campaign Id
+     */
+    campaign_id: number | null;
+    /**
+     * Reason
+     */
+    reason: string;
+};
+
+/**
  * Release
  *
  * Who has looked at the vehicle, and found what.
@@ -3572,6 +3600,44 @@ export type CloneCampaignResponses = {
 };
 
 export type CloneCampaignResponse = CloneCampaignResponses[keyof CloneCampaignResponses];
+
+export type RehearseCampaignData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/rehearsal';
+};
+
+export type RehearseCampaignErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type RehearseCampaignError = RehearseCampaignErrors[keyof RehearseCampaignErrors];
+
+export type RehearseCampaignResponses = {
+    /**
+     * Successful Response
+     */
+    201: Campaign;
+};
+
+export type RehearseCampaignResponse = RehearseCampaignResponses[keyof RehearseCampaignResponses];
 
 export type PromoteBestData = {
     body: Promotion;

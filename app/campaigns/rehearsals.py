@@ -1,0 +1,101 @@
+"""Whether a campaign on a real vehicle was rehearsed: flown on a simulation first, with the same definition."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.definitions import definition_of
+from app.campaigns.schemas import Rehearsal, RehearsalState
+from app.campaigns.states import Outcome
+from app.db.models import CampaignRow, TrialRow
+from app.db.types import utc_now
+from app.errors import ConflictError
+from app.fleet import service as fleet
+from app.trials import history
+from app.trials.states import TrialState
+
+FLIGHTS: Final = 3
+"""Valid flights that are enough, where the campaign's own rule has not ended it before."""
+_SPOILT: Final = frozenset({TrialState.ABORTED, TrialState.INVALID, TrialState.LOST})
+_NOT_NEEDED: Final = Rehearsal(state="not needed", campaign_id=None, reason="")
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """One trial of a rehearsal: `gate_passed` is false where the gate's refusal was overruled."""
+
+    number: int
+    state: TrialState
+    gate_passed: bool
+
+
+def judge(trials: Sequence[Rehearsed], outcome: Outcome | None) -> tuple[RehearsalState, str]:
+    """What a rehearsal's flights say, and why. `outcome` is None until its campaign is over.
+
+    Passed: at least three valid flights, or as many as the campaign's own rule took to end it; none of them aborted,
+    invalid or lost, and none with gains that the gate refused.
+    """
+    flown = [trial for trial in trials if trial.state in history.FLOWN]
+    if (spoilt := next((trial for trial in flown if trial.state in _SPOILT), None)) is not None:
+        return "failed", f"flight {spoilt.number} is {spoilt.state}"
+    if (refused := next((trial for trial in flown if not trial.gate_passed), None)) is not None:
+        return "failed", f"the gate refused the gains of flight {refused.number}, and was overruled"
+    valid = sum(trial.state == TrialState.VALID for trial in flown)
+    ended_by_rule = outcome is not None and outcome != Outcome.STOPPED
+    if valid >= FLIGHTS or (valid and ended_by_rule):
+        return "passed", f"{valid} valid {'flight' if valid == 1 else 'flights'}, nothing aborted, invalid or refused"
+    if outcome is not None:
+        return "failed", f"it was ended after {valid} valid flights; {FLIGHTS} are needed"
+    return "under way", f"{valid} of {FLIGHTS} valid flights"
+
+
+def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
+    """Where a campaign's rehearsal stands: its latest one with the very same definition, safe gains included."""
+    if not fleet.needs_staging(campaign.vehicle):
+        return _NOT_NEEDED
+    held = repository.rehearsals(session, campaign.id)
+    wanted = definition_of(campaign).digest()
+    flown = (row for row in held if not row.vehicle.is_real and definition_of(row).digest() == wanted)
+    row = next(flown, None)
+    if row is not None:
+        state, reason = judge([_rehearsed(trial) for trial in history.trials_of(session, row.id)], row.outcome)
+        return Rehearsal(state=state, campaign_id=row.id, reason=reason)
+    if campaign.definition_digest is not None:
+        return Rehearsal(state="not needed", campaign_id=None, reason="it flew before rehearsals were asked for")
+    changed = "its definition, or its vehicle's safe gains, have changed since the last rehearsal"
+    return Rehearsal(state="missing", campaign_id=None, reason=changed if held else "it was not flown on a simulation")
+
+
+def is_free_to_fly(said: Rehearsal) -> bool:
+    return said.state in {"not needed", "passed"}
+
+
+def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
+    """Raises ConflictError while a campaign on a real vehicle has no rehearsal that passed."""
+    said = rehearsal_of(session, campaign)
+    if not is_free_to_fly(said):
+        where = "on its simulation" if said.campaign_id is None else f"in campaign {said.campaign_id}"
+        raise ConflictError(
+            f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal: "
+            f"{said.reason}.",
+            hint=f"Rehearse it {where} first: {FLIGHTS} valid flights, or the campaign to its stop, none of them "
+            "aborted or invalid.",
+        )
+
+
+def rehearsed_by(session: Session, rehearsal: CampaignRow) -> int | None:
+    """The campaign that this one rehearses; None where it is no rehearsal."""
+    return repository.rehearsed_id(session, rehearsal.id)
+
+
+def tell_rehearsed(session: Session, rehearsal: CampaignRow) -> None:
+    """What changes in a rehearsal changes the campaign that it is for, and who looks at that one hears of it."""
+    if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
+        repository.get_one(session, campaign_id).updated_at = utc_now()
+
+
+def _rehearsed(trial: TrialRow) -> Rehearsed:
+    return Rehearsed(trial.number, trial.state, bool(trial.gate["passed"]))
