@@ -1,21 +1,19 @@
-import { lazy } from "react";
 import { Route, Routes } from "react-router";
 import { AppFrame } from "./components/AppFrame";
+import { later } from "./components/later";
 import { CampaignPage } from "./pages/CampaignPage";
 import { CampaignsPage } from "./pages/CampaignsPage";
 import { NotFoundPage } from "./pages/NotFoundPage";
 
-// What is not looked at first is fetched when it is.
-const FlightPage = lazy(async () => ({ default: (await import("./pages/FlightPage")).FlightPage }));
-const FlyPage = lazy(async () => ({ default: (await import("./pages/FlyPage")).FlyPage }));
-const JobsPage = lazy(async () => ({ default: (await import("./pages/JobsPage")).JobsPage }));
-const NewCampaignPage = lazy(async () => ({ default: (await import("./pages/NewCampaignPage")).NewCampaignPage }));
-const NewVehiclePage = lazy(async () => ({ default: (await import("./pages/NewVehiclePage")).NewVehiclePage }));
-const ReproductionsPage = lazy(async () => ({
-  default: (await import("./pages/ReproductionsPage")).ReproductionsPage,
-}));
-const VehiclePage = lazy(async () => ({ default: (await import("./pages/VehiclePage")).VehiclePage }));
-const VehiclesPage = lazy(async () => ({ default: (await import("./pages/VehiclesPage")).VehiclesPage }));
+const FlightPage = later("FlightPage");
+const FlyPage = later("FlyPage");
+const JobsPage = later("JobsPage");
+const NewCampaignPage = later("NewCampaignPage");
+const NewVehiclePage = later("NewVehiclePage");
+const ReproductionsPage = later("ReproductionsPage");
+const SettingsPage = later("SettingsPage");
+const VehiclePage = later("VehiclePage");
+const VehiclesPage = later("VehiclesPage");
 
 export function App() {
   return (
@@ -31,6 +29,7 @@ export function App() {
         <Route path="vehicles/:vehicleId" element={<VehiclePage />} />
         <Route path="reproductions" element={<ReproductionsPage />} />
         <Route path="jobs" element={<JobsPage />} />
+        <Route path="settings" element={<SettingsPage />} />
         <Route path="*" element={<NotFoundPage />} />
       </Route>
     </Routes>

@@ -1,6 +1,6 @@
 import { useQueryClient } from "@tanstack/react-query";
 import { Suspense, useEffect, useRef } from "react";
-import { Link, Outlet, useMatch } from "react-router";
+import { Link, Outlet, useLocation, useMatch } from "react-router";
 import { useRenewedControl } from "../api/control";
 import { followEvents } from "../api/events";
 import { useAbort, useFlying } from "../api/flying";
@@ -8,9 +8,12 @@ import { useCampaign } from "../api/queries";
 import { useVehicle } from "../api/vehicles";
 import { abortTargets, type Flying } from "../lib/abort";
 import { liveFlightsNow } from "../live/store";
+import { Announcer } from "./Announcer";
 import { ConnectionNotice, ConnectionState } from "./ConnectionState";
 import { FlyingBar } from "./FlyingBar";
 import classes from "./Frame.module.css";
+import { KeyboardHelp } from "./KeyboardHelp";
+import { fetchEveryPage, PageGuard } from "./later";
 import { MainNav } from "./MainNav";
 import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleBadge } from "./VehicleBadge";
@@ -66,9 +69,11 @@ export function AppFrame() {
   const campaignId = onPage ? Number(onPage.params.campaignId) : null;
   const flying = useFlying();
   const abort = useAbort(flying);
+  const { pathname } = useLocation();
   const onFlyScreen = useMatch("/fly/:trialId") !== null;
   useEventStream(flying.length > 0);
   useRenewedControl();
+  useEffect(fetchEveryPage, []);
   useSpaceAborts(flying, campaignId, abort.press);
   return (
     <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
@@ -93,6 +98,7 @@ export function AppFrame() {
           </div>
           <ConnectionState />
           <ThemeSwitch />
+          <KeyboardHelp />
         </div>
         {abort.trouble !== null && (
           <p className={classes["trouble"]} role="alert">
@@ -102,10 +108,13 @@ export function AppFrame() {
         <VehicleStrip />
         <ConnectionNotice />
       </header>
+      <Announcer />
       <main id="main" className={classes["main"]} tabIndex={-1}>
-        <Suspense fallback={<div aria-busy="true" />}>
-          <Outlet context={abort} />
-        </Suspense>
+        <PageGuard path={pathname}>
+          <Suspense fallback={<div aria-busy="true" />}>
+            <Outlet context={abort} />
+          </Suspense>
+        </PageGuard>
       </main>
     </div>
   );

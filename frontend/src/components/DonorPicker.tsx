@@ -60,7 +60,8 @@ interface OffersProps {
 }
 
 function Offers({ campaigns, onChoose }: OffersProps) {
-  if (campaigns.length === 0) return <p role="status">No campaign of this experiment has a valid flight and such a name.</p>;
+  if (campaigns.length === 0)
+    return <p role="status">No campaign of this experiment has a valid flight and such a name.</p>;
   return (
     <ul className={classes["offers"]} aria-label="Campaigns to start from">
       {campaigns.slice(0, OFFERED).map((campaign) => (

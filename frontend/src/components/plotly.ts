@@ -9,7 +9,13 @@ import { onLive } from "../live/store";
 let loading: Promise<typeof Plotly> | undefined;
 
 export function loadPlotly(): Promise<typeof Plotly> {
-  loading ??= import("plotly.js-cartesian-dist-min").then((module) => module.default);
+  loading ??= import("plotly.js-cartesian-dist-min").then(
+    (module) => module.default,
+    (error: unknown) => {
+      loading = undefined;
+      throw error;
+    },
+  );
   return loading;
 }
 

@@ -33,6 +33,23 @@ const UNREACHABLE: Problem = {
   problems: [],
 };
 
+/** The program was updated, or the server went away, after this tab was opened. */
+export const PAGE_MISSING: Problem = {
+  status: 0,
+  title: "This page could not be fetched.",
+  detail: "The server is away, or it was updated since this tab was opened. What flies goes on; nothing was changed.",
+  hint: "Try again; once a lost server is back, the page comes by itself.",
+  problems: [],
+};
+
+export const BROKEN_PAGE: Problem = {
+  status: 0,
+  title: "This page broke while it was drawn.",
+  detail: "It is a fault of this program. What flies goes on; nothing was changed.",
+  hint: "Try again; the other pages still work. The browser's console says more.",
+  problems: [],
+};
+
 function text(value: unknown): string {
   return typeof value === "string" ? value : "";
 }
