@@ -10,6 +10,7 @@ const PAGES = [
   { to: "/vehicles", title: "Vehicles", inRow: true },
   { to: "/reproductions", title: "Reproductions", inRow: false },
   { to: "/jobs", title: "Jobs", inRow: false },
+  { to: "/settings", title: "Settings", inRow: false },
 ] as const;
 
 interface PageLinkProps {

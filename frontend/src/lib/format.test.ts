@@ -1,5 +1,16 @@
 import { expect, test } from "vitest";
-import { against, count, gainText, localTime, NOTHING, percentChange, signed, utcTime, withUnit } from "./format";
+import {
+  against,
+  bytesText,
+  count,
+  gainText,
+  localTime,
+  NOTHING,
+  percentChange,
+  signed,
+  utcTime,
+  withUnit,
+} from "./format";
 
 test("an error is printed to the millimetre, with its unit", () => {
   expect(withUnit(0.13189333802782058, "m")).toBe("0.132 m");
@@ -43,4 +54,14 @@ test("a local time names the year only when it is another one", () => {
 
 test("one flight is singular", () => {
   expect([count(0, "flight"), count(1, "flight"), count(7, "flight")]).toEqual(["0 flights", "1 flight", "7 flights"]);
+});
+
+test("sizes are told in the digits that matter", () => {
+  expect([400, 12_345, 9_960_000, 87_654_321, 1.44e12].map(bytesText)).toEqual([
+    "0.4 kB",
+    "12 kB",
+    "10.0 MB",
+    "88 MB",
+    "1.4 TB",
+  ]);
 });

@@ -48,3 +48,12 @@ export function utcTime(iso: string): string {
 export function count(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
+
+const SIZES = ["kB", "MB", "GB", "TB"] as const;
+
+/** `1.4 GB`: what a disk or a file holds, in powers of a thousand as disks are sold. */
+export function bytesText(bytes: number): string {
+  const power = Math.min(SIZES.length, Math.max(1, Math.floor(Math.log10(Math.max(bytes, 1)) / 3)));
+  const value = bytes / 1000 ** power;
+  return `${value.toFixed(value < 10 ? 1 : 0)} ${SIZES[power - 1]}`;
+}

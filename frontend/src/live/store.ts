@@ -2,6 +2,7 @@
 
 import { useEffect, useMemo, useState, useSyncExternalStore } from "react";
 import { begun, extended, type LiveFlight, type Telemetry, underWay, withFlight } from "../lib/live";
+import type { News } from "../lib/speech";
 import { type Aged, aged, type Heard, type Moment, type VehicleStatus } from "../lib/vehicle";
 
 export interface Connection {
@@ -105,4 +106,14 @@ export function useVehicleStatus(vehicleId: number | null): Aged | null {
   );
   const now = useMoment();
   return useMemo(() => (heard === null ? null : aged(heard, now)), [heard, now]);
+}
+
+/** For what speaks of the news: called with everything known, now and whenever any of it changes. Returns the end. */
+export function onNews(tell: (news: News) => void): () => void {
+  const tellNow = (): void => tell({ state: connection.get().state, flights: flights.get(), vehicles: vehicles.get() });
+  tellNow();
+  const ends = [connection, flights, vehicles].map((store) => store.subscribe(tellNow));
+  return () => {
+    for (const end of ends) end();
+  };
 }

@@ -1,10 +1,10 @@
 import { Button, TextInput } from "@mantine/core";
-import { useLocalStorage } from "@mantine/hooks";
 import { IconUserCheck } from "@tabler/icons-react";
 import { useHandOver, useTakeControl } from "../../api/control";
 import type { Vehicle } from "../../api/types";
 import { useOwnLease } from "../../live/leases";
 import { Trouble } from "../Trouble";
+import { useOperatorName } from "../usePreferences";
 import classes from "./Fly.module.css";
 
 /** Whether this tab is in control of the vehicle, as far as it knows. */
@@ -15,11 +15,7 @@ export function useIsInControl(vehicle: Vehicle): boolean {
 
 /** One operator at a time: take control by name, see who has it, take over where everybody sees it. */
 export function Control({ vehicle }: { vehicle: Vehicle }) {
-  const [name, setName] = useLocalStorage({
-    key: "gainline-operator",
-    defaultValue: "",
-    getInitialValueInEffect: false,
-  });
+  const [name, setName] = useOperatorName();
   const isOwn = useIsInControl(vehicle);
   const own = useOwnLease(vehicle.id);
   const take = useTakeControl(vehicle.id);

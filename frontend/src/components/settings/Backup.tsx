@@ -1,0 +1,38 @@
+import { Button } from "@mantine/core";
+import { IconDownload } from "@tabler/icons-react";
+import { BACKUP, type System } from "../../api/system";
+import { bytesText } from "../../lib/format";
+import classes from "../../pages/SettingsPage.module.css";
+import { Panel } from "../Panel";
+
+/** A copy of everything, and how it comes back. */
+export function Backup({ system }: { system: System }) {
+  return (
+    <Panel title="Backup">
+      <div className={classes["stack"]}>
+        <p className={classes["quiet"]}>
+          One file with every campaign, flight and vehicle as they are at this moment, about{" "}
+          {bytesText(system.database_bytes)}. Flights and computations go on meanwhile. Telemetry logs (folder tlogs)
+          are not in it.
+        </p>
+        <div>
+          <Button component="a" href={BACKUP} download leftSection={<IconDownload size={18} aria-hidden />}>
+            Download a backup
+          </Button>
+        </div>
+        <details className={classes["details"]}>
+          <summary>How to restore it</summary>
+          <ol>
+            <li>Stop Gainline.</li>
+            <li>
+              In {system.data_dir}, delete gainline.sqlite3-wal and gainline.sqlite3-shm, and move gainline.sqlite3
+              away.
+            </li>
+            <li>Put the backup there under the name gainline.sqlite3.</li>
+            <li>Start Gainline. A backup of an earlier version is brought up to date.</li>
+          </ol>
+        </details>
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,20 @@
+import { expect, test } from "vitest";
+import { commandOf, keysOf } from "./keys";
+
+const press = (key: string, more: Partial<KeyboardEvent> = {}) =>
+  ({ key, ctrlKey: false, metaKey: false, altKey: false, ...more }) as KeyboardEvent;
+
+test("a key asks for something unless one types, or the browser has it", () => {
+  expect(commandOf(press("?"), false)).toBe("help");
+  expect(commandOf(press("/"), false)).toBe("search");
+  expect(commandOf(press("?"), true)).toBeNull();
+  expect(commandOf(press("/", { ctrlKey: true }), false)).toBeNull();
+  expect(commandOf(press("a"), false)).toBeNull();
+});
+
+test("a page's own keys come before those of every page, and abort is on every page", () => {
+  const words = (path: string) => keysOf(path).map(({ keys }) => keys.join(" "));
+  expect(words("/")).toEqual(["/", "Space", "Tab", "Enter", "Esc", "?"]);
+  expect(words("/campaigns/3")[0]).toBe("← →");
+  expect(words("/fly/3")[0]).toBe("Space");
+});

@@ -1,0 +1,94 @@
+import { SegmentedControl, Skeleton, Switch, TextInput, useMantineColorScheme } from "@mantine/core";
+import { useSystem } from "../api/system";
+import { Panel } from "../components/Panel";
+import { About } from "../components/settings/About";
+import { Backup } from "../components/settings/Backup";
+import { Tablet } from "../components/settings/Tablet";
+import { Trouble } from "../components/Trouble";
+import { useOperatorName, useSpeechWanted } from "../components/usePreferences";
+import { useTitle } from "../components/useTitle";
+import { speak } from "../live/voice";
+import classes from "./SettingsPage.module.css";
+import work from "./WorkPages.module.css";
+
+const THEMES = [
+  { value: "light", label: "Light" },
+  { value: "dark", label: "Dark" },
+  { value: "auto", label: "As the system" },
+] as const;
+
+/** This browser's choices, and the server it talks to. */
+export function SettingsPage() {
+  useTitle("Settings");
+  const system = useSystem();
+  return (
+    <>
+      <div className={work["head"]}>
+        <h1 className={work["title"]}>Settings</h1>
+      </div>
+      <div className={classes["columns"]}>
+        <Panel title="This browser">
+          <ThisBrowser />
+        </Panel>
+        {system.data === undefined ? (
+          <div>
+            <Trouble error={system.error} />
+            {system.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
+          </div>
+        ) : (
+          <>
+            <Tablet system={system.data} />
+            <About system={system.data} />
+            <Backup system={system.data} />
+          </>
+        )}
+      </div>
+    </>
+  );
+}
+
+function ThisBrowser() {
+  const { colorScheme, setColorScheme } = useMantineColorScheme();
+  const [name, setName] = useOperatorName();
+  const [speech, setSpeech] = useSpeechWanted();
+  const canSpeak = "speechSynthesis" in window;
+  return (
+    <div className={classes["stack"]}>
+      <div>
+        <p className={classes["label"]} id="appearance">
+          Appearance
+        </p>
+        <SegmentedControl
+          aria-labelledby="appearance"
+          size="md"
+          data={[...THEMES]}
+          value={colorScheme}
+          onChange={(value) => setColorScheme(value as typeof colorScheme)}
+        />
+      </div>
+      <Switch
+        label="Spoken announcements"
+        description={
+          canSpeak
+            ? "“Landed, captured, 0.24 metres.” After a reload, tap the page once: browsers speak only then."
+            : "This browser has no voice. What it would say still reaches a screen reader."
+        }
+        size="md"
+        checked={speech}
+        disabled={!canSpeak}
+        onChange={({ currentTarget: { checked } }) => {
+          setSpeech(checked);
+          if (checked) speak({ text: "Announcements are on.", urgent: true });
+        }}
+      />
+      <TextInput
+        label="Your name"
+        description="With it you take control of a vehicle; everybody sees it there."
+        value={name}
+        maxLength={80}
+        autoComplete="name"
+        onChange={({ currentTarget: { value } }) => setName(value)}
+      />
+    </div>
+  );
+}
