@@ -14,6 +14,7 @@ from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
 from app.api.origin import OriginMiddleware
 from app.campaigns.router import router as campaigns
+from app.compare.router import router as compare
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import NotFoundError
@@ -63,6 +64,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         fleet,
         jobs,
         reproductions,
+        compare,
         figures.router,
         events.router,
     )

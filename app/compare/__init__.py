@@ -1,0 +1,1 @@
+"""Flights of any campaigns side by side."""

@@ -1,0 +1,20 @@
+"""Queries on the flights that are compared."""
+
+from collections.abc import Collection, Mapping
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.db.models import FlightRow, TrialRow
+
+
+def trials_by_id(session: Session, trial_ids: Collection[int]) -> Mapping[int, TrialRow]:
+    """Those that there are."""
+    return {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
+
+
+def batteries(session: Session, trial_ids: Collection[int]) -> Mapping[int, str]:
+    """The label of the battery that was in at the last flight of each trial, where somebody told it."""
+    last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
+    told = select(FlightRow).where(FlightRow.id.in_(last), FlightRow.battery != "")
+    return {row.trial_id: row.battery for row in session.scalars(told)}

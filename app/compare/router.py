@@ -1,0 +1,45 @@
+"""Comparisons of flights over HTTP."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.api.deps import Reader
+from app.api.figures import FigureCard, Theme, figure_card
+from app.compare import service
+from app.compare.schemas import FlightComparison
+
+router = APIRouter(prefix="/api/compare", tags=["compare"])
+
+TrialIds = Annotated[
+    list[Annotated[int, Query(ge=1, le=2**63 - 1)]],
+    Query(alias="trial", min_length=2, max_length=20, description="2 to 20 flights; the first is what others change"),
+]
+
+
+@router.get("")
+def compare_flights(session: Reader, trial: TrialIds) -> FlightComparison:
+    """Flights of any campaigns side by side, in the order given: their gains, settings and errors, what differs, and
+    which of each two is better."""
+    return service.compare_flights(session, trial)
+
+
+@router.get("/figure")
+def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "light") -> FigureCard:
+    """Their curves over the set point, and below them how each differs from the first."""
+    return figure_card(service.comparison_figure(session, trial, theme))
+
+
+@router.get(
+    "/curves.csv",
+    response_class=Response,
+    responses={200: {"content": {"text/csv": {"schema": {"type": "string"}}}}},
+)
+def get_comparison_csv(session: Reader, trial: TrialIds) -> Response:
+    """Their curves on one grid of time, every 0.02 s; each flight's own CSV has the record as it was stored."""
+    export = service.export_curves(session, trial)
+    return Response(
+        export.csv,
+        media_type="text/csv",
+        headers={"Content-Disposition": f'attachment; filename="{export.file_name}"'},
+    )

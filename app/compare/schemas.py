@@ -1,0 +1,94 @@
+"""What a comparison of flights looks like from outside."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, Field
+
+from app.core.statistics import Word
+from app.schemas import Gains, OptionValue
+from app.trials.schemas import GroupBrief
+from app.trials.states import TrialState
+
+Basis = Literal["gains", "repeats", "apart", "no error"]
+_BASIS = (
+    "what the difference is of: other `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, "
+    "for their vehicles or experiments differ; or there is none, because one of them has `no error`"
+)
+
+
+class FlightSetting(BaseModel):
+    """Something that a flight was flown with."""
+
+    title: str
+    unit: str
+    value: OptionValue
+
+
+class ComparedFlight(BaseModel):
+    """One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
+    all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight."""
+
+    trial_id: int
+    label: str
+    name: str
+    number: int
+    campaign_id: int
+    campaign_name: str
+    vehicle: str
+    is_real: bool
+    experiment: str
+    state: TrialState
+    gains: Gains
+    error: float | None
+    group: GroupBrief | None
+    scatter: float
+    flown_at: datetime | None
+    settings: list[FlightSetting]
+
+
+class FlightDifference(BaseModel):
+    """A gain or setting that is not the same in all flights: its value in each, in their order, null where a flight has
+    no such thing, and its change against the first flight's, where both are numbers."""
+
+    title: str
+    unit: str
+    values: list[OptionValue | None]
+    changes: list[int | float | None]
+
+
+class FurtherFlights(BaseModel):
+    """Further flights of the gains of each after which the difference, if it stays, would be decided."""
+
+    trial: int
+    against: int
+
+
+class FlightPair(BaseModel):
+    """One flight's gains against another's, each with all their flights. `difference` is trial − against; `confidence`
+    that of the likelier direction, for `repeats` in one campaign that anything has changed."""
+
+    trial_id: int
+    against_id: int
+    basis: Annotated[Basis, Field(description=_BASIS)]
+    verdict: Word | None
+    confidence: float | None
+    difference: float | None
+    standard_error: float | None
+    further: FurtherFlights | None
+    sentence: str
+
+
+class FlightComparison(BaseModel):
+    """Flights side by side, in the order in which they were named; every later one of each pair stands against the
+    earlier. `sentence` is the verdict on all of them: the lowest against the first one, or against the next lowest."""
+
+    error_unit: str
+    verdict: Word | None
+    sentence: str
+    notes: list[str]
+    flights: list[ComparedFlight]
+    gains: list[FlightDifference]
+    settings: list[FlightDifference]
+    pairs: list[FlightPair]
+    file_stem: Annotated[str, Field(description="for the names of files made of this comparison")]

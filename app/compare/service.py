@@ -1,0 +1,131 @@
+"""Flights side by side: what differs between them, what that was worth, and their curves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from app.compare import repository
+from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
+from app.compare.settings import gain_differences, setting_differences, settings_of
+from app.compare.sides import Side, sides_of
+from app.compare.verdicts import notes_on, overall, pair
+from app.compare.words import file_stem
+from app.core.trajectory import CHANNEL_UNITS, Samples
+from app.figures.base import Card, card_of
+from app.figures.comparing import ComparedCurve, ComparingData, ComparingFigure
+from app.figures.history import Curve
+from app.figures.theme import ThemeName
+from app.trials import history
+from app.trials.schemas import GroupBrief
+
+GRID_STEP_S: Final = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class CurvesExport:
+    """The curves of several flights on one grid of time, as CSV."""
+
+    file_name: str
+    csv: str
+
+
+def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightComparison:
+    """Raises InputError naming the flights that cannot be compared."""
+    sides = sides_of(session, trial_ids)
+    batteries = repository.batteries(session, trial_ids)
+    settings = [settings_of(side, batteries.get(side.row.id, "")) for side in sides]
+    verdict, sentence = overall(sides)
+    return FlightComparison(
+        error_unit=sides[0].experiment.error_unit,
+        verdict=verdict,
+        sentence=sentence,
+        notes=notes_on(sides),
+        flights=[_flight(side, own) for side, own in zip(sides, settings, strict=True)],
+        gains=gain_differences(sides),
+        settings=setting_differences(settings),
+        pairs=[pair(later, earlier) for earlier, later in combinations(sides, 2)],
+        file_stem=file_stem([side.row for side in sides]),
+    )
+
+
+def comparison_figure(session: Session, trial_ids: Sequence[int], theme: ThemeName) -> Card:
+    """The curves over the set point. Raises InputError naming the flights that cannot be compared."""
+    return card_of(ComparingFigure(_drawn(session, sides_of(session, trial_ids)), theme))
+
+
+def export_curves(session: Session, trial_ids: Sequence[int]) -> CurvesExport:
+    """Every 0.02 s from the command to the end of the longest record, straight between samples, empty outside of a
+    record. Raises InputError naming the flights that cannot be compared."""
+    sides = sides_of(session, trial_ids)
+    data = _drawn(session, sides)
+    ends = [float(flight.curve.time_s[-1]) for flight in data.flights if flight.curve is not None]
+    grid = np.arange(round(max(ends, default=0.0) / GRID_STEP_S) + 1, dtype=np.float64) * GRID_STEP_S
+    unit = data.output_unit
+    columns = {"time_s": [f"{second:.2f}" for second in grid], f"set_point_{unit}": _column(data.set_point, grid)}
+    for side, flight in zip(sides, data.flights, strict=True):
+        title = f"campaign_{side.campaign.id}_flight_{side.row.number}_{side.experiment.output}"
+        columns[title] = _column(flight.curve, grid)
+    lines = [",".join(columns), *(",".join(cells) for cells in zip(*columns.values(), strict=True))]
+    return CurvesExport(f"{file_stem([side.row for side in sides])}.csv", "\n".join(lines) + "\n")
+
+
+def _column(curve: Curve | None, grid: Samples) -> list[str]:
+    if curve is None or len(curve.time_s) == 0:
+        return [""] * len(grid)
+    values = np.interp(grid, curve.time_s, curve.values, left=np.nan, right=np.nan)
+    return ["" if np.isnan(value) else f"{value:.6g}" for value in values]
+
+
+def _flight(side: Side, settings: list[FlightSetting]) -> ComparedFlight:
+    row, campaign, group = side.row, side.campaign, side.group
+    return ComparedFlight(
+        trial_id=row.id,
+        label=side.label,
+        name=side.name,
+        number=row.number,
+        campaign_id=campaign.id,
+        campaign_name=campaign.name,
+        vehicle=campaign.vehicle.title,
+        is_real=campaign.vehicle.is_real,
+        experiment=side.experiment.title,
+        state=row.state,
+        gains=row.gains,
+        error=row.error,
+        group=None
+        if group is None
+        else GroupBrief(mean=group.mean, standard_error=group.standard_error(side.scatter), n=group.size),
+        scatter=side.scatter.sigma,
+        flown_at=row.flown_at,
+        settings=settings,
+    )
+
+
+def _drawn(session: Session, sides: Sequence[Side]) -> ComparingData:
+    experiment = sides[0].experiment
+    recorded = [side.row.trajectory_id for side in sides if side.row.trajectory_id is not None]
+    records = history.trajectories_of(session, recorded)
+    unit = CHANNEL_UNITS[experiment.output]
+    return ComparingData(
+        output_title=experiment.output.removesuffix(f"_{unit}").replace("_", " ").capitalize(),
+        output_unit=unit,
+        error_unit=experiment.error_unit,
+        set_point=Curve(experiment.grid_s, experiment.set_point(experiment.grid_s)),
+        flights=tuple(
+            ComparedCurve(
+                trial_id=side.row.id,
+                label=side.label,
+                name=side.name,
+                curve=None
+                if side.row.trajectory_id is None
+                else Curve(
+                    records[side.row.trajectory_id].time_s, records[side.row.trajectory_id][side.experiment.output]
+                ),
+                error=side.row.error,
+            )
+            for side in sides
+        ),
+    )

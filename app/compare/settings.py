@@ -1,0 +1,87 @@
+"""What a flight was flown with, and in what several flights differ."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from app.compare.schemas import FlightDifference, FlightSetting
+from app.compare.sides import Side
+from app.core.experiments import get_experiment
+from app.core.options import Option
+from app.core.strategies import STRATEGIES
+from app.db.models import CampaignRow
+from app.fleet import service as fleet
+from app.schemas import OptionValue
+from app.vehicles.base import VehicleOption
+from app.vehicles.open import VEHICLE_KINDS
+
+
+def settings_of(side: Side, battery: str) -> list[FlightSetting]:
+    """Vehicle, experiment and strategy with their settings, the battery, and what the vehicle said of itself."""
+    row, campaign = side.row, side.campaign
+    kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
+    strategy = STRATEGIES[campaign.strategy]
+    found = [
+        FlightSetting(title="Vehicle", unit="", value=campaign.vehicle.title),
+        *_options(fleet.options_of(campaign), () if kind is None else kind.options),
+        FlightSetting(title="Experiment", unit="", value=side.experiment.title),
+        *_options(campaign.definition["experiment_options"], get_experiment(campaign.experiment).options),
+        FlightSetting(title="Strategy", unit="", value=strategy.title),
+        *_options(campaign.definition["options"], strategy.options),
+        FlightSetting(title="Seed of the campaign", unit="", value=_seed(campaign)),
+    ]
+    if battery:
+        found.append(FlightSetting(title="Battery", unit="", value=battery))
+    if row.landing_battery_v is not None:
+        found.append(FlightSetting(title="Battery after landing", unit="V", value=round(row.landing_battery_v, 2)))
+    return found + [FlightSetting(title=name, unit="", value=value) for name, value in row.settings.items()]
+
+
+def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[FlightDifference]:
+    """Those settings that are not the same in all flights; one that a flight does not have is None there."""
+    titles = dict.fromkeys((one.title, one.unit) for settings in flights for one in settings)
+    values = [{(one.title, one.unit): one.value for one in settings} for settings in flights]
+    return _differing((title, unit, [own.get((title, unit)) for own in values]) for title, unit in titles)
+
+
+def gain_differences(sides: Sequence[Side]) -> list[FlightDifference]:
+    """Those gains that are not the same in all flights."""
+    known = {gain.name: gain for side in sides for gain in side.experiment.space.gains}
+    names = dict.fromkeys(name for side in sides for name in side.row.gains)
+    return _differing(
+        (name, known[name].unit if name in known else "", [side.row.gains.get(name) for side in sides])
+        for name in names
+    )
+
+
+def _seed(campaign: CampaignRow) -> int:
+    seed: int = campaign.definition["seed"]
+    return seed
+
+
+def _options(
+    values: Mapping[str, OptionValue], known: Iterable[Option] | Iterable[VehicleOption]
+) -> list[FlightSetting]:
+    described = {option.name: option for option in known}
+    return [
+        FlightSetting(
+            title=described[name].title if name in described else name,
+            unit=described[name].unit if name in described else "",
+            value=value,
+        )
+        for name, value in values.items()
+    ]
+
+
+def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> list[FlightDifference]:
+    return [
+        FlightDifference(title=title, unit=unit, values=values, changes=[_change(values[0], one) for one in values])
+        for title, unit, values in rows
+        if any(one != values[0] for one in values)
+    ]
+
+
+def _change(first: OptionValue | None, value: OptionValue | None) -> int | float | None:
+    if any(one is None or isinstance(one, bool | str) for one in (first, value)):
+        return None
+    assert isinstance(first, int | float)
+    assert isinstance(value, int | float)
+    return value - first

@@ -1,0 +1,185 @@
+"""Which of two flights' gains are better, or why nobody can say; and the same of several flights in one sentence.
+
+Each flight counts with all valid flights of its gains in its campaign, and the scatter is that of its population, so
+that flights of one campaign get the verdict that they have there. Between populations there is none: vehicle and gains
+differ together, and only the errors stand beside each other.
+"""
+
+import math
+from collections.abc import Sequence
+
+from app.compare.schemas import Basis, FlightPair, FurtherFlights
+from app.compare.sides import Side
+from app.compare.words import capitalised, flights, measured, named, percent
+from app.core.statistics import Comparison, Group, Word, compare, drift_of
+from app.core.strategies.history import describe
+from app.fleet import service as fleet
+from app.trials.comparisons import CONFIDENCE
+
+
+def pair(side: Side, against: Side, *, candidates: int = 1) -> FlightPair:
+    """`side` against `against`, chosen among so many `candidates` for its low error."""
+    if side.group is None or against.group is None:
+        missing = side if side.group is None else against
+        sentence = f"{capitalised(missing.name)} is {missing.row.state}: it has no error that counts."
+        return _pair(side, against, "no error", sentence)
+    if side.population != against.population:
+        return _apart(side, side.group, against, against.group)
+    if side.group is against.group:
+        return _repeats(side, against, side.group)
+    said = compare(side.group, against.group, side.scatter, CONFIDENCE, candidates=candidates)
+    same = dict(side.group.gains) == dict(against.group.gains)
+    sentence = _changed(side, against, said) if same else _told(side, side.group, against, against.group, said)
+    return FlightPair(
+        trial_id=side.row.id,
+        against_id=against.row.id,
+        basis="repeats" if same else "gains",
+        verdict=said.verdict,
+        confidence=said.confidence,
+        difference=said.difference,
+        standard_error=said.standard_error,
+        further=None if said.further is None else FurtherFlights(trial=said.further.first, against=said.further.second),
+        sentence=sentence,
+    )
+
+
+def overall(sides: Sequence[Side]) -> tuple[Word | None, str]:
+    """The gains with the lowest mean (plus its standard error, as in a campaign) against those of the first flight, or
+    where they are the first flight's, against the next lowest."""
+    ranked = sorted((side for side in sides if side.group is not None), key=_rank)
+    if len(ranked) < 2:
+        return None, "No verdict: fewer than two of these flights have an error that counts."
+    best, first = ranked[0], sides[0]
+    policies = len({id(side.group) for side in ranked})
+    other = (
+        first
+        if first.group not in (None, best.group)
+        else next((side for side in ranked if side.group is not best.group), ranked[1])
+    )
+    said = pair(best, other, candidates=max(1, policies - 1))
+    return said.verdict, f"{_among(best, policies)}{said.sentence}"
+
+
+def notes_on(sides: Sequence[Side]) -> list[str]:
+    """What has to be known before the numbers are believed."""
+    first = sides[0]
+    apart = dict.fromkeys(_why_apart(side, first) for side in sides if side.population != first.population)
+    campaigns: dict[str, set[int]] = {}
+    for side in sides:
+        campaigns.setdefault(side.population, set()).add(side.campaign.id)
+    scatters = {side.population: side.scatter for side in sides}
+    shared = [
+        f"One flight scatters by {scatters[population].sigma:.4f} {first.experiment.error_unit}, as repeats in "
+        f"{len(members)} campaigns of the same vehicle and experiment say together."
+        for population, members in campaigns.items()
+        if len(members) > 1
+    ]
+    return [*apart, *shared]
+
+
+def _rank(side: Side) -> tuple[float, str]:
+    assert side.group is not None
+    return side.group.mean + side.group.standard_error(side.scatter), side.label
+
+
+def _among(best: Side, policies: int) -> str:
+    return f"{capitalised(best.name)} is the lowest of {policies} gain sets. " if policies > 2 else ""
+
+
+def _pair(side: Side, against: Side, basis: Basis, sentence: str) -> FlightPair:
+    return FlightPair(
+        trial_id=side.row.id,
+        against_id=against.row.id,
+        basis=basis,
+        verdict=None,
+        confidence=None,
+        difference=None,
+        standard_error=None,
+        further=None,
+        sentence=sentence,
+    )
+
+
+def _apart(side: Side, own: Group, against: Side, other: Group) -> FlightPair:
+    """Two means with scatters of their own: the difference has the sum of both variances."""
+    difference = own.mean - other.mean
+    standard_error = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
+    amount = measured(abs(difference), standard_error, side.experiment.error_unit)
+    direction = "lower" if difference < 0.0 else "higher"
+    sentence = f"No verdict on the gains: {side.name} is {amount} {direction} than {against.name}. "
+    told = _pair(side, against, "apart", sentence + _why_apart(side, against))
+    return told.model_copy(update={"difference": difference, "standard_error": standard_error})
+
+
+def _why_apart(side: Side, against: Side) -> str:
+    """What is not the same in the two campaigns beside the gains, and what that means."""
+    one, other = side.campaign.vehicle, against.campaign.vehicle
+    if side.experiment.name != against.experiment.name:
+        what = f"Different experiments ({side.experiment.title}, {against.experiment.title})"
+    elif one.id != other.id:
+        what = f"Different vehicles ({one.title}, {other.title})"
+    elif not fleet.can_fly(one):
+        what = "Flights made elsewhere: nothing says that one vehicle flew both campaigns"
+    else:
+        what = "One vehicle, but with other settings"
+    return f"{what}. The errors differ for that as well as for the gains; to compare gains, fly both in one campaign."
+
+
+def _repeats(side: Side, against: Side, group: Group) -> FlightPair:
+    """Two flights of the same gains in one campaign: has anything changed between them?"""
+    errors = dict(zip(group.numbers, group.errors, strict=True))
+    numbers = (against.row.number, side.row.number)
+    found = drift_of(Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]])), side.scatter)
+    assert found is not None
+    amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
+    word = "more than flights scatter" if found.confidence >= CONFIDENCE else "no more than flights scatter"
+    sentence = (
+        f"The same gains ({describe(group.gains)}): {side.name} and {against.name} are {amount} apart, {word} "
+        f"({percent(found.confidence)} confidence that something has changed)."
+    )
+    told = _pair(side, against, "repeats", sentence)
+    return told.model_copy(
+        update={
+            "difference": found.difference,
+            "standard_error": found.standard_error,
+            "confidence": found.confidence,
+        }
+    )
+
+
+def _changed(side: Side, against: Side, said: Comparison) -> str:
+    """The same gains in two campaigns."""
+    amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
+    word = (
+        "which scatter explains"
+        if said.verdict == "unresolved"
+        else "more than scatter explains: the vehicle or its surroundings have changed"
+    )
+    direction = "lower" if said.difference < 0.0 else "higher"
+    return (
+        f"The same gains in two campaigns: {side.name} is {amount} {direction} than {against.name}, {word} "
+        f"({percent(said.confidence)} confidence)."
+    )
+
+
+def _told(side: Side, own: Group, against: Side, other: Group, said: Comparison) -> str:
+    amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
+    direction = "lower" if said.difference < 0.0 else "higher"
+    both = f"{amount} {direction}, {percent(said.confidence)} confidence"
+    if said.verdict == "unresolved":
+        return (
+            f"Unresolved: {named(own, side.name)} against {named(other, against.name)}, {both}. "
+            f"{_deciding(side, against, said)}"
+        )
+    return f"{capitalised(named(own, side.name))} is {said.verdict} than {named(other, against.name)}: {both}."
+
+
+def _deciding(side: Side, against: Side, said: Comparison) -> str:
+    if said.further is None:
+        return "Not even 100 further flights would decide it."
+    parts = [
+        f"{count} with the gains of {name}"
+        for count, name in ((said.further.first, side.name), (said.further.second, against.name))
+        if count
+    ]
+    return f"If the difference stays, {flights(said.further.total)} more would decide it: {' and '.join(parts)}."

@@ -1,0 +1,67 @@
+"""Numbers and flights in sentences."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from app.core.statistics import Group
+from app.core.strategies.history import describe
+from app.db.models import CampaignRow, TrialRow
+
+_MOST_DIGITS = 6
+_TWO_DIGITS_BELOW = 3.55
+"""An uncertainty that begins with less carries a second digit: rounding 0.012 to 0.01 would cost too much."""
+
+
+def measured(value: float, standard_error: float, unit: str) -> str:
+    """`0.105 ± 0.012 m`, in as many digits as the uncertainty allows."""
+    if standard_error <= 0.0:
+        return f"{value:.3f} {unit}"
+    power = math.floor(math.log10(standard_error))
+    two = standard_error / 10.0**power < _TWO_DIGITS_BELOW
+    digits = min(_MOST_DIGITS, max(0, 1 - power if two else -power))
+    return f"{value:.{digits}f} ± {standard_error:.{digits}f} {unit}"
+
+
+def percent(confidence: float) -> str:
+    """A confidence as people say it; one that rounds to certainty is not claimed."""
+    return "more than 99 %" if confidence > 0.995 else f"{100.0 * confidence:.0f} %"
+
+
+def flights(count: int) -> str:
+    return "1 flight" if count == 1 else f"{count} flights"
+
+
+def named(group: Group, name: str) -> str:
+    """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains, and how often they were flown."""
+    return f"{name} ({describe(group.gains)}; {flights(group.size)})"
+
+
+def capitalised(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
+def names_of(rows: Sequence[TrialRow], campaigns: Mapping[int, CampaignRow]) -> list[str]:
+    """`flight 3`; with its campaign where there are several, and with that one's id where two have the same name."""
+    used = {row.campaign_id: campaigns[row.campaign_id].name for row in rows}
+    if len(used) == 1:
+        return [f"flight {row.number}" for row in rows]
+    alike = Counter(used.values())
+    return [
+        f"flight {row.number} of {(name := used[row.campaign_id])}"
+        + (f" (campaign {row.campaign_id})" if alike[name] > 1 else "")
+        for row in rows
+    ]
+
+
+def file_stem(rows: Sequence[TrialRow]) -> str:
+    """`compare-campaign-3-flights-1-4-campaign-5-flight-2`; only how many there are, where that would be long."""
+    numbers: dict[int, list[int]] = {}
+    for row in rows:
+        numbers.setdefault(row.campaign_id, []).append(row.number)
+    parts = [
+        f"campaign-{campaign_id}-flight{'s' if len(flown) > 1 else ''}-{'-'.join(map(str, flown))}"
+        for campaign_id, flown in numbers.items()
+    ]
+    stem = "-".join(["compare", *parts])
+    return stem if len(stem) <= 80 else f"compare-{len(rows)}-flights"
