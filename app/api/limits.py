@@ -11,22 +11,24 @@ from app.errors import GainlineError, Problem, TooLargeError
 
 JSON_BYTES: Final = 2**20
 """Largest JSON body."""
-_UPLOADS: Final = "/trajectory"
+PHOTO_BYTES: Final = 10 * 2**20 + 2**12
+"""Largest photo, with the form that it comes in."""
 
 
 class BodyLimitMiddleware:
-    """Bounds every request's body: flight records to `upload_bytes`, everything else to 1 MiB."""
+    """Bounds every request's body: flight records to `upload_bytes`, photos to 10 MiB, everything else to 1 MiB."""
 
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
-        self._upload_bytes = upload_bytes
+        self._uploads = {"/trajectory": upload_bytes, "/photos": PHOTO_BYTES}
         self._refuse = refuse
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        field, limit = ("file", self._upload_bytes) if scope["path"].endswith(_UPLOADS) else ("body", JSON_BYTES)
+        named = next((limit for ending, limit in self._uploads.items() if scope["path"].endswith(ending)), None)
+        field, limit = ("body", JSON_BYTES) if named is None else ("file", named)
         stated = Headers(scope=scope).get("content-length", "")
         if stated.isdecimal() and int(stated) > limit:
             await self._refuse(_too_large(field, limit))(scope, receive, send)
@@ -45,10 +47,11 @@ class BodyLimitMiddleware:
 
 
 def _too_large(field: str, limit_bytes: int) -> TooLargeError:
-    size = f"{limit_bytes / 2**20:g} MiB"
+    size = f"{limit_bytes / 2**20:.4g} MiB"
     return TooLargeError(
         "The request is too large; nothing was stored.",
-        hint=f"Send at most {size}; a flight record has at most 200 000 rows, so thin a longer one or cut it. "
+        hint=f"Send at most {size}: a photo in a lower resolution is enough; a flight record has at most 200 000 rows, "
+        "so thin a longer one or cut it. "
         "`gainline import` reads larger logs.",
         problems=(Problem(field, f"is larger than {size}"),),
     )

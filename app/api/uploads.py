@@ -45,6 +45,19 @@ REQUEST_BODY: Final = {
 }
 """For OpenAPI."""
 
+FILE_BODY: Final = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {"type": "object", "required": ["file"], "properties": {"file": _BINARY["schema"]}}
+            },
+            _ANY: _BINARY,
+        },
+    }
+}
+"""The same for one file of any kind."""
+
 
 @dataclass(frozen=True, slots=True)
 class Upload:

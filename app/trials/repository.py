@@ -4,9 +4,9 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from sqlalchemy import delete, func, select
-from sqlalchemy.orm import Session, joinedload, undefer
+from sqlalchemy.orm import Session, defer, joinedload, undefer
 
-from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow
 from app.errors import NotFoundError
 from app.trials.states import UNDER_WAY, FlightState, TrialState
 
@@ -77,6 +77,17 @@ def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int
         select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids)).options(undefer(TrajectoryRow.data))
     )
     return {row.id: row for row in rows}
+
+
+def photos(session: Session, trial_id: int) -> Sequence[TrialPhotoRow]:
+    """Without what they show, in the order in which they were added."""
+    return session.scalars(
+        select(TrialPhotoRow).where(TrialPhotoRow.trial_id == trial_id).order_by(TrialPhotoRow.id)
+    ).all()
+
+
+def photo_or_none(session: Session, photo_id: int) -> TrialPhotoRow | None:
+    return session.get(TrialPhotoRow, photo_id)
 
 
 def get_flight(session: Session, flight_id: int) -> FlightRow:

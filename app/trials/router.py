@@ -19,10 +19,20 @@ from app.api.deps import (
     Writer,
     json_only,
 )
-from app.api.uploads import REQUEST_BODY, Record
+from app.api.uploads import FILE_BODY, REQUEST_BODY, Record
 from app.schemas import Page
-from app.trials import orders, service
-from app.trials.schemas import Abort, AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial, TrialEdit
+from app.trials import orders, photos, service
+from app.trials.schemas import (
+    Abort,
+    AbortAnswer,
+    Classification,
+    FlightOrder,
+    NewTrial,
+    Trajectory,
+    Trial,
+    TrialEdit,
+    TrialPhoto,
+)
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
 
@@ -158,6 +168,36 @@ def get_telemetry_log(session: Reader, settings: CurrentSettings, trial_id: Id) 
     return FileResponse(log.file, media_type="application/octet-stream", filename=log.name)
 
 
+@router.get("/trials/{trial_id}/photos")
+def list_photos(session: Reader, trial_id: Id) -> list[TrialPhoto]:
+    """The photos of a flight, in the order in which they were added."""
+    return photos.list_photos(session, trial_id)
+
+
+@router.get(
+    "/trials/{trial_id}/photos/{photo_id}",
+    response_class=Response,
+    responses={200: {"content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in photos.ENDINGS}}},
+)
+def get_photo(session: Reader, trial_id: Id, photo_id: Id) -> Response:
+    """A picture as it was handed in; opened by itself it may run nothing and load nothing."""
+    picture = photos.get_picture(session, trial_id, photo_id)
+    return Response(
+        picture.data,
+        media_type=picture.media_type,
+        headers={
+            "Cache-Control": "private, max-age=31536000, immutable",
+            "Content-Disposition": f'inline; filename="{picture.file_name}"',
+            "Content-Security-Policy": "default-src 'none'; sandbox; frame-ancestors 'none'",
+        },
+    )
+
+
+@router.delete("/trials/{trial_id}/photos/{photo_id}", status_code=status.HTTP_204_NO_CONTENT)
+def delete_photo(session: Writer, trial_id: Id, photo_id: Id) -> None:
+    photos.delete_photo(session, trial_id, photo_id)
+
+
 records = APIRouter(prefix="/api", tags=["trials"])
 """Apart from the rest, because what comes in here is no JSON."""
 
@@ -179,3 +219,11 @@ def upload_trajectory(
     """
     flown = service.read_record(record.file, name=record.name, takeoff=takeoff, companion=record.companion)
     return record.once(Trial, lambda session: service.import_record(session, trial_id, flown, confirmed=confirm))
+
+
+@records.post("/trials/{trial_id}/photos", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)
+def add_photo(upload: Record, trial_id: Id) -> TrialPhoto:
+    """Add a photo (JPEG, PNG or WebP, told by its content; at most 10 MiB) to a flight, as the form field `file`."""
+    upload.file.seek(0)
+    content = upload.file.read(photos.MAX_BYTES + 1)
+    return upload.once(TrialPhoto, lambda session: photos.add_photo(session, trial_id, content))

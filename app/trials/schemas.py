@@ -44,6 +44,15 @@ class TrialEdit(Request):
     note: Text
 
 
+class TrialPhoto(BaseModel):
+    """A photo of a flight; the picture itself is at `/api/trials/{trial_id}/photos/{id}`."""
+
+    id: int
+    trial_id: int
+    media_type: str
+    added_at: datetime
+
+
 class Classification(Request):
     """A person's word on a finished flight."""
 

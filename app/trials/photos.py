@@ -1,0 +1,97 @@
+"""Photos of flights, kept as they were handed in."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.db.models import TrialPhotoRow
+from app.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
+from app.trials import repository
+from app.trials.schemas import TrialPhoto
+
+MAX_BYTES: Final = 10 * 2**20
+MAX_PER_TRIAL: Final = 20
+ENDINGS: Final = {"image/jpeg": "jpg", "image/png": "png", "image/webp": "webp"}
+"""Media types that every browser shows, and the endings of their files' names."""
+_JPEG: Final = b"\xff\xd8\xff"
+_PNG: Final = b"\x89PNG\r\n\x1a\n"
+_RIFF, _WEBP = b"RIFF", b"WEBP"
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A photo's bytes, and the name it is handed out under."""
+
+    media_type: str
+    data: bytes
+    file_name: str
+
+
+def media_type_of(content: bytes) -> str | None:
+    """What a picture is by its first bytes, whatever it is called; None where it is none that is taken."""
+    if content.startswith(_JPEG):
+        return "image/jpeg"
+    if content.startswith(_PNG):
+        return "image/png"
+    if content.startswith(_RIFF) and content[8:12] == _WEBP:
+        return "image/webp"
+    return None
+
+
+def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
+    """Raises NotFoundError; TooLargeError, MediaTypeError or InputError for what is no photo; ConflictError when the
+    trial has as many as it may have."""
+    trial = repository.get_one(session, trial_id)
+    if len(content) > MAX_BYTES:
+        size = f"{MAX_BYTES / 2**20:g} MiB"
+        raise TooLargeError(
+            "The photo is too large; nothing was stored.",
+            hint=f"Send at most {size}: a lower resolution in the camera's settings is enough.",
+            problems=(Problem("file", f"is larger than {size}"),),
+        )
+    if not content:
+        raise InputError("The photo is empty.", hint="Take it again.", problems=(Problem("file", "holds nothing"),))
+    if (media_type := media_type_of(content)) is None:
+        raise MediaTypeError(
+            "This is not a JPEG, PNG or WebP picture; nothing was stored.",
+            hint="Set the camera to JPEG (iPhone: Settings, Camera, Formats, Most Compatible), or send a screenshot.",
+            problems=(Problem("file", "is no JPEG, PNG or WebP picture"),),
+        )
+    if len(repository.photos(session, trial_id)) >= MAX_PER_TRIAL:
+        raise ConflictError(
+            f"Flight {trial.number} has {MAX_PER_TRIAL} photos, which is as many as are kept.",
+            hint="Delete one that says little, then add this one.",
+        )
+    row = TrialPhotoRow(trial=trial, media_type=media_type, data=content)
+    session.add(row)
+    session.flush()
+    return _view(row)
+
+
+def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:
+    """In the order in which they were added. Raises NotFoundError."""
+    return [_view(row) for row in repository.photos(session, repository.get_one(session, trial_id).id)]
+
+
+def get_picture(session: Session, trial_id: int, photo_id: int) -> Picture:
+    """Raises NotFoundError."""
+    row = _one(session, trial_id, photo_id)
+    name = f"campaign-{row.trial.campaign_id}-trial-{row.trial.number}-photo-{row.id}.{ENDINGS[row.media_type]}"
+    return Picture(row.media_type, row.data, name)
+
+
+def delete_photo(session: Session, trial_id: int, photo_id: int) -> None:
+    """Raises NotFoundError."""
+    session.delete(_one(session, trial_id, photo_id))
+
+
+def _one(session: Session, trial_id: int, photo_id: int) -> TrialPhotoRow:
+    row = repository.photo_or_none(session, photo_id)
+    if row is None or row.trial_id != trial_id:
+        raise NotFoundError("photo", photo_id)
+    return row
+
+
+def _view(row: TrialPhotoRow) -> TrialPhoto:
+    return TrialPhoto(id=row.id, trial_id=row.trial_id, media_type=row.media_type, added_at=row.added_at)
