@@ -12,6 +12,7 @@ GainlineError                 (app.core.errors)
 ├── NotFoundError             there is no such thing
 ├── ConflictError             it is not possible now: the state or the version forbids it
 │   └── BusyError             the vehicle is flying for somebody else
+├── UnavailableError          this installation lacks what is needed, or it is in use; all else works
 ├── StorageError              the database cannot take or give what it should; nothing was changed
 ├── SchemaError               the database belongs to another version of the program
 ├── AlreadyRunningError       another process of the program holds the database
@@ -37,6 +38,7 @@ __all__ = [
     "StorageError",
     "TooLargeError",
     "TrajectoryError",
+    "UnavailableError",
     "UnconfirmedError",
 ]
 
@@ -77,6 +79,10 @@ class ConflictError(GainlineError):
 
 class BusyError(ConflictError):
     """The vehicle has a flight already."""
+
+
+class UnavailableError(GainlineError):
+    """This installation lacks what is needed for it, or that is in use at present; everything else works."""
 
 
 class StorageError(GainlineError):

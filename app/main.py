@@ -21,6 +21,7 @@ from app.errors import NotFoundError
 from app.fleet.router import router as fleet
 from app.jobs.router import router as jobs
 from app.live.link import live_link
+from app.reports.router import router as reports
 from app.settings import Settings
 from app.studies.router import router as reproductions
 from app.trials.router import records
@@ -64,6 +65,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         fleet,
         jobs,
         reproductions,
+        reports,
         compare,
         figures.router,
         events.router,

@@ -1,11 +1,23 @@
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
 import react from "@vitejs/plugin-react";
+import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
 // `./dev npm run dev` serves the sources with hot reload and takes the API from a running `./dev up`.
 const api = process.env["GAINLINE_URL"] ?? "http://127.0.0.1:8000";
 
+/** Reports carry the chart library within themselves, as it is published and not as a module of the pages. */
+const chartsForReports: Plugin = {
+  name: "charts-for-reports",
+  generateBundle() {
+    const library = createRequire(import.meta.url).resolve("plotly.js-cartesian-dist-min");
+    this.emitFile({ type: "asset", fileName: "report/plotly-cartesian.min.js", source: readFileSync(library) });
+  },
+};
+
 export default defineConfig({
-  plugins: [react()],
+  plugins: [react(), chartsForReports],
   // The name that the browser asked for is passed on: the API refuses acts from pages of another origin.
   server: { host: "127.0.0.1", proxy: { "/api": { target: api, changeOrigin: false } } },
   build: { target: "es2023", sourcemap: false },

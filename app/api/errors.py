@@ -25,6 +25,7 @@ from app.errors import (
     StorageError,
     TooLargeError,
     TrajectoryError,
+    UnavailableError,
     UnconfirmedError,
 )
 from app.live.client import LinkDownError
@@ -44,6 +45,7 @@ _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
     TrajectoryError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable record"),
     UnconfirmedError: (HTTPStatus.CONFLICT, "Confirmation needed"),
     InputError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable input"),
+    UnavailableError: (HTTPStatus.SERVICE_UNAVAILABLE, "Not available"),
     StorageError: (HTTPStatus.SERVICE_UNAVAILABLE, "Storage trouble"),
     LinkDownError: (HTTPStatus.SERVICE_UNAVAILABLE, "Worker out of reach"),
     GainlineError: (HTTPStatus.INTERNAL_SERVER_ERROR, "Error"),

@@ -1,0 +1,60 @@
+"""What a report says, as plain data; `service` gathers it, `rendering` puts it on paper."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from app.campaigns.schemas import Campaign, CampaignStatistics
+from app.core.policy import Gain
+from app.figures.base import Card
+from app.fleet.schemas import Identity
+from app.trials.schemas import Trial
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One setting with its title."""
+
+    title: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Anomaly:
+    """Something that did not go as it should: of which flight (None: of none), what kind, and what is known of it."""
+
+    flight: int | None
+    kind: str
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """A campaign, as the API tells of it, with its settings in words and its figures drawn for a light page.
+
+    `what` was tuned and `how`, `anomalies` in the order of the flights, `made_at` by program `version`.
+    """
+
+    campaign: Campaign
+    statistics: CampaignStatistics
+    trials: tuple[Trial, ...]
+    gains: tuple[Gain, ...]
+    identity: Identity | None
+    what: tuple[Fact, ...]
+    how: tuple[Fact, ...]
+    cards: tuple[Card, ...]
+    anomalies: tuple[Anomaly, ...]
+    version: str
+    made_at: datetime
+
+    @property
+    def flown(self) -> tuple[Trial, ...]:
+        """Trials that left the ground, the ones in the table of runs."""
+        return tuple(trial for trial in self.trials if trial.state in FLOWN)
+
+    @property
+    def first(self) -> Trial | None:
+        """The baseline: the first valid flight."""
+        return next((trial for trial in self.trials if trial.state == "valid"), None)
+
+
+FLOWN = frozenset({"captured", "valid", "aborted", "invalid", "lost"})

@@ -1,0 +1,156 @@
+"""A report as one HTML file: text escaped, charts drawn by the library inside it, nothing asked from anywhere."""
+
+import base64
+import hashlib
+import json
+from dataclasses import dataclass
+from datetime import datetime, tzinfo
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from app.campaigns.schemas import Campaign
+from app.figures.base import Cell, Column
+from app.reports import wording
+from app.reports.content import Report
+
+_TEMPLATES: Final = Path(__file__).parent / "templates"
+_BUNDLE: Final = "report/plotly-cartesian.min.js"
+_OUTCOMES: Final = {
+    "converged": "Converged",
+    "budget": "Flight budget used",
+    "stopped": "Stopped by the operator",
+}
+_STATES: Final = {
+    "draft": "Not flown yet",
+    "ready": "Not flown yet",
+    "flying": "Not finished: a flight is under way",
+    "deciding": "Not finished: between two flights",
+    "finished": "Finished",
+    "archived": "Finished, and archived",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """The whole file, and the policy under which a server has to hand it out: inline scripts by their hash, no network,
+    no origin of its own."""
+
+    html: str
+    policy: str
+
+
+def render(report: Report, plotly: str, zone: tzinfo | None = None) -> Document:
+    """`plotly`: source of the chart library; `zone`: of the printed times, this machine's where it is None."""
+    draw = _script((_TEMPLATES / "draw.js").read_text(encoding="utf-8"))
+    library = _script(plotly)
+    own = _policy(library, draw)
+    groups = report.statistics.groups
+    html = (
+        _environment(zone)
+        .get_template("report.html.j2")
+        .render(
+            report=report,
+            state=_state(report.campaign),
+            baseline=next((group for group in groups if group.is_baseline), None),
+            winner=next((group for group in groups if group.is_best), None),
+            policy=own,
+            css=Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8")),  # noqa: S704  # ours
+            figures=_data(report),
+            plotly=library,
+            draw=draw,
+        )
+    )
+    return Document(html, f"{own}; frame-ancestors 'none'; sandbox allow-scripts")
+
+
+@lru_cache(maxsize=2)
+def chart_library(ui_dir: Path) -> str:
+    """Source of the chart library: as the built dashboard ships it, else the larger one of the figures' own package."""
+    shipped = ui_dir / _BUNDLE
+    if shipped.is_file():
+        return shipped.read_text(encoding="utf-8")
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415  # five megabytes, wanted only without a dashboard
+
+    source: str = get_plotlyjs()
+    return source
+
+
+def file_name(campaign: Campaign, ending: str) -> str:
+    """What a report is saved as."""
+    return f"campaign-{campaign.id}-report.{ending}"
+
+
+def _state(campaign: Campaign) -> str:
+    if campaign.state == "finished" and campaign.outcome is not None:
+        return _OUTCOMES[campaign.outcome]
+    return _STATES[campaign.state]
+
+
+def _script(source: str) -> Markup:
+    """Source that may stand between script tags as it is."""
+    if "</script" in source.lower() or "<!--" in source:
+        raise ValueError("this script would end early inside a page")
+    return Markup(source)  # noqa: S704  # ours and the library's, checked above
+
+
+def _data(report: Report) -> Markup:
+    """The figures as JSON in which nothing can look like a tag."""
+    drawn = {card.name: card.figure for card in report.cards if card.state == "ready"}
+    return Markup(json.dumps(drawn, ensure_ascii=False).replace("<", "\\u003c"))  # noqa: S704  # no `<` is left
+
+
+def _policy(*scripts: Markup) -> str:
+    """The chart library writes its own style rules, so that styles inside the file cannot be told by hash."""
+    hashes = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()}'" for each in scripts
+    )
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _environment(zone: tzinfo | None) -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
+    )
+    environment.filters |= {
+        "instant": lambda at: wording.instant(at, zone or _here(at)),
+        "plus_minus": wording.plus_minus,
+        "number": wording.number,
+        "interval": wording.interval,
+        "gain": wording.gain,
+        "gains": wording.gains,
+        "signed_gain": _signed_gain,
+        "count": wording.count,
+        "flights": _flights,
+        "cell": _cell,
+    }
+    return environment
+
+
+def _here(at: datetime) -> tzinfo:
+    """This machine's zone, as it was at that time."""
+    zone = at.astimezone().tzinfo
+    assert zone is not None
+    return zone
+
+
+def _signed_gain(change: float) -> str:
+    return f"+{wording.gain(change)}" if change > 0 else wording.gain(change)
+
+
+def _flights(numbers: list[int]) -> str:
+    return f"flight{'' if len(numbers) == 1 else 's'} {', '.join(map(str, numbers))}"
+
+
+def _cell(value: Cell, column: Column) -> str:
+    if value is None:
+        return wording.NOTHING
+    if isinstance(value, str):
+        return value
+    return wording.gain(value) if column.digits is None else wording.number(value, column.digits)

@@ -1,0 +1,73 @@
+"""Gathers what a report says: the same views that the API gives, and nothing computed anew."""
+
+from collections.abc import Callable, Iterator
+from typing import Final, TypeVar
+
+from sqlalchemy.orm import Session
+
+from app import __version__
+from app.campaigns import drawing
+from app.campaigns import service as campaigns
+from app.campaigns.schemas import Campaign
+from app.campaigns.statistics import campaign_statistics
+from app.db.types import utc_now
+from app.figures import CAMPAIGN_FIGURES
+from app.figures.base import card_of
+from app.fleet import service as fleet
+from app.fleet.views import acts_view, ledger_view
+from app.reports import anomalies
+from app.reports.content import Anomaly, Report
+from app.reports.settings_in_words import experiment_of, how_it_was_tuned, what_was_tuned
+from app.schemas import Page
+from app.trials import service as trials_service
+from app.trials.schemas import Trial
+
+_PAGE: Final = 200
+T = TypeVar("T")
+
+
+def report_of(session: Session, campaign_id: int) -> Report:
+    """Everything that is known of a campaign, for one reader. Raises NotFoundError."""
+    campaign = campaigns.get_campaign(session, campaign_id)
+    statistics = campaign_statistics(session, campaign_id)
+    trials = tuple(_all(lambda cursor: trials_service.list_trials(session, campaign_id, limit=_PAGE, cursor=cursor)))
+    experiment = experiment_of(campaign)
+    vehicle = fleet.get_vehicle(session, campaign.vehicle.id)
+    past = drawing.history_of(session, campaign_id, curves=True)
+    return Report(
+        campaign=campaign,
+        statistics=statistics,
+        trials=trials,
+        gains=experiment.space.gains,
+        identity=vehicle.identity,
+        what=what_was_tuned(campaign, experiment, vehicle.identity),
+        how=how_it_was_tuned(campaign, experiment),
+        cards=tuple(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
+        anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
+        version=__version__,
+        made_at=utc_now(),
+    )
+
+
+def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
+    yield from anomalies.of_flights(trials, unit)
+    if not campaign.vehicle.registered:
+        return
+    vehicle_id = campaign.vehicle.id
+    yield from anomalies.of_vehicle(
+        campaign,
+        fleet.get_vehicle(session, vehicle_id),
+        _all(lambda cursor: acts_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),
+        _all(lambda cursor: ledger_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),
+        trials,
+    )
+
+
+def _all(page_after: Callable[[str | None], Page[T]]) -> Iterator[T]:
+    """Every item of a list that comes in pages."""
+    cursor = None
+    while True:
+        page = page_after(cursor)
+        yield from page.items
+        if (cursor := page.next_cursor) is None:
+            return

@@ -1,0 +1,84 @@
+"""Numbers, gains and times as a report prints them: no more digits than the measurement carries, always with a unit."""
+
+import math
+from collections.abc import Mapping
+from datetime import UTC, datetime, tzinfo
+from typing import Final
+
+from app.core.definition import OptionValue
+from app.schemas import Interval
+
+NOTHING: Final = "–"
+_MOST_DIGITS: Final = 6
+_TWO_DIGITS_BELOW: Final = 3.55
+"""An uncertainty that begins with less than this carries a second digit: 0.012, not 0.01."""
+
+
+def decimals(uncertainty: float | None) -> int:
+    """Digits after the point that an uncertainty of this size allows; three where it is not known."""
+    if uncertainty is None or not math.isfinite(uncertainty) or uncertainty <= 0:
+        return 3
+    power = math.floor(math.log10(uncertainty))
+    digits = 1 - power if uncertainty / 10**power < _TWO_DIGITS_BELOW else -power
+    return min(_MOST_DIGITS, max(0, digits))
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """`0.132`; a true minus, a dash where there is none."""
+    return NOTHING if value is None else f"{value:.{digits}f}".replace("-", "−")
+
+
+def plus_minus(value: float | None, uncertainty: float | None, unit: str) -> str:
+    """`0.132 ± 0.007 m`; the value alone where its uncertainty is not known."""
+    if value is None:
+        return NOTHING
+    after = f" {unit}" if unit else ""
+    if uncertainty is None or uncertainty <= 0:
+        return number(value) + after
+    digits = decimals(uncertainty)
+    return f"{number(value, digits)} ± {number(uncertainty, digits)}{after}"
+
+
+def interval(span: Interval | None) -> str:
+    """`0.093 … 0.118`."""
+    return NOTHING if span is None else f"{number(span.lower)} … {number(span.upper)}"
+
+
+def gain(value: float) -> str:
+    """A whole gain in full, any other in four significant digits."""
+    text = f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
+    return text.replace("-", "−")
+
+
+def gains(values: Mapping[str, float]) -> str:
+    """`kp 283, ki 13, kd 82`."""
+    return ", ".join(f"{name} {gain(value)}" for name, value in values.items())
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+def option(value: OptionValue, unit: str = "") -> str:
+    """A setting: yes and no for switches, numbers short, texts as they are."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    text = f"{value:g}".replace("-", "−") if isinstance(value, int | float) else value
+    return f"{text} {unit}" if unit else text
+
+
+def instant(at: datetime | None, zone: tzinfo) -> str:
+    """`22 Nov 2026, 14:03 CET (13:03 UTC)`; UTC alone where that is the zone's own time."""
+    if at is None:
+        return NOTHING
+    here = at.astimezone(zone)
+    there = at.astimezone(UTC)
+    said = f"{here.day} {here:%b %Y, %H:%M}"
+    if not here.utcoffset():
+        return f"{said} UTC"
+    utc = f"{there:%H:%M}" if there.date() == here.date() else f"{there.day} {there:%b, %H:%M}"
+    return f"{said} {here.tzname()} ({utc} UTC)"
+
+
+def count(amount: int, noun: str) -> str:
+    return f"{amount} {noun}{'' if amount == 1 else 's'}"

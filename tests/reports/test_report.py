@@ -1,0 +1,189 @@
+"""A campaign's report: it says what the API says, runs nothing but its own scripts, and becomes a PDF where it can."""
+
+import base64
+import hashlib
+import re
+import shutil
+import subprocess
+import zlib
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.session import Database
+from app.reports import printing
+from app.reports.wording import plus_minus
+from tests.builders import Json, create_ready_campaign, get
+from tests.reports.conftest import NAME, REASON
+
+
+class Page(HTMLParser):
+    """Text of the page, its scripts as they would run, and every address that it names."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.cells: list[str] = []
+        self.text = ""
+        self._open: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._open.append(tag)
+        if tag in {"td", "th"}:
+            self.cells.append("")
+        if tag == "script" and dict(attrs).get("type") is None:
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        while self._open and self._open.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if "script" in self._open:
+            if self.tags[-1][1].get("type") is None:
+                self.scripts[-1] += data
+            return
+        if "style" not in self._open:
+            self.text += data
+        if "td" in self._open or "th" in self._open:
+            self.cells[-1] += data
+
+    @property
+    def said(self) -> str:
+        return " ".join(self.text.split())
+
+
+def read(client: TestClient, campaign: Json) -> Page:
+    answer = client.get(f"/api/campaigns/{campaign['id']}/report.html")
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == "text/html; charset=utf-8"
+    return Page(answer.text)
+
+
+def test_the_report_says_what_the_api_says(client: TestClient, campaign: Json) -> None:
+    page = read(client, campaign)
+    statistics = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    best = campaign["best"]
+    assert plus_minus(best["mean"], best["standard_error"], "m") in page.said
+    assert statistics["comparison"]["sentence"] in page.said
+    assert statistics["track_record"]["sentence"] in page.said
+    assert campaign["definition_digest"] in page.said
+    health = get(client, "/api/health")
+    assert f"Gainline {health['version']}" in page.said
+    cells = [" ".join(cell.split()) for cell in page.cells]
+    for trial in get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]:
+        assert all(f"{value:.0f}" in cells for value in trial["gains"].values())
+        assert trial["record"]["checksum"] in cells
+        assert trial["verdict"] in page.said
+        if trial["error"] is not None:
+            assert plus_minus(trial["error"], statistics["sigma"], "") in cells
+
+
+def test_what_people_wrote_is_text_and_never_markup(client: TestClient, campaign: Json) -> None:
+    page = read(client, campaign)
+    assert NAME in page.said
+    assert REASON in page.said
+    assert len(page.scripts) == 2
+    assert not [tag for tag, _ in page.tags if tag in {"img", "b", "iframe", "link", "object"}]
+    assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]
+
+
+def test_the_file_runs_its_own_scripts_alone_and_reaches_nothing(client: TestClient, campaign: Json) -> None:
+    answer = client.get(f"/api/campaigns/{campaign['id']}/report.html")
+    page = Page(answer.text)
+    served = answer.headers["content-security-policy"]
+    (own,) = (found["content"] for tag, found in page.tags if tag == "meta" and "http-equiv" in found)
+    assert own is not None
+    assert served.startswith(own)
+    assert "sandbox allow-scripts" in served
+    assert "default-src 'none'" in own
+    allowed = re.findall(r"'sha256-([^']+)'", own)
+    assert allowed == [base64.b64encode(hashlib.sha256(each.encode()).digest()).decode() for each in page.scripts]
+    assert not [name for _, attributes in page.tags for name in attributes if name in {"src", "href", "srcset"}]
+
+
+def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, database: Database) -> None:
+    page = read(client, create_ready_campaign(client, database))
+    assert "No valid flight yet" in page.said
+    assert "Nothing has flown yet." in page.said
+
+
+def test_the_report_of_no_campaign_is_not_found(client: TestClient) -> None:
+    assert client.get("/api/campaigns/77/report.html").status_code == 404
+    assert client.get("/api/campaigns/77/report.pdf").status_code == 404
+
+
+@pytest.mark.skipif(not any(map(shutil.which, printing.PRINTERS)), reason="no Chromium to print with")
+def test_the_pdf_is_one_and_its_text_can_be_read(client: TestClient, campaign: Json, tmp_path: Path) -> None:
+    answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == "application/pdf"
+    assert answer.content.startswith(b"%PDF-")
+    assert b"%%EOF" in answer.content[-64:]
+    pages = len(re.findall(rb"/Type\s*/Page\b", answer.content))
+    assert 2 <= pages <= 12
+    if shutil.which("pdftotext") is None:
+        assert b"/ToUnicode" in unpacked(answer.content)
+        return
+    file = tmp_path / "report.pdf"
+    file.write_bytes(answer.content)
+    text = subprocess.run(["pdftotext", "-layout", file, "-"], capture_output=True, text=True, check=True).stdout
+    assert plus_minus(campaign["best"]["mean"], campaign["best"]["standard_error"], "m") in text
+    assert "Takeoff curves" in text
+    assert "Time since the command (s)" in text, "the charts are not drawn"
+
+
+def unpacked(pdf: bytes) -> bytes:
+    """The file with its compressed streams opened."""
+    opened = [pdf]
+    for stream in re.findall(rb"stream\r?\n(.*?)endstream", pdf, re.DOTALL):
+        try:
+            opened.append(zlib.decompress(stream))
+        except zlib.error:
+            continue
+    return b"".join(opened)
+
+
+def test_without_a_browser_the_pdf_is_refused_in_words(
+    client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
+    assert answer.status_code == 503
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "Chromium" in answer.json()["detail"]
+    assert "HTML" in answer.json()["hint"]
+
+
+def test_a_browser_that_fails_is_told_of_in_words(
+    client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    broken = tmp_path / "chromium"
+    broken.write_text("#!/bin/sh\nexit 7\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
+    assert (answer.status_code, answer.json()["title"]) == (503, "Not available")
+    assert "without a PDF" in answer.json()["detail"]
+
+
+def test_prints_beyond_a_few_at_once_are_refused_rather_than_queued(
+    client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "chromium").write_text("#!/bin/sh\nexit 0\n")
+    (tmp_path / "chromium").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    taken = [printing._places.acquire(blocking=False) for _ in range(printing.AT_ONCE)]
+    try:
+        assert all(taken)
+        answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
+        assert answer.status_code == 503
+        assert "already" in answer.json()["detail"]
+    finally:
+        for _ in taken:
+            printing._places.release()
