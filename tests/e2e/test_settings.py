@@ -1,0 +1,147 @@
+"""Settings, the help for keys, explanations, and what is said aloud."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport
+
+VOICE = """
+window.said = [];
+const voice = {speak: ({text}) => window.said.push(text), cancel: () => {}};
+Object.defineProperty(window, "speechSynthesis", {value: voice});
+window.SpeechSynthesisUtterance = class { constructor(text) { this.text = text; } };
+"""
+"""Stands in for the browser's voice: headless, it has none."""
+
+
+def said(dashboard: Dashboard) -> list[str]:
+    spoken: list[str] = dashboard.page.evaluate("window.said")
+    return spoken
+
+
+def theme_of(dashboard: Dashboard) -> object:
+    return dashboard.page.evaluate("document.documentElement.dataset.mantineColorScheme")
+
+
+def test_theme_and_name_are_kept_by_this_browser(dashboard: Dashboard) -> None:
+    dashboard.open("/settings")
+    dashboard.page.get_by_role("radiogroup", name="Appearance").get_by_text("Dark", exact=True).click()
+    dashboard.page.get_by_label("Your name").fill("Jaime")
+    dashboard.page.reload()
+    expect(dashboard.page.get_by_label("Your name")).to_have_value("Jaime")
+    assert theme_of(dashboard) == "dark"
+    dashboard.page.get_by_role("radiogroup", name="Appearance").get_by_text("As the system").click()
+    dashboard.until(lambda: theme_of(dashboard) == "light")
+
+
+def test_settings_are_reached_from_every_page_by_the_menu(dashboard: Dashboard) -> None:
+    dashboard.open("/vehicles")
+    dashboard.button("More pages").click()
+    dashboard.page.get_by_role("link", name="Settings").click()
+    expect(dashboard.page.get_by_role("heading", name="Settings", level=1)).to_be_visible()
+
+
+def test_on_loopback_the_page_says_how_a_tablet_gets_in_and_what_that_opens(dashboard: Dashboard) -> None:
+    dashboard.open("/settings")
+    panel = dashboard.panel("Open on the tablet")
+    expect(panel).to_contain_text("gainline serve --host 0.0.0.0")
+    expect(panel).to_contain_text("Real vehicles fly only from a server on loopback")
+    expect(panel.get_by_role("img")).to_have_count(0)
+
+
+def test_a_server_that_others_reach_shows_its_address_to_a_camera(
+    open_dashboard: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAINLINE_HOST", "0.0.0.0")
+    with served(tmp_path / "data") as server:
+        dashboard = open_dashboard(server.url)
+        dashboard.open("/settings")
+        addresses = [each["url"] for each in dashboard.get("/system")["addresses"]]
+        if not addresses:
+            pytest.skip("this machine is in no network")
+        panel = dashboard.panel("Open on the tablet")
+        code = panel.get_by_role("img", name=f"QR code of {addresses[0]}")
+        dashboard.until(lambda: bool(code.evaluate("image => image.naturalWidth > 0")))
+        expect(panel.get_by_role("link", name=addresses[0])).to_be_visible()
+        expect(panel).to_contain_text("anybody who can reach this machine")
+
+
+def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(dashboard: Dashboard, tmp_path: Path) -> None:
+    campaign_id = dashboard.create("twin", name="Worth keeping")
+    dashboard.open("/settings")
+    with dashboard.page.expect_download() as waiting:
+        dashboard.page.get_by_role("link", name="Download a backup").click()
+    assert waiting.value.suggested_filename.endswith(".sqlite3")
+    waiting.value.save_as(tmp_path / "copy.sqlite3")
+    with closing(sqlite3.connect(tmp_path / "copy.sqlite3")) as copy:
+        found = copy.execute("SELECT name FROM campaign WHERE id = ?", (campaign_id,)).fetchone()
+    assert found == ("Worth keeping",)
+
+
+def test_what_the_server_is_asked_about_stands_there_with_units(dashboard: Dashboard) -> None:
+    system = dashboard.get("/system")
+    dashboard.open("/settings")
+    panel = dashboard.panel("This server")
+    expect(panel).to_contain_text(system["version"])
+    expect(panel).to_contain_text(system["database_revision"])
+    expect(panel).to_contain_text(system["data_dir"])
+    expect(panel.locator("dd", has_text="B").first).to_be_visible()
+
+
+@pytest.mark.parametrize("viewport", [TABLET, PHONE], ids=["tablet", "phone"])
+def test_settings_fit_their_screen(open_dashboard: Opener, shared_server: Server, viewport: Viewport) -> None:
+    dashboard = open_dashboard(shared_server.url, viewport=viewport)
+    dashboard.open("/settings")
+    expect(dashboard.panel("Backup")).to_be_visible()
+    wide = dashboard.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    assert wide == 0
+
+
+def test_keys_are_explained_by_a_key_and_those_of_the_page_come_first(dashboard: Dashboard) -> None:
+    dashboard.open("/")
+    dashboard.page.keyboard.press("?")
+    help_ = dashboard.page.get_by_role("dialog", name="Keys on this page")
+    expect(help_).to_be_visible()
+    expect(help_).to_be_focused()
+    expect(help_.locator("kbd").first).to_have_text("/")
+    expect(help_).to_contain_text("abort it")
+    dashboard.page.keyboard.press("Escape")
+    expect(help_).to_be_hidden()
+    dashboard.button("Keyboard help").click()
+    expect(help_).to_be_visible()
+
+
+def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(dashboard: Dashboard) -> None:
+    dashboard.create("twin")
+    dashboard.open("/")
+    search = dashboard.page.get_by_label("Search")
+    expect(search).to_be_visible()
+    dashboard.page.keyboard.press("/")
+    expect(search).to_be_focused()
+    dashboard.page.keyboard.type("what?")
+    expect(search).to_have_value("what?")
+    expect(dashboard.page.get_by_role("dialog", name="Keys on this page")).to_be_hidden()
+
+
+def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switched_on(dashboard: Dashboard) -> None:
+    dashboard.page.add_init_script(VOICE)
+    campaign_id = dashboard.create("twin")
+    dashboard.open(f"/campaigns/{campaign_id}")
+    region = dashboard.page.locator("[aria-live=polite]", has_text="Landed")
+    dashboard.fly_headless(campaign_id, 1)
+    expect(region).to_contain_text("Landed, valid, ")
+    assert said(dashboard) == []
+
+    dashboard.open("/settings")
+    dashboard.page.get_by_role("switch", name="Spoken announcements").click()
+    dashboard.until(lambda: said(dashboard) == ["Announcements are on."])
+    dashboard.open(f"/campaigns/{campaign_id}")
+    dashboard.fly_headless_body(campaign_id, {"variant": "repeat"})
+    error = dashboard.trials(campaign_id)[-1]["error"]
+    dashboard.until(lambda: f"Landed, valid, {error:.2f} metres." in said(dashboard))
+    assert "Taking off." in said(dashboard)
