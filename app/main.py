@@ -15,6 +15,8 @@ from app.api.openapi import describe
 from app.api.origin import OriginMiddleware
 from app.campaigns.router import router as campaigns
 from app.compare.router import router as compare
+from app.controller_checks.router import recordings
+from app.controller_checks.router import router as controller_checks
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import NotFoundError
@@ -65,6 +67,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         fleet,
         jobs,
         reproductions,
+        controller_checks,
+        recordings,
         reports,
         compare,
         figures.router,

@@ -20,7 +20,7 @@ class BodyLimitMiddleware:
 
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
-        self._uploads = {"/trajectory": upload_bytes, "/photos": PHOTO_BYTES}
+        self._uploads = {"/trajectory": upload_bytes, "/controller-checks": upload_bytes, "/photos": PHOTO_BYTES}
         self._refuse = refuse
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -2,28 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
 from rich.console import Console
 
 from app.commands.console import console, show_error, table, write_json
-from app.core.control.replay import OUTPUTS, Replay, replay_trace
-from app.core.loop_log import (
-    GAINS,
-    TIME_TOLERANCE_S,
-    TOLERANCES,
-    CommandCheck,
-    LoopLog,
-    SimulationCheck,
-    check_commands,
-    check_simulation,
-    infer_gains,
-)
-from app.errors import InputError, Problem
+from app.controller_checks.checking import LogCheck, check_log, check_trace, parse_gains
+from app.core.control.replay import OUTPUTS, Replay
+from app.core.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
+from app.errors import InputError
 from app.logs.loop_trace import read_loop_trace
-from app.logs.paparazzi import read_loop_log
 
 _UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 
@@ -33,7 +23,7 @@ def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
     replays: dict[Path, Replay] = {}
     for file in files:
         try:
-            replays[file] = replay_trace(read_loop_trace(file))
+            replays[file] = check_trace(read_loop_trace(file)).replay
         except InputError as error:
             show_error(error)
     rows = [
@@ -63,26 +53,11 @@ def _document(file: Path, replay: Replay) -> dict[str, object]:
     }
 
 
-@dataclass(frozen=True, slots=True)
-class _Checked:
-    """What a log showed: its gains and where they are from, and both parts of the comparison."""
-
-    gains: Mapping[str, float]
-    gains_from: str
-    inferred: Mapping[str, float] | None
-    commands: CommandCheck
-    simulation: SimulationCheck | None
-
-    @property
-    def passed(self) -> bool:
-        return self.commands.passed and (self.simulation is None or self.simulation.passed)
-
-
 def check_files(files: Sequence[Path], given: str | None, json_out: Path | None) -> bool:
     """Hold Paparazzi logs with VERT_LOOP against the replica; whether all are readable and agree."""
-    gains = None if given is None else _parsed(given)
+    gains = None if given is None else parse_gains(given, field="--gains")
     out = console(json_out)
-    checked: dict[Path, _Checked] = {}
+    checked: dict[Path, LogCheck] = {}
     for file in files:
         try:
             checked[file] = _check(file, gains)
@@ -94,43 +69,20 @@ def check_files(files: Sequence[Path], given: str | None, json_out: Path | None)
     return len(checked) == len(files) and all(each.passed for each in checked.values())
 
 
-def _check(file: Path, given: Mapping[str, float] | None) -> _Checked:
-    log, logged = _read(file)
-    inferred = infer_gains(log)
-    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "worked out from the commands")):
-        if gains is not None:
-            return _Checked(gains, source, inferred, check_commands(log, gains), check_simulation(log))
-    raise InputError(
-        f"{file.name} does not say which gains were flown, and its flight is too calm to tell.",
-        problems=(Problem("--gains", "are needed"),),
-        hint="Put the .log file beside it, or give them: --gains KP,KI,KD.",
-    )
-
-
-def _read(file: Path) -> tuple[LoopLog, dict[str, float] | None]:
+def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
     try:
         with ExitStack() as opened:
             beside = file.with_suffix(".log")
             companion = opened.enter_context(beside.open("rb")) if beside != file and beside.is_file() else None
-            return read_loop_log(opened.enter_context(file.open("rb")), companion)
+            data = opened.enter_context(file.open("rb"))
+            return check_log(data, name=file.name, companion=companion, given=given)
     except OSError as error:
         raise InputError(
             f"{file} could not be read: {error.strerror or error}.", hint="Give a readable .data file of Paparazzi."
         ) from error
 
 
-def _parsed(given: str) -> dict[str, float]:
-    parts = given.split(",")
-    if len(parts) != len(GAINS) or not all(part.strip().isdecimal() and len(part) < 10 for part in parts):
-        raise InputError(
-            f"{given[:60]!r} is no gain set.",
-            problems=(Problem("--gains", "must be three whole numbers, KP,KI,KD"),),
-            hint="For example --gains 283,13,82.",
-        )
-    return {name: float(part) for name, part in zip(GAINS, parts, strict=True)}
-
-
-def _print(out: Console, file: Path, checked: _Checked) -> None:
+def _print(out: Console, file: Path, checked: LogCheck) -> None:
     commands, simulation = checked.commands, checked.simulation
     spoken = ", ".join(f"{name} {value:g}" for name, value in checked.gains.items())
     tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
@@ -153,8 +105,8 @@ def _print(out: Console, file: Path, checked: _Checked) -> None:
             for name, value in simulation.largest_difference.items()
         ]
     out.print(table(("", ""), rows, title=f"{file.name}, {spoken} ({checked.gains_from})"))
-    if checked.inferred is not None and dict(checked.inferred) != dict(checked.gains):
-        better = ", ".join(f"{name} {value:g}" for name, value in checked.inferred.items())
+    if checked.better_gains is not None:
+        better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
         out.print(f"More commands follow from {better}: were other gains flown?")
     out.print("The replica agrees." if checked.passed else "[bold]The replica differs.[/]")
 
@@ -164,7 +116,7 @@ def _different(commands: CommandCheck) -> str:
     return str(commands.different) if first is None else f"{commands.different}, the first at {first:.3f} s"
 
 
-def _as_json(file: Path, checked: _Checked) -> dict[str, object]:
+def _as_json(file: Path, checked: LogCheck) -> dict[str, object]:
     return {
         "file": str(file),
         "passed": checked.passed,

@@ -27,6 +27,8 @@ FIELDS: Final = (
 GAINS: Final = ("kp", "ki", "kd")
 
 STALE_FIELDS: Final = ("state", "reference", "integrator")
+COMMANDS: Final = ("ff_cmd", "fb_cmd", "thrust")
+SIMULATED: Final = ("z_ref", "zd_ref", "zdd_ref", "z_sum_err")
 
 TIME_TOLERANCE_S: Final = 0.02
 TOLERANCES: Final[Mapping[str, float]] = MappingProxyType(
@@ -35,7 +37,8 @@ TOLERANCES: Final[Mapping[str, float]] = MappingProxyType(
 """Largest differences beyond what 20 ms of uncertain time explain, in m, m/s and m/s², and as a share of the largest
 value of the integrator."""
 
-_UNITS: Final = {"z_ref": 1 / 256, "zd_ref": 1 / 2**19, "zdd_ref": 1 / 2**10}
+UNITS: Final[Mapping[str, float]] = MappingProxyType({"z_ref": 1 / 256, "zd_ref": 1 / 2**19, "zdd_ref": 1 / 2**10})
+"""What a count of a reference is, in m, m/s and m/s²."""
 _FIT_S: Final = 2.0
 _ROUNDING: Final = 1
 _TILT_ROUNDING: Final = 3
@@ -101,14 +104,31 @@ class SimulationCheck:
         return all(value <= TOLERANCES[name] for name, value in self.largest_difference.items())
 
 
+@dataclass(frozen=True, slots=True)
+class Overlay:
+    """What a log recorded and what the replica gives for the same samples, to be drawn: `time_s` of shape (n,),
+    `recorded` and `replica` by the names of the signals, each of shape (n,); `differs` says where no explanation was
+    found."""
+
+    time_s: Samples
+    recorded: Mapping[str, Counts]
+    replica: Mapping[str, Samples | Counts]
+    differs: Mapping[str, NDArray[np.bool_]]
+
+
 def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
     """Compare ff_cmd, fb_cmd and thrust of every sample of the working loop with what the sample itself gives."""
+    return compare_commands(log, gains)[0]
+
+
+def compare_commands(log: LoopLog, gains: Gains) -> tuple[CommandCheck, Overlay]:
+    """As `check_commands`, with both sides of `COMMANDS` for every sample of the working loop."""
     active = ~log.idle
     sample = LoopLog(log.time_s[active], log.values[active])
     tilt = _tilts_deg(sample)
+    replica = _replica_commands(sample, gains, tilt)
     sums = sample["thrust"] == np.clip(sample["ff_cmd"] + sample["fb_cmd"], 0, loop.FULL_THRUST)
-    follows = _feedback(gains, *_errors(sample), sample["z_sum_err"]) == sample["fb_cmd"]
-    exact = np.isfinite(tilt) & follows & sums
+    exact = np.isfinite(tilt) & (replica["fb_cmd"] == sample["fb_cmd"]) & sums
     left = ~exact
     stale: dict[str, int] = {}
     for fields in STALE_FIELDS:
@@ -116,7 +136,7 @@ def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
         stale[fields] = int(explained.sum())
         left &= ~explained
     tilted = exact & (tilt > 0.0)
-    return CommandCheck(
+    check = CommandCheck(
         rows=len(sample),
         exact=int(exact.sum()),
         tilted=int(tilted.sum()),
@@ -125,11 +145,21 @@ def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
         different=int(left.sum()),
         first_different_s=float(sample.time_s[left][0]) if left.any() else None,
     )
+    recorded = {name: sample[name] for name in COMMANDS}
+    differs = {name: left & (replica[name] != recorded[name]) for name in COMMANDS}
+    return check, Overlay(sample.time_s, recorded, replica, differs)
 
 
 def check_simulation(log: LoopLog) -> SimulationCheck | None:
     """Simulate the reference and the integrator from the first command on that stays for two seconds. None without any:
     the loop works from the first sample on, or never, or for a moment only."""
+    found = compare_simulation(log)
+    return None if found is None else found[0]
+
+
+def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
+    """As `check_simulation`, with both sides of `SIMULATED` for every sample after the command; NaN where the
+    integrator does not work yet."""
     found = _first_command(log)
     if found is None:
         return None
@@ -137,17 +167,26 @@ def check_simulation(log: LoopLog) -> SimulationCheck | None:
     part = LoopLog(log.time_s[first : last + 1], log.values[first : last + 1])
     reference = _simulated_reference(part)
     steps, offset_s = _aligned(part, reference)
-    differences = {
-        name: float(_outside(part[name], reference[:, place], steps).max() * _UNITS[name])
-        for place, name in enumerate(_UNITS)
+    outside: dict[str, Samples] = {
+        name: np.float64(unit) * _outside(part[name], reference[:, place], steps)
+        for place, (name, unit) in enumerate(UNITS.items())
     }
-    differences["z_sum_err"] = _integrator_difference(part, reference[:, 0], steps)
-    return SimulationCheck(
+    integrator = _simulated_integrator(part, reference[:, 0], steps)
+    largest = max(float(np.abs(part["z_sum_err"][1:][np.isfinite(integrator)]).max(initial=0.0)), 1.0)
+    outside["z_sum_err"] = np.nan_to_num(np.abs(part["z_sum_err"][1:] - integrator) / largest)
+    check = SimulationCheck(
         command_s=float(part.time_s[0]) + offset_s,
         duration_s=float(part.time_s[-1] - part.time_s[0]),
         rows=len(part) - 1,
-        largest_difference=differences,
+        largest_difference={name: float(values.max()) for name, values in outside.items()},
     )
+    overlay = Overlay(
+        part.time_s[1:],
+        {name: part[name][1:] for name in SIMULATED},
+        {**{name: reference[steps, place] for place, name in enumerate(UNITS)}, "z_sum_err": integrator},
+        {name: values > TOLERANCES[name] for name, values in outside.items()},
+    )
+    return check, overlay
 
 
 def infer_gains(log: LoopLog) -> dict[str, float] | None:
@@ -186,6 +225,14 @@ def _errors(sample: LoopLog) -> tuple[Counts, Counts]:
 def _feedback(gains: Gains, ez: Counts, ev: Counts, z_sum_err: Counts) -> Counts:
     kp, ki, kd = (int(gains[name]) for name in GAINS)
     return _wrap32((_wrap32(-kp * ez) >> 7) + (_wrap32(-kd * ev) >> 16) + (_wrap32(-ki * z_sum_err) >> 16))
+
+
+def _replica_commands(sample: LoopLog, gains: Gains, tilt_deg: Samples) -> dict[str, Counts]:
+    """What the replica commands for every sample, shape (n,) each; under the sample's tilt where one explains it."""
+    level = np.array([loop.feed_forward(value, loop.LEVEL) for value in sample["zdd_ref"].tolist()], dtype=np.int64)
+    forward = np.where(np.isfinite(tilt_deg), sample["ff_cmd"], level)
+    back = _feedback(gains, *_errors(sample), sample["z_sum_err"])
+    return {"ff_cmd": forward, "fb_cmd": back, "thrust": np.clip(forward + back, 0, loop.FULL_THRUST)}
 
 
 def _tilts_deg(sample: LoopLog) -> Samples:
@@ -291,24 +338,24 @@ def _outside(logged: Counts, simulated: Counts, steps: NDArray[np.int64]) -> Cou
     return outside
 
 
-def _integrator_difference(part: LoopLog, z_ref: Counts, steps: NDArray[np.int64]) -> float:
-    """The largest difference of the summed error as a share of its range, from the first sample on where it works, 0
-    where it never does; the position between the samples follows from their positions and speeds. Of samples in the
-    same step the first one counts."""
+def _simulated_integrator(part: LoopLog, z_ref: Counts, steps: NDArray[np.int64]) -> Samples:
+    """The summed error of the samples after the command, shape (n − 1,), from the first one on where it works, NaN
+    before and where it never does; the position between the samples follows from their positions and speeds. Of
+    samples in the same step the first one counts, and the others are NaN."""
+    summed = np.full(len(steps), np.nan)
     working = np.flatnonzero(part["z_sum_err"][1:])
     begin = int(working[0]) if working.size else len(steps)
     since, first = np.unique(steps[begin:], return_index=True)
     if len(since) < 2:
-        return 0.0
+        return summed
     rows = begin + 1 + first
     position = CubicHermiteSpline(since, part["z"][rows], part["zd"][rows] / 2**20)
     each = np.arange(since[0], since[-1] + 1)
     error = np.clip(z_ref[each] - position(each), -loop.POSITION_ERROR_MAX, loop.POSITION_ERROR_MAX)
-    logged = part["z_sum_err"][rows]
-    total, start = np.empty(len(each)), float(logged[0])
+    total, now = np.empty(len(each)), float(part["z_sum_err"][rows[0]])
     for step, value in enumerate(error.tolist()):
         if step:
-            start = min(max(start + value, -loop.ERROR_SUM_MAX), loop.ERROR_SUM_MAX)
-        total[step] = start
-    largest = max(float(np.abs(logged).max()), 1.0)
-    return float(np.abs(logged - total[since - since[0]]).max()) / largest
+            now = min(max(now + value, -loop.ERROR_SUM_MAX), loop.ERROR_SUM_MAX)
+        total[step] = now
+    summed[rows - 1] = total[since - since[0]]
+    return summed

@@ -10,7 +10,7 @@ from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 Style = Literal[
-    "goal", "reference", "before", "after", "model", "recorded", "replica", "mean", "spread",
+    "goal", "reference", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
     "run 1", "run 2", "run 3", "run 4", "run 5", "run 6",
 ]  # fmt: skip
 """What a line stands for. A style is told from the others by its dash or width too, not by its colour alone."""
@@ -179,6 +179,7 @@ def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
         "model": (palette.prediction, 2, "dash"),
         "recorded": (palette.earlier, 4.5, "solid"),
         "replica": (palette.ink, 1.5, "dash"),
+        "differs": (palette.bad, 1, "solid"),
         "mean": (palette.best, 2, "solid"),
         "spread": (palette.dim, 1.25, "dash"),
         "run 1": (palette.ink, 2, "solid"),

@@ -4,10 +4,12 @@ import csv
 import gzip
 import io
 import re
+import tempfile
 import zlib
+from array import array
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 import numpy as np
 
@@ -18,6 +20,9 @@ from app.core.errors import InputError, Problem
 
 COLUMNS: Final = ("step", *INPUTS[:7], "zdd", *INPUTS[7:], *OUTPUTS)
 MAX_ROWS: Final = 1_000_000
+MAX_BYTES: Final = 256 * 2**20
+_GZIP: Final = b"\x1f\x8b"
+_IN_MEMORY_BYTES: Final = 2**22
 _INTEGER: Final = re.compile(r"[+-]?[0-9]{1,19}")
 
 _HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row for each 1/512 s, whole numbers of 32 bits."
@@ -27,15 +32,59 @@ def read_loop_trace(path: Path) -> LoopTrace:
     """Read `path` (.csv or .csv.gz). Raises InputError naming the line and the column of the first thing wrong."""
     try:
         with path.open("rb") as raw:
-            stream = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
-            with io.TextIOWrapper(stream, encoding="utf-8", newline="") as text:
-                return _read(path.name, text)
+            return _read_bytes(path.name, raw, zipped=path.suffix == ".gz")
     except OSError as error:
         raise InputError(
             f"{path} could not be read: {error.strerror or error}.", hint="Give a readable trace file, .csv or .csv.gz."
         ) from error
+
+
+def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
+    """As `read_loop_trace`, from a stream that says by its first bytes whether it is gzipped."""
+    stream.seek(0)
+    zipped = stream.read(len(_GZIP)) == _GZIP
+    stream.seek(0)
+    try:
+        return _read_bytes(name, stream, zipped=zipped)
+    except gzip.BadGzipFile as error:
+        raise _damaged(name, error) from error
+
+
+def may_be_loop_trace(head: bytes) -> bool:
+    """Whether a file that begins so can be one at all: gzipped, or text whose first line names a column of a trace."""
+    first = head.partition(b"\n")[0]
+    return head.startswith(_GZIP) or bool({b"mode", b"z_ref", b"r33"} & {word.strip() for word in first.split(b",")})
+
+
+def _read_bytes(name: str, raw: BinaryIO, *, zipped: bool) -> LoopTrace:
+    try:
+        with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as plain:
+            _unpack(name, gzip.GzipFile(fileobj=raw, mode="rb") if zipped else raw, plain)  # type: ignore[arg-type]
+            with io.TextIOWrapper(plain, encoding="utf-8", newline="") as text:
+                return _read(name, text)
     except (EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path.name} is damaged or not a text file: {error}.", hint=_HINT) from error
+        raise _damaged(name, error) from error
+
+
+def _unpack(name: str, source: BinaryIO, plain: BinaryIO) -> None:
+    """A small file may unpack to a huge one."""
+    while chunk := source.read(2**20):
+        plain.write(chunk)
+        if plain.tell() > MAX_BYTES:
+            raise InputError(
+                f"{name} cannot be replayed.",
+                hint=f"Cut the run: at most {MAX_BYTES // 2**20} MiB of text and {MAX_ROWS} rows are read.",
+                problems=(Problem("file", f"holds more than {MAX_BYTES // 2**20} MiB of text"),),
+            )
+    plain.seek(0)
+
+
+def _damaged(name: str, error: Exception) -> InputError:
+    return InputError(
+        f"{name} is damaged or not a text file: {error}.",
+        hint=_HINT,
+        problems=(Problem("file", "is damaged or not a text file"),),
+    )
 
 
 def _read(name: str, text: io.TextIOWrapper) -> LoopTrace:
@@ -47,9 +96,12 @@ def _read(name: str, text: io.TextIOWrapper) -> LoopTrace:
     if len(header) != len(COLUMNS):
         extra = next((column for column in header if column not in COLUMNS), header[-1])
         raise _malformed(name, 1, extra, "column is unknown or appears twice")
-    rows = np.array(list(_rows(name, header, reader)), dtype=np.int64)
-    if not len(rows):
-        raise InputError(f"{name} holds a header and no rows.", hint=_HINT)
+    values = array("q")
+    for row in _rows(name, header, reader):
+        values.extend(row)
+    if not values:
+        raise InputError(f"{name} holds a header and no rows.", hint=_HINT, problems=(Problem("file", "has no rows"),))
+    rows = np.array(values, dtype=np.int64).reshape(-1, len(header))
     place = {column: index for index, column in enumerate(header)}
     return LoopTrace(rows[:, [place[column] for column in INPUTS]], rows[:, [place[column] for column in OUTPUTS]])
 

@@ -1,0 +1,123 @@
+"""Holding a recorded vertical loop against the replica, for the commands and the page alike: the log of a flight, or a
+trace with a row for every step."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import BinaryIO, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.control.replay import LoopTrace, Replay, compared, replayed
+from app.core.errors import InputError, Problem
+from app.core.loop_log import (
+    GAINS,
+    CommandCheck,
+    Overlay,
+    SimulationCheck,
+    compare_commands,
+    compare_simulation,
+    infer_gains,
+)
+from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
+from app.logs.paparazzi import is_paparazzi, read_loop_log
+
+_HEAD_BYTES: Final = 4096
+_MOST_DIGITS: Final = 9
+
+
+@dataclass(frozen=True, slots=True)
+class LogCheck:
+    """What a log showed: its gains and where they are from, those that its commands follow from, and both parts of the
+    comparison with what there is to draw."""
+
+    gains: Mapping[str, float]
+    gains_from: str
+    inferred: Mapping[str, float] | None
+    commands: CommandCheck
+    simulation: SimulationCheck | None
+    overlays: tuple[Overlay, ...]
+
+    @property
+    def passed(self) -> bool:
+        return self.commands.passed and (self.simulation is None or self.simulation.passed)
+
+    @property
+    def better_gains(self) -> Mapping[str, float] | None:
+        """Other gains, which more of the commands follow from."""
+        return None if self.inferred is None or dict(self.inferred) == dict(self.gains) else self.inferred
+
+
+@dataclass(frozen=True, slots=True)
+class TraceCheck:
+    """A trace, the replica's outputs for it, shape (n, 7), and how far they are apart."""
+
+    trace: LoopTrace
+    computed: NDArray[np.int64]
+    replay: Replay
+
+    @property
+    def passed(self) -> bool:
+        return self.replay.exact
+
+
+def check_recording(
+    stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
+) -> LogCheck | TraceCheck:
+    """Whichever the content says that it is. Raises InputError naming what cannot be read."""
+    stream.seek(0)
+    head = stream.read(_HEAD_BYTES)
+    if is_paparazzi(head):
+        return check_log(stream, name=name, companion=companion, given=given)
+    if may_be_loop_trace(head):
+        return check_trace(read_loop_trace_stream(stream, name=name))
+    reason = "is empty" if not head else "is neither a .data file of Paparazzi nor a trace"
+    raise InputError(
+        f"{name} is no recording of the vertical loop.",
+        hint="Give the .data file of Paparazzi's ground log with VERT_LOOP in it (its .log goes along), or a trace of "
+        "the loop, .csv or .csv.gz, with a row for every step.",
+        problems=(Problem("file", reason),),
+    )
+
+
+def check_trace(trace: LoopTrace) -> TraceCheck:
+    """Every output of every row."""
+    computed = replayed(trace)
+    return TraceCheck(trace, computed, compared(trace, computed))
+
+
+def check_log(
+    stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
+) -> LogCheck:
+    """A .data file of Paparazzi; the gains are those given, else the log's own, else those that its commands follow
+    from. Raises InputError when it has no VERT_LOOP, or nothing tells its gains."""
+    log, logged = read_loop_log(stream, companion)
+    inferred = infer_gains(log)
+    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "worked out from the commands")):
+        if gains is not None:
+            commands, drawn = compare_commands(log, gains)
+            simulated = compare_simulation(log)
+            if simulated is None:
+                return LogCheck(gains, source, inferred, commands, None, (drawn,))
+            return LogCheck(gains, source, inferred, commands, simulated[0], (simulated[1], drawn))
+    raise InputError(
+        f"{name} does not say which gains were flown, and its flight is too calm to tell.",
+        problems=(Problem("gains", "are needed"),),
+        hint="Give the .log file that was written beside it too, or the gains; to the command with --gains KP,KI,KD.",
+    )
+
+
+def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
+    """Gains from `KP,KI,KD`. Raises InputError naming `field`."""
+    parts = given.split(",")
+    if len(parts) != len(GAINS) or not all(_is_whole(part.strip()) for part in parts):
+        raise InputError(
+            f"{given[:60]!r} is no gain set.",
+            problems=(Problem(field, "must be three whole numbers, KP,KI,KD"),),
+            hint="For example 283,13,82.",
+        )
+    return {name: float(part) for name, part in zip(GAINS, parts, strict=True)}
+
+
+def _is_whole(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS

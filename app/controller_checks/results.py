@@ -1,0 +1,271 @@
+"""What a check comes to, as plain data that is kept with it: words, one line for each signal, and what is drawn."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from types import MappingProxyType
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from app.controller_checks.checking import LogCheck, TraceCheck
+from app.core.control.replay import INPUTS, OUTPUTS
+from app.core.control.vertical_loop import RATE_HZ
+from app.core.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay
+from app.core.loop_log import UNITS as REFERENCE_UNITS
+from app.core.trajectory import Samples
+from app.figures.controller import Overlaid
+from app.figures.scale import thinned
+
+Kind = Literal["log", "trace"]
+Verdict = Literal["exact", "agrees", "differs"]
+Values = NDArray[np.int64] | Samples
+
+CURVE_POINTS: Final = 1000
+MARKS: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """How a signal is called and drawn: `scale` is what one of its counts is in `unit`."""
+
+    title: str
+    unit: str
+    scale: float
+    digits: int
+
+
+_SHOWN: Final[Mapping[str, _Shown]] = MappingProxyType(
+    {
+        "z_ref": _Shown("Reference altitude", "m down", REFERENCE_UNITS["z_ref"], 3),
+        "zd_ref": _Shown("Reference speed", "m/s down", REFERENCE_UNITS["zd_ref"], 3),
+        "zdd_ref": _Shown("Reference acceleration", "m/s² down", REFERENCE_UNITS["zdd_ref"], 2),
+        "z_sum_err": _Shown("Summed error", "m·s", REFERENCE_UNITS["z_ref"] / RATE_HZ, 3),
+        "ff_cmd": _Shown("Feed-forward", "of 9600", 1.0, 0),
+        "fb_cmd": _Shown("Feedback", "of 9600", 1.0, 0),
+        "thrust": _Shown("Thrust", "of 9600", 1.0, 0),
+    }
+)
+_TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
+_BEYOND: Final = f"beyond what {1000 * TIME_TOLERANCE_S:g} ms of uncertain time explain"
+_STEP_APART: Final = "or with fields one step of 1/512 s apart"
+
+FIGURES: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
+    {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
+)
+"""What is drawn: the title, and the signals above one another."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalResult:
+    """One signal: the largest difference between recording and replica in `difference_unit`, what is allowed, and how
+    many samples differ by more, the first of them when."""
+
+    name: str
+    title: str
+    largest_difference: float
+    difference_unit: str
+    tolerance: float
+    allowance: str
+    verdict: Verdict
+    different: int
+    first_different_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """Everything that a page shows of one check. `better_gains` are others that more of the commands follow from."""
+
+    kind: Kind
+    passed: bool
+    sentence: str
+    rows: int
+    gains: Mapping[str, float] | None
+    gains_from: str
+    better_gains: Mapping[str, float] | None
+    notes: tuple[str, ...]
+    signals: tuple[SignalResult, ...]
+    curves: Mapping[str, Overlaid]
+
+    def as_json(self) -> dict[str, object]:
+        return asdict(self)
+
+
+_RESULT: Final = TypeAdapter(Result)
+
+
+def result_from_json(document: object) -> Result:
+    """What `as_json` made, back again. Raises ValueError for anything else."""
+    return _RESULT.validate_python(document)
+
+
+def result_of(checked: LogCheck | TraceCheck) -> Result:
+    return _result_of_log(checked) if isinstance(checked, LogCheck) else _result_of_trace(checked)
+
+
+def _result_of_trace(checked: TraceCheck) -> Result:
+    trace, replay = checked.trace, checked.replay
+    recorded = dict(zip(OUTPUTS, trace.outputs.T, strict=True))
+    replica = dict(zip(OUTPUTS, checked.computed.T, strict=True))
+    differs = {name: recorded[name] != replica[name] for name in OUTPUTS}
+    time_s = np.arange(replay.rows) / RATE_HZ
+    overlay = Overlay(time_s, recorded, replica, differs)
+    constant = {name: np.unique(trace.inputs[:, INPUTS.index(name)]) for name in GAINS}
+    is_constant = all(len(values) == 1 for values in constant.values())
+    return Result(
+        kind="trace",
+        passed=replay.exact,
+        sentence=_said_of_trace(checked, differs),
+        rows=replay.rows,
+        gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
+        gains_from="of the recording" if is_constant else "not the same throughout",
+        better_gains=None,
+        notes=(),
+        signals=tuple(
+            _signal(name, float(replay.largest_difference[name]), "counts", 0.0, "to the last bit", overlay)
+            for name in OUTPUTS
+        ),
+        curves=_curves((overlay,)),
+    )
+
+
+def _result_of_log(checked: LogCheck) -> Result:
+    commands, simulation = checked.commands, checked.simulation
+    *simulated, drawn = checked.overlays
+    apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
+    signals = [
+        _signal(name, difference, "counts", 0.0, f"to the last bit, {_STEP_APART}", drawn)
+        for name, difference in apart.items()
+    ]
+    if simulation is not None:
+        signals[:0] = [
+            _signal(name, difference, _TOLERANCE_UNITS[name], TOLERANCES[name], _BEYOND, simulated[0])
+            for name, difference in simulation.largest_difference.items()
+        ]
+    return Result(
+        kind="log",
+        passed=checked.passed,
+        sentence=_said_of_log(checked),
+        rows=commands.rows,
+        gains=dict(checked.gains),
+        gains_from=checked.gains_from,
+        better_gains=checked.better_gains,
+        notes=tuple(_notes(checked)),
+        signals=tuple(signals),
+        curves=_curves(checked.overlays),
+    )
+
+
+def _signal(
+    name: str, difference: float, unit: str, tolerance: float, allowance: str, overlay: Overlay
+) -> SignalResult:
+    wrong = np.flatnonzero(overlay.differs[name])
+    verdict: Verdict = "differs" if wrong.size else "exact" if difference == 0.0 else "agrees"
+    return SignalResult(
+        name=name,
+        title=_SHOWN[name].title,
+        largest_difference=difference,
+        difference_unit=unit,
+        tolerance=tolerance,
+        allowance=allowance,
+        verdict=verdict,
+        different=int(wrong.size),
+        first_different_s=round(float(overlay.time_s[wrong[0]]), 6) if wrong.size else None,
+    )
+
+
+def _said_of_trace(checked: TraceCheck, differs: Mapping[str, NDArray[np.bool_]]) -> str:
+    replay = checked.replay
+    if replay.first_different_row is None:
+        return f"The replica agrees: all {_grouped(replay.rows)} steps are exact in all {len(OUTPUTS)} signals."
+    row = replay.first_different_row
+    names = ", ".join(name for name in OUTPUTS if differs[name][row])
+    steps = int(np.logical_or.reduce(list(differs.values())).sum())
+    return (
+        f"The replica differs: {_grouped(steps)} of {_grouped(replay.rows)} steps are not exact, the first at "
+        f"{row / RATE_HZ:.3f} s in {names}."
+    )
+
+
+def _said_of_log(checked: LogCheck) -> str:
+    commands, simulation = checked.commands, checked.simulation
+    if not commands.rows:
+        return "Nothing could be compared: the loop commands nothing of its own in this log."
+    if not commands.passed:
+        return (
+            f"The replica differs: {_grouped(commands.different)} of {_grouped(commands.rows)} commands do not follow, "
+            f"the first at {commands.first_different_s:.3f} s."
+        )
+    if simulation is not None and not simulation.passed:
+        name, value = max(simulation.largest_difference.items(), key=lambda pair: pair[1] / TOLERANCES[pair[0]])
+        return (
+            f"The replica differs: {name} lies {value:.3g} {_TOLERANCE_UNITS[name]} {_BEYOND}, and "
+            f"{TOLERANCES[name]:g} are allowed."
+        )
+    apart = sum(commands.stale.values())
+    more = "" if not apart else f", the other {_grouped(apart)} with fields one step of 1/512 s apart"
+    exact = f"{_grouped(commands.exact)} of {_grouped(commands.rows)}"
+    return f"The replica agrees: {exact} commands follow to the last bit{more}."
+
+
+def _notes(checked: LogCheck) -> Iterable[str]:
+    if checked.better_gains is not None:
+        better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
+        yield f"More commands follow from {better}: were other gains flown?"
+    yield from _notes_on(checked.commands)
+    if checked.simulation is None:
+        yield "Reference and integrator were not simulated: no command in the log, or another one within 2 s."
+    else:
+        yield (
+            f"Reference and integrator were simulated again from the command at {checked.simulation.command_s:.3f} s "
+            f"for {checked.simulation.duration_s:.1f} s."
+        )
+
+
+def _notes_on(commands: CommandCheck) -> Iterable[str]:
+    if commands.tilted:
+        yield f"{_grouped(commands.tilted)} commands follow under a tilt of up to {commands.largest_tilt_deg:.1f}°."
+    for fields, count in commands.stale.items():
+        if count:
+            yield f"{_grouped(count)} commands follow only with the {fields} a step apart."
+
+
+def _curves(overlays: Iterable[Overlay]) -> dict[str, Overlaid]:
+    return {name: _curve(name, overlay) for overlay in overlays for name in overlay.recorded if len(overlay.time_s)}
+
+
+def _curve(name: str, overlay: Overlay) -> Overlaid:
+    """Thinned so that both curves keep their look and their extremes, at the same times."""
+    shown = _SHOWN[name]
+    known = np.flatnonzero(np.isfinite(overlay.replica[name]))
+    recorded, replica = (_scaled(values[known], shown) for values in (overlay.recorded[name], overlay.replica[name]))
+    time_s = overlay.time_s[known]
+    kept = sorted({*_kept(recorded), *_kept(replica)})
+    wrong = np.flatnonzero(overlay.differs[name][known])
+    marked = wrong if len(wrong) <= MARKS else wrong[np.linspace(0, len(wrong) - 1, MARKS).astype(np.int64)]
+    return Overlaid(
+        label=f"{name} ({shown.unit})",
+        digits=shown.digits,
+        time_s=_rounded(time_s[kept]),
+        recorded=_rounded(recorded[kept]),
+        replica=_rounded(replica[kept]),
+        differing_s=_rounded(time_s[marked]),
+        differing=_rounded(recorded[marked]),
+    )
+
+
+def _scaled(values: Values, shown: _Shown) -> Samples:
+    return np.asarray(values, dtype=np.float64) * shown.scale
+
+
+def _rounded(values: Samples) -> tuple[float, ...]:
+    return tuple(round(float(each), 6) for each in values)
+
+
+def _kept(values: Samples) -> list[int]:
+    return [int(place) for place in thinned(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)[0]]
+
+
+def _grouped(count: int) -> str:
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")

@@ -1,0 +1,65 @@
+"""Controller checks over HTTP."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Query, status
+
+from app.api.deps import Act, CursorText, Id, Limit, Reader, Writer, json_only
+from app.api.figures import FigureCard, Theme, figure_card
+from app.api.uploads import REQUEST_BODY, Record
+from app.controller_checks import service
+from app.controller_checks.schemas import ControllerCheck, ControllerCheckSummary
+from app.schemas import Page
+
+PREFIX = "/api/controller-checks"
+
+router = APIRouter(prefix=PREFIX, tags=["controller checks"], dependencies=[Depends(json_only)])
+recordings = APIRouter(prefix=PREFIX, tags=["controller checks"])
+"""Apart from the rest, because what comes in here is no JSON."""
+
+
+@router.get("")
+def list_controller_checks(
+    session: Reader, limit: Limit = 50, cursor: CursorText = None
+) -> Page[ControllerCheckSummary]:
+    """Recordings that were held against the replica, the newest first."""
+    return service.list_checks(session, limit=limit, cursor=cursor)
+
+
+@recordings.post("", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
+def check_controller(
+    record: Record,
+    gains: Annotated[
+        str | None, Query(max_length=40, description="KP,KI,KD that were flown, where the log does not say so")
+    ] = None,
+) -> ControllerCheck:
+    """Hold a recording of the vertical loop against the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
+    form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept."""
+    result = service.examine(record.file, name=record.name, companion=record.companion, gains=gains)
+    return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
+
+
+@router.post("/example", status_code=status.HTTP_201_CREATED)
+def check_example_controller(act: Act) -> ControllerCheck:
+    """The same with a takeoff that comes with the program, recorded from the autopilot's own code."""
+    result = service.examine_example()
+    return act(ControllerCheck, lambda session: service.store_example(session, result))
+
+
+@router.get("/{check_id}")
+def get_controller_check(session: Reader, check_id: Id) -> ControllerCheck:
+    return service.get_check(session, check_id)
+
+
+@router.get("/{check_id}/figures/{name}")
+def get_controller_check_figure(
+    session: Reader, check_id: Id, name: Literal["reference", "commands"], theme: Theme = "light"
+) -> FigureCard:
+    """The signals of the reference model and the integrator, or the commands, recorded and replica overlaid."""
+    return figure_card(service.figure(session, check_id, name, theme))
+
+
+@router.delete("/{check_id}", status_code=status.HTTP_204_NO_CONTENT)
+def delete_controller_check(session: Writer, check_id: Id) -> None:
+    """Remove a check; it can be made again from its recording."""
+    service.delete_check(session, check_id)

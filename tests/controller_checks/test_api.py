@@ -1,0 +1,204 @@
+"""Controller checks over HTTP, with the recorded runs and with logs of the replica's own flights."""
+
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from app.cli import app
+from app.core.control.replay import OUTPUTS
+from app.db.models import ControllerCheckRow
+from app.db.session import Database
+from tests.builders import get, problems_of
+from tests.logs.paparazzi_flights import COMPANION, Flight, data_of, write
+
+Json = dict[str, Any]
+PATH = "/api/controller-checks"
+TRACES = sorted((Path(__file__).parents[1] / "data" / "vertical_loop").glob("*.csv.gz"))
+DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def send(
+    client: TestClient, name: str, content: bytes | str, *, companion: str = "", gains: str = ""
+) -> httpx2.Response:
+    files = {"file": (name, content)} | ({"companion": ("a.log", companion)} if companion else {})
+    return client.post(PATH, files=files, params={"gains": gains} if gains else {})
+
+
+def figures(client: TestClient, check: Json) -> list[Json]:
+    return [get(client, f"{PATH}/{check['id']}/figures/{figure['name']}") for figure in check["figures"]]
+
+
+def spoilt(*, line: int, column: str, value: str) -> bytes:
+    """The first trace with one value replaced; lines count from 1, the header is line 1."""
+    rows = [row.split(",") for row in gzip.decompress(TRACES[0].read_bytes()).decode().splitlines()]
+    rows[line - 1][rows[0].index(column)] = value
+    return "\n".join(map(",".join, rows)).encode()
+
+
+@pytest.mark.parametrize("trace", TRACES, ids=lambda path: path.stem)
+def test_a_recorded_run_is_exact_in_every_signal(client: TestClient, database: Database, trace: Path) -> None:
+    answer = send(client, trace.name, trace.read_bytes())
+    assert answer.status_code == 201, answer.text
+    check = answer.json()
+    assert (check["file_name"], check["kind"], check["passed"]) == (trace.name, "trace", True)
+    assert [signal["name"] for signal in check["signals"]] == list(OUTPUTS)
+    assert {(signal["largest_difference"], signal["verdict"]) for signal in check["signals"]} == {(0.0, "exact")}
+    assert get(client, f"{PATH}/{check['id']}") == check
+    with database.read() as session:
+        row = session.get(ControllerCheckRow, check["id"])
+        assert row is not None
+        assert len(json.dumps(row.result)) < 1_000_000
+
+
+def test_what_is_drawn_is_the_recording_in_its_units_and_the_replica_over_it(client: TestClient) -> None:
+    trace = next(path for path in TRACES if path.name.startswith("takeoff_default"))
+    check = send(client, trace.name, trace.read_bytes()).json()
+    header, *lines = gzip.decompress(trace.read_bytes()).decode().splitlines()
+    names = header.split(",")
+    rows = np.array([line.split(",") for line in lines])
+    scales = {"z_ref": 2**-8, "zd_ref": 2**-19, "zdd_ref": 2**-10, "z_sum_err": 2**-17}
+    cards = figures(client, check)
+    assert [card["state"] for card in cards] == ["ready", "ready"]
+    traces = [each for card in cards for each in card["figure"]["data"]]
+    assert [each["meta"]["role"] for each in traces] == ["recorded", "replica"] * len(OUTPUTS)
+    for name, recorded, replica in zip(OUTPUTS, traces[::2], traces[1::2], strict=True):
+        assert (recorded["x"], recorded["y"]) == (replica["x"], replica["y"])
+        whole = rows[:, names.index(name)].astype(np.int64) * scales.get(name, 1)
+        places = np.round(np.array(recorded["x"]) * 512).astype(int)
+        assert recorded["y"] == pytest.approx(whole[places].tolist(), abs=1e-6)
+        assert max(recorded["y"]) == pytest.approx(whole.max(), abs=1e-6)
+        assert places[-1] == len(rows) - 1
+
+
+def test_numbers_are_those_of_the_command(client: TestClient, tmp_path: Path) -> None:
+    log = write(tmp_path, Flight(DEFAULT, stale=True))
+    printed = CliRunner().invoke(app, ["controller", "check", str(log), "--json", str(tmp_path / "out.json")])
+    assert printed.exit_code == 0
+    (said,) = json.loads((tmp_path / "out.json").read_text())["files"]
+    check = send(client, "flight.data", log.read_bytes(), companion=COMPANION).json()
+    assert (check["passed"], check["gains"], check["gains_from"]) == (True, DEFAULT, "of the log")
+    commands = said["commands"]
+    assert check["rows"] == commands["rows"] == 669
+    assert f"{commands['exact']} of {commands['rows']} commands follow to the last bit" in check["sentence"]
+    simulated = {signal["name"]: signal for signal in check["signals"][:4]}
+    assert {name: signal["largest_difference"] for name, signal in simulated.items()} == (
+        said["simulation"]["largest_difference"]
+    )
+    assert all(signal["tolerance"] == said["tolerances"][name] for name, signal in simulated.items())
+    verdicts = {signal["name"]: signal["verdict"] for signal in check["signals"]}
+    assert (verdicts["z_ref"], verdicts["fb_cmd"]) == ("exact", "agrees")
+
+
+def test_a_difference_is_named_measured_and_marked_where_it_is(client: TestClient) -> None:
+    check = send(client, "spoilt.csv", spoilt(line=1002, column="thrust", value="123")).json()
+    assert check["passed"] is False
+    assert "1 of 8\N{NARROW NO-BREAK SPACE}192 steps are not exact, the first at 1.953 s in thrust" in check["sentence"]
+    found = {signal["name"]: signal for signal in check["signals"]}
+    assert (found["thrust"]["verdict"], found["thrust"]["different"]) == ("differs", 1)
+    assert found["thrust"]["first_different_s"] == pytest.approx(1000 / 512, abs=1e-6)
+    assert found["ff_cmd"]["verdict"] == "exact"
+    marks = [trace for trace in figures(client, check)[1]["figure"]["data"] if trace["meta"]["role"] == "differs"]
+    assert [(mark["x"], mark["y"]) for mark in marks] == [([pytest.approx(1000 / 512, abs=1e-6)], [123])]
+
+
+def test_other_gains_than_flown_are_noticed_and_the_flown_ones_offered(client: TestClient) -> None:
+    data = data_of(Flight(DEFAULT))
+    check = send(client, "flight.data", data, gains="300,13,82").json()
+    assert (check["passed"], check["gains_from"], check["better_gains"]) == (False, "given", DEFAULT)
+    assert "The replica differs" in check["sentence"]
+    assert send(client, "flight.data", data, gains="283,13,82").json()["passed"] is True
+
+
+def test_a_calm_flight_asks_for_its_gains(client: TestClient) -> None:
+    lines = data_of(Flight(DEFAULT)).splitlines()
+    calm = "\n".join(line for line in lines if float(line.split()[0]) > 40.0)
+    refused = send(client, "calm.data", calm)
+    assert (refused.status_code, problems_of(refused)) == (422, {"gains": "are needed"})
+    check = send(client, "calm.data", calm, gains="283,13,82").json()
+    assert check["passed"] is True
+    assert "not simulated" in check["notes"][-1]
+    assert [signal["name"] for signal in check["signals"]] == ["ff_cmd", "fb_cmd", "thrust"]
+    reference, commands = figures(client, check)
+    assert (reference["state"], commands["state"]) == ("waiting", "ready")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "field", "reason"),
+    [
+        ("empty.data", b"", "file", "is empty"),
+        ("flight.ulg", b"ULog\x01\x12\x35" + bytes(100), "file", "is neither"),
+        ("alive.data", b"1.0 31 ALIVE 1\n", "file", "holds no VERT_LOOP"),
+        ("cut.csv.gz", TRACES[0].read_bytes()[:5000], "file", "is damaged"),
+        ("noise.csv.gz", b"\x1f\x8b" + bytes(range(200)), "file", "is damaged"),
+        ("text.csv.gz", gzip.compress(b"a,b\n1,2\n"), "line 1, step", "column is missing"),
+        ("spoilt.csv", spoilt(line=17, column="z", value="1.5"), "line 17, z", "must be a whole number"),
+        ("header.csv", spoilt(line=2, column="z", value="1").splitlines()[0], "file", "has no rows"),
+    ],
+)
+def test_what_cannot_be_checked_is_refused_in_words_and_stores_nothing(
+    client: TestClient, name: str, content: bytes, field: str, reason: str
+) -> None:
+    answer = send(client, name, content)
+    assert answer.status_code == 422, answer.text
+    found = problems_of(answer)
+    assert field in found, found
+    assert reason in found[field]
+    assert answer.json()["hint"]
+    assert get(client, PATH)["total"] == 0
+
+
+def test_gains_that_are_none_and_a_form_without_a_file_are_refused_naming_the_field(client: TestClient) -> None:
+    answer = send(client, "flight.data", data_of(Flight(DEFAULT, fly_s=4.0)), gains="1,2")
+    assert (answer.status_code, problems_of(answer)) == (422, {"gains": "must be three whole numbers, KP,KI,KD"})
+    assert problems_of(client.post(PATH, files={"log": ("a.data", b"x")})) == {"file": "is missing"}
+    assert client.post(PATH, json={}).status_code == 415
+
+
+def test_a_small_file_that_unpacks_to_a_huge_one_is_refused(client: TestClient) -> None:
+    bomb = gzip.compress(b"step,mode\n" + bytes(300 * 2**20), compresslevel=1)
+    answer = send(client, "bomb.csv.gz", bomb)
+    assert (answer.status_code, problems_of(answer)) == (422, {"file": "holds more than 256 MiB of text"})
+
+
+def test_more_than_the_limit_is_refused_before_it_arrives(client: TestClient) -> None:
+    headers = {"Content-Type": "application/octet-stream", "Content-Length": str(10**9)}
+    assert client.post(PATH, content=b"x", headers=headers).status_code == 413
+
+
+def test_the_example_shows_what_a_check_is(client: TestClient) -> None:
+    answer = client.post(f"{PATH}/example", headers={"Idempotency-Key": "one"})
+    assert (answer.status_code, answer.json()["passed"]) == (201, True)
+    assert "all 8\N{NARROW NO-BREAK SPACE}192 steps are exact in all 7 signals" in answer.json()["sentence"]
+    assert client.post(f"{PATH}/example", headers={"Idempotency-Key": "one"}).json() == answer.json()
+    assert get(client, PATH)["total"] == 1
+
+
+def test_checks_are_listed_newest_first_in_pages_and_removed(client: TestClient) -> None:
+    made = [client.post(f"{PATH}/example").json()["id"] for _ in range(3)]
+    first = get(client, f"{PATH}?limit=2")
+    assert ([item["id"] for item in first["items"]], first["total"]) == (made[:0:-1], 3)
+    rest = get(client, f"{PATH}?limit=2&cursor={first['next_cursor']}")
+    assert ([item["id"] for item in rest["items"]], rest["next_cursor"]) == (made[:1], None)
+    assert client.delete(f"{PATH}/{made[0]}").status_code == 204
+    for answer in (
+        client.delete(f"{PATH}/{made[0]}"),
+        client.get(f"{PATH}/{made[0]}"),
+        client.get(f"{PATH}/{made[0]}/figures/commands"),
+    ):
+        assert answer.status_code == 404
+        assert "There is no controller check" in answer.json()["detail"]
+    assert client.get(f"{PATH}/{made[1]}/figures/nonsense").status_code == 422
+
+
+def test_a_browser_hears_of_a_check(client: TestClient, database: Database) -> None:
+    made = client.post(f"{PATH}/example").json()["id"]
+    with database.engine.connect() as connection:
+        told = connection.exec_driver_sql("SELECT topic, entity_id FROM event ORDER BY id DESC LIMIT 1").one()
+    assert tuple(told) == ("check", made)
