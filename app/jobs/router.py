@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from app.api.deps import Act, CursorText, Id, Limit, Reader, json_only
+from app.api.deps import Act, CurrentSettings, CursorText, Id, Limit, Reader, json_only
 from app.jobs import service
-from app.jobs.schemas import Job
+from app.jobs.schemas import Job, JobLog
 from app.jobs.states import JobState
 from app.schemas import Page
 
@@ -28,6 +28,12 @@ def list_jobs(
 @router.get("/{job_id}")
 def get_job(session: Reader, job_id: Id) -> Job:
     return service.get_job(session, job_id)
+
+
+@router.get("/{job_id}/log")
+def get_job_log(session: Reader, settings: CurrentSettings, job_id: Id, limit: Limit = 100) -> JobLog:
+    """What the worker wrote down about a job, its last lines."""
+    return service.get_log(session, job_id, settings.data_dir, limit=limit)
 
 
 @router.post("/{job_id}/cancel")

@@ -26,3 +26,20 @@ class Job(BaseModel):
     started_at: datetime | None
     finished_at: datetime | None
     actions: Annotated[list[str], Field(description="what may be done with it now: cancel, retry")]
+
+
+class JobLogLine(BaseModel):
+    """A line of the worker's log about a job. `exception` is a traceback, empty without one."""
+
+    at: datetime
+    level: str
+    message: str
+    details: dict[str, str]
+    exception: str
+
+
+class JobLog(BaseModel):
+    """The last lines about a job, the oldest first; `total` counts all that are kept."""
+
+    lines: list[JobLogLine]
+    total: int

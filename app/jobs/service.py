@@ -6,6 +6,7 @@ For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it co
 
 from collections.abc import Collection
 from datetime import timedelta
+from pathlib import Path
 from typing import Final
 
 from sqlalchemy import update
@@ -16,7 +17,8 @@ from app.db.models import JobRow, JsonObject
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.jobs import repository
-from app.jobs.schemas import Job
+from app.jobs.logs import lines_of_job
+from app.jobs.schemas import Job, JobLog
 from app.jobs.states import ACTIONS, MOVES, JobState
 from app.moves import allowed, check_action, check_move
 from app.schemas import Page, Trouble
@@ -164,6 +166,13 @@ def get_job(session: Session, job_id: int) -> Job:
     return job_view(repository.get_one(session, job_id))
 
 
+def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> JobLog:
+    """What the worker wrote down about it. Raises NotFoundError."""
+    row = repository.get_one(session, job_id)
+    lines, total = lines_of_job(data_dir, job_id, since=row.created_at, limit=limit)
+    return JobLog.model_validate({"lines": lines, "total": total}, from_attributes=True)
+
+
 def cancel_job(session: Session, job_id: int) -> Job:
     """Raises ConflictError when it is over already."""
     row = repository.get_one(session, job_id)
@@ -229,7 +238,7 @@ def _requeue(row: JobRow) -> int:
         _fail(
             row,
             f"The worker went away {row.attempts} times while it did this.",
-            "Look into the worker's log, then retry the job.",
+            "Look into its log on the page of jobs, then retry it.",
             [],
         )
     else:

@@ -92,8 +92,11 @@ class Desk:
     def carry_out(self, job: Claimed) -> None:
         """The whole job, from the stored order to the stored result. Raises nothing."""
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
+            began_s = monotonic()
+            _log.info("job begun", worker=self._worker, order=job.order or None)
             try:
                 self._perform(job)
+                _log.info("the worker is done with the job", seconds=round(monotonic() - began_s, 3))
             except CancelledError:
                 _log.info("job dropped, because the worker ends; it runs again with the next one")
             except StorageError as error:
@@ -119,5 +122,5 @@ def mistake(what: str) -> GainlineError:
     """The error that a person sees when the program itself is to blame."""
     return GainlineError(
         f"The program made a mistake ({what}).",
-        hint="Try again; if it happens again, report it with the worker's log.",
+        hint="Try again; if it happens again, report it with the job's log.",
     )

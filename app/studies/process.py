@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from traceback import format_exc
 from types import TracebackType
 from typing import Final, Self
 
@@ -41,9 +42,10 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Mistaken:
-    """Said by the process: the program's own mistake."""
+    """Said by the process: the program's own mistake, and where it was made."""
 
     what: str
+    traceback: str
 
 
 Said = Advance | Result | Refused | Mistaken
@@ -100,7 +102,7 @@ def _outcome(tell: Callable[[float, str], None], name: str, full: bool) -> Resul
     except GainlineError as error:
         return Refused(error.message, error.hint, error.problems)
     except Exception as error:  # noqa: BLE001 - the edge of the process
-        return Mistaken(f"{type(error).__name__}: {error}")
+        return Mistaken(f"{type(error).__name__}: {error}", format_exc())
 
 
 def _end_with(pipe: Connection) -> None:

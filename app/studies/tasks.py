@@ -90,7 +90,8 @@ def _checked(said: Said) -> Result:
             return said
         case Refused(message, hint, problems):
             raise GainlineError(message, hint=hint, problems=problems)
-        case Mistaken(what):
+        case Mistaken(what, traceback):
+            _log.error("the process that computed made a mistake", exception=traceback)
             raise mistake(what)
         case Advance():
             raise AssertionError

@@ -1,0 +1,51 @@
+"""What the worker wrote down about a job, over HTTP."""
+
+import json
+from datetime import UTC, datetime, timedelta
+
+from fastapi.testclient import TestClient
+
+from app.db.session import Database
+from app.jobs import service as jobs
+from app.settings import Settings
+from tests.builders import get
+
+NOW = datetime.now(UTC)
+
+
+def line(after_s: float, message: str, job_id: int = 1, **more: object) -> str:
+    said = {"event": message, "job_id": job_id, "level": "info", "logger": "app", **more}
+    return json.dumps({**said, "timestamp": (NOW + timedelta(seconds=after_s)).isoformat()})
+
+
+def test_a_job_s_lines_are_found_in_turned_over_files_too_and_nobody_elses(
+    client: TestClient, database: Database, settings: Settings
+) -> None:
+    with database.write() as session:
+        assert jobs.enqueue_job(session, "reproduction", order={"name": "table1"}).id == 1
+    folder = settings.data_dir / "log"
+    folder.mkdir()
+    older = [line(-3600, "of an older database"), line(60, "job begun", order={"name": "table1"})]
+    newer = [
+        line(61, "of another job", 11),
+        json.dumps({"event": 'says "job_id": 1', "timestamp": NOW.isoformat()}),
+        '{"event": "cut off", "job_id": 1',
+        line(62, "job failed", exception="Traceback\nValueError: 3", why="no such thing"),
+    ]
+    (folder / "worker.log.1").write_text("\n".join(older) + "\n")
+    (folder / "worker.log").write_text("\n".join(newer))
+    found = get(client, "/api/jobs/1/log")
+    assert [(each["message"], each["details"]) for each in found["lines"]] == [
+        ("job begun", {"order": "{'name': 'table1'}"}),
+        ("job failed", {"why": "no such thing"}),
+    ]
+    assert found["lines"][1]["exception"] == "Traceback\nValueError: 3"
+    last = get(client, "/api/jobs/1/log?limit=1")
+    assert ([each["message"] for each in last["lines"]], last["total"]) == (["job failed"], 2)
+
+
+def test_a_job_without_lines_has_none_and_no_job_is_not_found(client: TestClient, database: Database) -> None:
+    with database.write() as session:
+        jobs.enqueue_job(session, "proposal")
+    assert get(client, "/api/jobs/1/log") == {"lines": [], "total": 0}
+    assert client.get("/api/jobs/2/log").status_code == 404
