@@ -1,7 +1,9 @@
 """Logs: one JSON object a line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error."""
 
+import faulthandler
 import logging
 import logging.handlers
+import signal
 import sys
 from pathlib import Path
 from typing import Final, Literal
@@ -23,7 +25,11 @@ _SHARED: Final[tuple[Processor, ...]] = (
 
 
 def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -> None:
-    """Send this process's logs, the libraries' included, to its file and to standard error (readable on a terminal)."""
+    """Send this process's logs, the libraries' included, to its file and to standard error (readable on a terminal).
+
+    SIGUSR1 has it write to standard error what each of its threads does, so that one that hangs can be understood.
+    """
+    faulthandler.register(signal.SIGUSR1)
     folder = data_dir / "log"
     prepare_data_dir(folder)
     to_file = logging.handlers.RotatingFileHandler(

@@ -8,6 +8,7 @@ everything else.
 
 import os
 import platform
+import queue
 import signal
 import sys
 import threading
@@ -107,13 +108,21 @@ def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting
 
 
 def _end_on(*signals: signal.Signals, ending: Ending, airspace: Airspace) -> None:
-    def end(number: int, _frame: FrameType | None) -> None:
-        reason = f"the worker was stopped ({signal.Signals(number).name})"
-        ending.ask(reason)
-        airspace.close(reason)
+    """The handler takes no lock: the thread that it interrupts may hold any. Whoever does is a thread of its own."""
+    asked: queue.SimpleQueue[str] = queue.SimpleQueue()
 
+    def note(number: int, _frame: FrameType | None) -> None:
+        asked.put(f"the worker was stopped ({signal.Signals(number).name})")
+
+    def heed() -> None:
+        while True:
+            reason = asked.get()
+            ending.ask(reason)
+            airspace.close(reason)
+
+    threading.Thread(target=heed, name="signals", daemon=True).start()
     for number in signals:
-        signal.signal(number, end)
+        signal.signal(number, note)
 
 
 def _end_with_parent(ending: Ending) -> None:

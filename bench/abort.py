@@ -118,21 +118,31 @@ def free_port() -> int:
 @contextlib.contextmanager
 def program(*arguments: str, until: str) -> Iterator[str]:
     """`gainline …` from its line that contains `until`, which is given, to the end of the block."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "app.cli", *arguments],
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    assert process.stdout is not None
-    while until not in (line := process.stdout.readline()):
-        assert line, f"gainline {arguments[0]} ended"
-    try:
-        yield line
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.wait(PATIENCE_S)
+    with tempfile.TemporaryFile("w+") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "app.cli", *arguments],
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            start_new_session=True,
+        )
+        assert process.stdout is not None
+        while until not in (line := process.stdout.readline()):
+            assert line, f"gainline {arguments[0]} ended"
+        try:
+            yield line
+        finally:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGUSR1)  # say what every thread does
+                time.sleep(1.0)
+                said.seek(0)
+                print("".join(said.readlines()[-300:]), file=sys.stderr)
+                os.killpg(process.pid, signal.SIGKILL)
+                raise
 
 
 # ---- the clients
