@@ -18,6 +18,8 @@ import {
   flyTrial,
   type NewCampaignInput,
   type NewTrial,
+  promoteBest,
+  rehearseCampaign,
   type Trial,
   uploadTrajectory,
 } from "./generated";
@@ -140,6 +142,30 @@ export function useFinish(campaignId: number) {
   return useMutation({
     mutationFn: () => answer(finishCampaign({ path: { campaign_id: campaignId }, body: {} })),
     onSuccess: settled.campaign,
+  });
+}
+
+/** The campaign that rehearses this one on a simulation. */
+export function useRehearse(campaignId: number) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: () => answer(rehearseCampaign({ path: { campaign_id: campaignId } })),
+    onSuccess: settled.campaign,
+    onSettled: () => settled.ofCampaign(campaignId),
+  });
+}
+
+/** Make the best gains the safe ones of the campaign's registered vehicle. */
+export function usePromote({ id, vehicle }: Campaign) {
+  const queries = useQueryClient();
+  return useMutation({
+    mutationFn: (body: { version: number; statement: string }) =>
+      answer(promoteBest({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
+    onSettled: () =>
+      Promise.all([
+        queries.invalidateQueries({ queryKey: ["vehicles"] }),
+        queries.invalidateQueries({ queryKey: ["vehicle", vehicle.id] }),
+      ]),
   });
 }
 

@@ -1,12 +1,18 @@
+import { Button } from "@mantine/core";
+import { IconArchive } from "@tabler/icons-react";
+import { useState } from "react";
 import { Link } from "react-router";
+import { useArchive } from "../api/mutations";
 import type { CampaignSummary } from "../api/types";
 import { progress } from "../lib/campaigns";
 import { count } from "../lib/format";
 import { campaignWords } from "../lib/states";
 import { plusMinus } from "../lib/uncertainty";
 import classes from "./CampaignCard.module.css";
+import { CloneForm } from "./CloneForm";
 import { Sparkline } from "./Sparkline";
 import { StateBadge } from "./StateBadge";
+import { Trouble } from "./Trouble";
 import { useUnits } from "./useUnits";
 import { VehicleBadge } from "./VehicleBadge";
 
@@ -38,6 +44,36 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
         </div>
       </dl>
       <p className={classes["next"]}>{next_action}</p>
+      <More campaign={campaign} />
     </li>
+  );
+}
+
+/** What can be done with a campaign without opening it. */
+function More({ campaign }: { campaign: CampaignSummary }) {
+  const [open, setOpen] = useState(false);
+  const archive = useArchive(campaign.id);
+  return (
+    <details className={classes["more"]} onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary aria-label={`More to do with ${campaign.name}`}>
+        {campaign.state === "finished" ? "Clone or archive" : "Clone"}
+      </summary>
+      {open && (
+        <div className={classes["acts"]}>
+          <CloneForm {...campaign} />
+          {campaign.state === "finished" && (
+            <Button
+              variant="default"
+              leftSection={<IconArchive size={18} aria-hidden />}
+              loading={archive.isPending}
+              onClick={() => archive.mutate()}
+            >
+              Archive
+            </Button>
+          )}
+          <Trouble error={archive.error} />
+        </div>
+      )}
+    </details>
   );
 }

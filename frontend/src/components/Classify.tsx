@@ -2,9 +2,9 @@ import { Button, Chip, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useClassify } from "../api/mutations";
 import type { Trial } from "../api/types";
-import type { Suggestion } from "../lib/flyScreen";
+import { type Suggestion, suggestedClass } from "../lib/flyScreen";
 import { problemOf, reasonsByField } from "../lib/problems";
-import { INVALID_REASONS, otherClasses } from "../lib/verdict";
+import { consequenceOf, INVALID_REASONS, otherClasses } from "../lib/verdict";
 import { Trouble } from "./Trouble";
 import classes from "./Verdict.module.css";
 
@@ -12,16 +12,17 @@ const WORDS = { valid: "Count it as valid", aborted: "Class as aborted", invalid
 
 interface Props {
   trial: Trial;
-  /** What stands out, and is one tap away with its own reason. */
-  suggestion?: Suggestion | null;
+  /** All of the campaign, to tell what a class would change. */
+  trials: readonly Trial[];
 }
 
-/** Say what a flight is worth: one tap to undo, a reason to throw out. */
-export function Classify({ trial, suggestion = null }: Props) {
+/** Say what a flight is worth: what is suggested first and in one tap, one tap to undo, a reason to throw out. */
+export function Classify({ trial, trials }: Props) {
   const [asking, setAsking] = useState(false);
   const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
   const classify = useClassify();
-  const others = otherClasses(trial);
+  const suggestion = suggestedClass(trial);
+  const others = otherClasses(trial).sort((one, other) => rank(one, suggestion) - rank(other, suggestion));
   if (others.length === 0) return null;
 
   function choose(outcome: Suggestion["outcome"]): void {
@@ -44,7 +45,10 @@ export function Classify({ trial, suggestion = null }: Props) {
           classify.mutate({ trial, outcome: "invalid", reason });
         }}
       >
-        <p>An invalid flight keeps its record, but nothing is computed from it. Why is it invalid?</p>
+        <p>
+          An invalid flight keeps its record, but nothing is computed from it.{" "}
+          <strong>{consequenceOf(trial, trials, "invalid")}</strong> Why is it invalid?
+        </p>
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
           <div className={classes["chips"]}>
             {INVALID_REASONS.map((one) => (
@@ -75,11 +79,18 @@ export function Classify({ trial, suggestion = null }: Props) {
   }
   return (
     <>
+      {suggestion !== null && (
+        <p className={classes["suggested"]}>
+          Suggested: <strong>{suggestion.outcome}</strong>, {suggestion.why}.
+          {suggestion.outcome === "invalid" && ` ${consequenceOf(trial, trials, "invalid")}`}
+        </p>
+      )}
       {others.map((outcome) => (
         <Button
           key={outcome}
           variant={standsOut(outcome, trial, suggestion) ? "filled" : "default"}
           loading={classify.isPending}
+          title={consequenceOf(trial, trials, outcome)}
           onClick={() => choose(outcome)}
         >
           {trial.state === "invalid" ? `Undo: ${WORDS[outcome].toLowerCase()}` : WORDS[outcome]}
@@ -89,6 +100,9 @@ export function Classify({ trial, suggestion = null }: Props) {
     </>
   );
 }
+
+const rank = (outcome: Suggestion["outcome"], suggestion: Suggestion | null): number =>
+  outcome === suggestion?.outcome ? 0 : 1;
 
 function standsOut(outcome: Suggestion["outcome"], trial: Trial, suggestion: Suggestion | null): boolean {
   if (suggestion !== null) return outcome === suggestion.outcome;

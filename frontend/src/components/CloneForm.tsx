@@ -12,15 +12,18 @@ import { Help } from "./Help";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
 
+interface Props extends Pick<Campaign, "id" | "vehicle" | "best"> {
+  experiment: string;
+}
+
 /** The same settings again, on this vehicle or another, from the start or from what this campaign has reached. */
-export function CloneForm({ campaign }: { campaign: Campaign }) {
+export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props) {
   const navigate = useNavigate();
-  const own = campaign.vehicle.registered ? String(campaign.vehicle.id) : campaign.vehicle.kind;
-  const [vehicle, setVehicle] = useState(own);
+  const ownKey = own.registered ? String(own.id) : own.kind;
+  const [vehicle, setVehicle] = useState(ownKey);
   const [warm, setWarm] = useState(false);
-  const clone = useClone(campaign.id);
+  const clone = useClone(origin);
   const catalogue = useCatalogue().data;
-  const experiment = campaign.definition.experiment ?? "takeoff";
   const registered = registeredFor(useVehicles().data ?? [], experiment);
   const kinds = catalogue === undefined ? [] : kindsFor(catalogue, experiment);
   const chosen = registered.find(({ id }) => String(id) === vehicle);
@@ -36,21 +39,15 @@ export function CloneForm({ campaign }: { campaign: Campaign }) {
         value={vehicle}
         onChange={setVehicle}
       />
-      {campaign.best !== null && (
+      {best !== null && (
         <div className={classes["warm"]}>
           <Switch
             size="md"
-            label={`Start from flight ${campaign.best.trial_number}`}
+            label={`Start from flight ${best.trial_number}`}
             checked={warm}
             onChange={(event) => setWarm(event.currentTarget.checked)}
           />
-          <Help question="What is a warm start?">
-            <p>
-              The first flight uses this campaign's best gains. From how it goes the program sees whether the two
-              vehicles are alike: then it builds on what was learned here, with a shorter first step; else it starts
-              afresh.
-            </p>
-          </Help>
+          <Help topic="warmStart" />
         </div>
       )}
       <Button
@@ -59,7 +56,7 @@ export function CloneForm({ campaign }: { campaign: Campaign }) {
         onClick={() =>
           // The same vehicle keeps its settings, another one starts from its own defaults.
           clone.mutate(
-            { warmStart: warm, ...(vehicle === own ? {} : { vehicle: choice }) },
+            { warmStart: warm, ...(vehicle === ownKey ? {} : { vehicle: choice }) },
             { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
           )
         }

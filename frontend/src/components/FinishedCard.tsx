@@ -11,6 +11,7 @@ import { CloneForm } from "./CloneForm";
 import { GainList } from "./GainList";
 import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
+import { Promote } from "./Promote";
 import { Trouble } from "./Trouble";
 import { useUnits } from "./useUnits";
 
@@ -57,11 +58,12 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             Look at flight {best.number}
           </Button>
         )}
+        <Promote campaign={campaign} />
         <p className={classes["quiet"]}>
           This campaign takes no more flights. To fly on, clone it; with “Start from flight” on, the clone begins at the
           best gains found here.
         </p>
-        <CloneForm campaign={campaign} />
+        <CloneForm {...campaign} experiment={experiment} />
         {campaign.actions.includes("archive") && (
           <Button
             variant="subtle"

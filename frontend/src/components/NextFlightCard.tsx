@@ -8,6 +8,7 @@ import classes from "./NextFlight.module.css";
 import { Panel } from "./Panel";
 import { PlannedCard } from "./PlannedCard";
 import { ProposalCard } from "./ProposalCard";
+import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
 import { Trouble } from "./Trouble";
 
 interface Props {
@@ -18,7 +19,16 @@ interface Props {
 }
 
 /** Always one recommended thing to do, whatever state the campaign is in. */
-export function NextFlightCard({ campaign, next, trials, onChoose }: Props) {
+export function NextFlightCard(props: Props) {
+  return (
+    <>
+      {props.campaign.rehearses !== null && <RehearsalNote campaignId={props.campaign.rehearses} />}
+      <Step {...props} />
+    </>
+  );
+}
+
+function Step({ campaign, next, trials, onChoose }: Props) {
   const step = nextStep(campaign, next, trials);
   // Held here, so that a refused record is still explained when its trial has become a planned one.
   const upload = useUploadRecord(campaign.id);
@@ -27,6 +37,8 @@ export function NextFlightCard({ campaign, next, trials, onChoose }: Props) {
       return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
     case "finished":
       return <FinishedCard campaign={campaign} trials={trials} onChoose={onChoose} />;
+    case "rehearse":
+      return <RehearsalCard campaign={campaign} />;
     case "planned":
       return <PlannedCard campaign={campaign} trial={step.trial} upload={upload} />;
     case "propose":

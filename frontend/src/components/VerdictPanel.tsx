@@ -2,18 +2,21 @@ import { Anchor, Button } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
-import { recordCsv, useStatistics } from "../api/queries";
+import { recordCsv, useCampaign, useStatistics } from "../api/queries";
 import type { Trial } from "../api/types";
 import { percentChange, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { intervalText, plusMinus } from "../lib/uncertainty";
-import { askedFor, bestBeforeOf, sentenceOf } from "../lib/verdict";
+import { askedFor, bestBeforeOf, sentenceOf, standingWithout } from "../lib/verdict";
 import { Classify } from "./Classify";
 import { Comparisons } from "./Comparisons";
+import { FlightNotes } from "./FlightNotes";
 import { GainList } from "./GainList";
 import { Glitches } from "./Glitches";
 import { Kept, Marks } from "./Marks";
 import { Panel } from "./Panel";
+import { Promote } from "./Promote";
+import { Retry } from "./Retry";
 import { StateBadge } from "./StateBadge";
 import { Time } from "./Time";
 import classes from "./Verdict.module.css";
@@ -55,8 +58,10 @@ function Fact({ title, wide = false, children }: { title: string; wide?: boolean
 export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false }: Props) {
   const bestBefore = bestBeforeOf(trial, trials);
   const statistics = useStatistics(trial.campaign_id).data;
+  const campaign = useCampaign(trial.campaign_id).data;
   const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
   const asked = askedFor(trial);
+  const without = standingWithout(trial, trials);
   const scatter = trial.state === "valid" ? statistics?.sigma : null;
   return (
     <Panel
@@ -106,8 +111,14 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Fact>
       </dl>
       <Glitches trial={trial} unit={unit} />
+      {without && (
+        <p className={classes["sentence"]} role="status">
+          {without}
+        </p>
+      )}
       <div className={classes["acts"]}>
-        <Classify key={`${trial.id} ${trial.state}`} trial={trial} />
+        <Classify key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
+        {campaign && <Retry campaign={campaign} trial={trial} />}
         {trial.record !== null && (
           <Button
             component="a"
@@ -129,6 +140,8 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           </Anchor>
         )}
       </div>
+      <FlightNotes trial={trial} />
+      {campaign && isBest && campaign.state !== "finished" && <Promote campaign={campaign} />}
     </Panel>
   );
 }

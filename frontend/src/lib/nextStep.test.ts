@@ -2,7 +2,12 @@ import { expect, test } from "vitest";
 import type { Campaign, NextFlight, Proposal, Trial } from "../api/types";
 import { bestOf, nextStep, speedOf } from "./nextStep";
 
-const campaign = { state: "deciding", flying: null, best: { trial_id: 7 } } as unknown as Campaign;
+const campaign = {
+  state: "deciding",
+  flying: null,
+  best: { trial_id: 7 },
+  rehearsal: { state: "not needed" },
+} as unknown as Campaign;
 const proposal = { kind: "step", recommended: "step", stale: false } as unknown as Proposal;
 const ready: NextFlight = { state: "ready", proposal, problem: null };
 const trial = (id: number, state: Trial["state"]): Trial => ({ id, state }) as unknown as Trial;
@@ -31,6 +36,14 @@ test("a stale proposal is never offered", () => {
 test("a flight that nobody has judged comes before the next one", () => {
   const lost = trial(8, "lost");
   expect(nextStep(campaign, ready, [trial(7, "valid"), lost])).toEqual({ kind: "judge", trial: lost });
+});
+
+test("a real vehicle's campaign is rehearsed before anything else is offered", () => {
+  const real = (state: string) => ({ ...campaign, rehearsal: { state } }) as unknown as Campaign;
+  for (const state of ["missing", "under way", "failed"]) {
+    expect(nextStep(real(state), ready, [trial(8, "planned")])).toEqual({ kind: "rehearse" });
+  }
+  expect(nextStep(real("passed"), ready, [])).toEqual({ kind: "propose", proposal });
 });
 
 test("a planned trial waits for its flight or its record", () => {

@@ -6,6 +6,7 @@ import { wasFlown } from "./states";
 export type NextStep =
   | { kind: "flying"; trialId: number; trialNumber: number }
   | { kind: "judge"; trial: Trial }
+  | { kind: "rehearse" }
   | { kind: "planned"; trial: Trial }
   | { kind: "propose"; proposal: Proposal }
   | { kind: "nothing better"; proposal: Proposal }
@@ -24,11 +25,17 @@ export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly 
   // The list of flights has come before the campaign that it belongs to: neither it nor its proposal is up to date.
   if (landed) return { kind: "computing" };
   if (campaign.state === "finished" || campaign.state === "archived") return { kind: "finished" };
+  if (wantsRehearsal(campaign)) return { kind: "rehearse" };
   const planned = trials.find((trial) => trial.state === "planned" || trial.state === "staged");
   if (planned !== undefined) return { kind: "planned", trial: planned };
   if (next.state === "failed" || next.state === "none") return { kind: "failed", problem: next.problem };
   if (next.state === "ready" && next.proposal !== null && !next.proposal.stale) return offered(next.proposal);
   return { kind: "computing" };
+}
+
+/** Whether its real vehicle may not fly before the campaign has flown on a simulation. */
+export function wantsRehearsal({ rehearsal }: Campaign): boolean {
+  return rehearsal.state !== "not needed" && rehearsal.state !== "passed";
 }
 
 function offered(proposal: Proposal): NextStep {

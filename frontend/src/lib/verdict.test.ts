@@ -1,9 +1,20 @@
 import { expect, test } from "vitest";
-import type { Trial } from "../api/types";
-import { askedFor, bestBeforeOf, keptPrediction, marksOf, otherClasses, sentenceOf, shownTrial } from "./verdict";
+import type { Campaign, Trial } from "../api/types";
+import {
+  askedFor,
+  bestBeforeOf,
+  consequenceOf,
+  keptPrediction,
+  marksOf,
+  otherClasses,
+  promotable,
+  sentenceOf,
+  shownTrial,
+  standingWithout,
+} from "./verdict";
 
 const trial = (number: number, state: Trial["state"], error: number | null, predicted_error: number | null = null) =>
-  ({ number, state, error, predicted_error, actions: ["classify"] }) as unknown as Trial;
+  ({ id: number, number, state, error, predicted_error, actions: ["classify"] }) as unknown as Trial;
 
 const first = trial(1, "valid", 0.3267);
 const glitch = trial(2, "invalid", 0.05);
@@ -65,4 +76,30 @@ test("a flight that repeats gains on purpose is held against its own prediction"
   expect(askedFor(again)).toMatch(/^Asked for: the first flight's gains .* inside its prediction/);
   expect(askedFor({ ...again, error: 0.5 })).toContain("above its prediction");
   expect(askedFor({ ...again, kind: "step" })).toBe("");
+});
+
+test("what a class would change is said before: which flight is the best then, and that the gains are found anew", () => {
+  expect(consequenceOf(third, all, "invalid")).toBe(
+    "Flight 3 is the best; without it flight 1 is, and the next gains are computed anew.",
+  );
+  expect(consequenceOf(first, all, "invalid")).toBe(
+    "Flight 3 stays the best, and the next gains are computed anew without flight 1.",
+  );
+  expect(consequenceOf(first, [first, glitch], "invalid")).toBe(
+    "No other flight counts: without flight 1 the campaign begins again at its start gains.",
+  );
+  expect(consequenceOf(glitch, all, "valid")).toContain("is scored from its record");
+  expect(standingWithout(glitch, all)).toBe("Flight 3 is the best now; the next gains are computed without flight 2.");
+  expect(standingWithout(third, all)).toBe("");
+});
+
+test("the best gains become the safe ones only once flights have shown that they are better", () => {
+  const drone = { name: "Number 1", safe_gains: { kp: 283 } };
+  const best = { gains: { kp: 400 } } as unknown as NonNullable<Campaign["best"]>;
+  expect(promotable({ best, verdict: "better" }, drone)).toEqual({ possible: true, why: "" });
+  expect(promotable({ best, verdict: "unresolved" }, drone).why).toContain("whether they are better is unresolved");
+  expect(promotable({ best, verdict: null }, drone).possible).toBe(false);
+  expect(promotable({ best: { ...best, gains: { kp: 283 } }, verdict: "better" }, drone).why).toBe(
+    "The best gains are the safe ones of Number 1.",
+  );
 });

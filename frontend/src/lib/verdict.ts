@@ -1,6 +1,7 @@
 /** What a finished flight is worth, and against what. */
 
-import type { Trial } from "../api/types";
+import type { Campaign, Trial, Vehicle } from "../api/types";
+import { sameHeld } from "./flyScreen";
 import { wasFlown } from "./states";
 
 export const VERDICTS = { better: "Better", worse: "Worse", unresolved: "Unresolved" } as const;
@@ -42,7 +43,7 @@ export function marksOf(trial: Trial): string[] {
 }
 
 /** The valid flight with the lowest error before this one. */
-export function bestBeforeOf(trial: Trial, trials: readonly Trial[]): Trial | null {
+export function bestBeforeOf(trial: Pick<Trial, "number">, trials: readonly Trial[]): Trial | null {
   const before = trials.filter((one) => one.state === "valid" && one.number < trial.number && one.error !== null);
   return before.reduce<Trial | null>(
     (best, one) => (best === null || (one.error ?? 0) < (best.error ?? 0) ? one : best),
@@ -60,6 +61,52 @@ export function sentenceOf(trial: Trial): string {
 export function shownTrial(trials: readonly Trial[], chosen: number | null): Trial | null {
   const flown = trials.filter((trial) => wasFlown(trial.state));
   return flown.find((trial) => trial.number === chosen) ?? flown.at(-1) ?? null;
+}
+
+/** Flights that count; the one with the lowest error, the earliest of equals, is the best. */
+function bestOfCounted(trials: readonly Trial[]): Trial | null {
+  return bestBeforeOf({ number: Infinity }, trials);
+}
+
+/** What classing a flight so would change: which flight is the best, and from what the next gains are computed. */
+export function consequenceOf(trial: Trial, trials: readonly Trial[], outcome: Trial["state"]): string {
+  const best = bestOfCounted(trials);
+  if (outcome === "valid") {
+    const until = best === null ? "" : ` Flight ${best.number} is the best of the others.`;
+    return `Flight ${trial.number} is scored from its record, and the next gains are computed with it.${until}`;
+  }
+  const other = bestOfCounted(trials.filter(({ id }) => id !== trial.id));
+  if (other === null) {
+    return `No other flight counts: without flight ${trial.number} the campaign begins again at its start gains.`;
+  }
+  const anew = "and the next gains are computed anew";
+  if (best?.id === trial.id)
+    return `Flight ${trial.number} is the best; without it flight ${other.number} is, ${anew}.`;
+  return `Flight ${other.number} stays the best, ${anew} without flight ${trial.number}.`;
+}
+
+/** Of a flight that does not count: what holds instead; empty for others. */
+export function standingWithout(trial: Trial, trials: readonly Trial[]): string {
+  if (trial.state !== "invalid") return "";
+  const best = bestOfCounted(trials);
+  if (best === null) return "No flight counts now: the next gains are the start gains.";
+  return `Flight ${best.number} is the best now; the next gains are computed without flight ${trial.number}.`;
+}
+
+/** Whether the best gains may become the vehicle's safe ones; if not, why not, and what to do. */
+export function promotable(
+  { best, verdict }: Pick<Campaign, "best" | "verdict">,
+  { name, safe_gains: safe }: Pick<Vehicle, "name" | "safe_gains">,
+): { possible: boolean; why: string } {
+  if (best !== null && sameHeld(safe, best.gains))
+    return { possible: false, why: `The best gains are the safe ones of ${name}.` };
+  if (verdict === "better") return { possible: true, why: "" };
+  const because =
+    verdict === null ? "no gains are better than the first ones yet" : `whether they are better is ${verdict} as yet`;
+  return {
+    possible: false,
+    why: `The best gains cannot become the safe ones of ${name}: ${because}. Fly the best and the first ones again until the statistics say “better”.`,
+  };
 }
 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong set-up", "Battery low", "Touched something"];

@@ -85,6 +85,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const strategy = strategies.find(({ name }) => name === form.strategy);
   const recommended = strategies[0]?.name;
   const unread = unreadable(form, catalogue);
+  const isReal = vehicles.some(({ id, is_real }) => id === form.registered?.id && is_real);
   return (
     <form
       noValidate
@@ -113,6 +114,12 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         onKind={(kind) => setForm(withVehicle(form, catalogue, kind))}
         onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
       />
+      {isReal && (
+        <p className={classes["rehearse"]}>
+          {form.registered?.name} is a real vehicle: before its first flight the campaign is rehearsed on a simulation,
+          in one click from its page.
+        </p>
+      )}
       <TextInput
         label="Name"
         value={form.name}

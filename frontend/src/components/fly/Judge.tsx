@@ -1,10 +1,11 @@
 import { Anchor, Button } from "@mantine/core";
 import { Link } from "react-router";
+import { useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";
-import { suggestedClass } from "../../lib/flyScreen";
 import { trialWords } from "../../lib/states";
 import { sentenceOf } from "../../lib/verdict";
 import { Classify } from "../Classify";
+import { FlightNotes } from "../FlightNotes";
 import { Kept, Marks } from "../Marks";
 import { StateBadge } from "../StateBadge";
 import classes from "./Fly.module.css";
@@ -16,7 +17,7 @@ interface Props {
 
 /** What the flight was worth: a suggestion, one tap, and on to the next. */
 export function Judge({ campaign, trial }: Props) {
-  const suggestion = suggestedClass(trial);
+  const trials = useTrials(campaign.id).data ?? [];
   const page = `/campaigns/${campaign.id}`;
   return (
     <div className={classes["stack"]}>
@@ -26,14 +27,10 @@ export function Judge({ campaign, trial }: Props) {
         <Marks trial={trial} />
       </p>
       {trial.state !== "captured" && <p className={classes["say"]}>{sentenceOf(trial)}</p>}
-      {suggestion !== null && (
-        <p className={classes["say"]}>
-          Suggested: <strong>{suggestion.outcome}</strong>, {suggestion.why}.
-        </p>
-      )}
       <div className={classes["classes"]}>
-        <Classify key={`${trial.id} ${trial.state}`} trial={trial} suggestion={suggestion} />
+        <Classify key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
       </div>
+      <FlightNotes trial={trial} />
       <div className={classes["onward"]}>
         {trial.state !== "captured" && trial.state !== "lost" && (
           <Button component={Link} to={page} size="lg" fullWidth>

@@ -7,7 +7,7 @@ import type { AbortControl } from "../../api/flying";
 import { useFlyTrial } from "../../api/mutations";
 import type { Campaign, Trial, Vehicle } from "../../api/types";
 import type { FlyStep } from "../../lib/flyScreen";
-import { speedOf } from "../../lib/nextStep";
+import { speedOf, wantsRehearsal } from "../../lib/nextStep";
 import { HoldButton } from "../HoldButton";
 import { SpeedSwitch, useSpeed } from "../SpeedSwitch";
 import { Trouble } from "../Trouble";
@@ -27,7 +27,7 @@ interface Props {
 export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & { vehicle: Vehicle }) {
   switch (step) {
     case "plan":
-      return <Plan trial={trial} vehicle={vehicle} />;
+      return <Plan campaign={campaign} trial={trial} vehicle={vehicle} />;
     case "staging":
       return (
         <Waiting text="The gains are written one by one, and each is read back.">
@@ -89,11 +89,21 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
   }
 }
 
-function Plan({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
+function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; vehicle: Vehicle }) {
   const { stage } = useFlyActs(vehicle.id);
   const isInControl = useIsInControl(vehicle);
   const isOthers = vehicle.control !== null && !isInControl;
   const wantsControl = isOthers || (vehicle.is_real && !isInControl);
+  if (wantsRehearsal(campaign)) {
+    return (
+      <p className={classes["say"]}>
+        {vehicle.name} is a real vehicle, and this campaign has not passed its rehearsal: {campaign.rehearsal.reason}.{" "}
+        <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
+          Rehearse it first
+        </Anchor>
+      </p>
+    );
+  }
   const isReady = vehicle.actions.includes("stage") && trial.actions.includes("stage");
   return (
     <div className={classes["stack"]}>

@@ -1,0 +1,84 @@
+import { Button, FileButton, InputBase } from "@mantine/core";
+import { IconCamera, IconTrash } from "@tabler/icons-react";
+import { useState } from "react";
+import { photoAddress, useNote, usePhotoActs, usePhotos } from "../api/photos";
+import type { Trial } from "../api/types";
+import classes from "./FlightNotes.module.css";
+import { Trouble } from "./Trouble";
+
+const PICTURES = "image/jpeg,image/png,image/webp";
+
+/** What people keep of a flight beside its record: a note, and photos, straight from the camera on a tablet. */
+export function FlightNotes({ trial }: { trial: Trial }) {
+  const photos = usePhotos(trial.id).data ?? [];
+  const { add, remove } = usePhotoActs(trial.id);
+  const kept = trial.note !== "" || photos.length > 0;
+  return (
+    <details className={classes["notes"]} open={kept || undefined}>
+      <summary>Note and photos</summary>
+      <Note key={`${trial.id} ${trial.version}`} trial={trial} />
+      {photos.length > 0 && (
+        <ul className={classes["photos"]}>
+          {photos.map(({ id }, index) => (
+            <li key={id}>
+              <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
+                <img src={photoAddress(trial.id, id)} alt={`Flight ${trial.number}, ${index + 1}`} loading="lazy" />
+              </a>
+              <button
+                type="button"
+                aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
+                disabled={remove.isPending}
+                onClick={() => remove.mutate(id)}
+              >
+                <IconTrash size={18} aria-hidden />
+              </button>
+            </li>
+          ))}
+        </ul>
+      )}
+      <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
+        {(props) => (
+          <Button
+            {...props}
+            variant="default"
+            loading={add.isPending}
+            leftSection={<IconCamera size={20} aria-hidden />}
+          >
+            Add a photo
+          </Button>
+        )}
+      </FileButton>
+      <Trouble error={add.error ?? remove.error} />
+    </details>
+  );
+}
+
+function Note({ trial }: { trial: Trial }) {
+  const [note, setNote] = useState(trial.note);
+  const save = useNote(trial);
+  return (
+    <form
+      className={classes["note"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        save.mutate(note);
+      }}
+    >
+      <InputBase
+        component="textarea"
+        multiline
+        label={`Note on flight ${trial.number}`}
+        rows={2}
+        maxLength={2000}
+        value={note}
+        onChange={(event) => setNote(event.currentTarget.value)}
+      />
+      {note !== trial.note && (
+        <Button type="submit" loading={save.isPending}>
+          Keep the note
+        </Button>
+      )}
+      <Trouble error={save.error} />
+    </form>
+  );
+}
