@@ -7,7 +7,9 @@ from pydantic import BaseModel, Field
 
 from app.api.deps import Id, Reader
 from app.campaigns import drawing
+from app.errors import InputError, Problem
 from app.figures.base import Card
+from app.figures.history import Range
 from app.figures.theme import ThemeName
 
 router = APIRouter(prefix="/api", tags=["figures"])
@@ -45,9 +47,37 @@ class FigureCard(BaseModel):
 
 
 @router.get("/campaigns/{campaign_id}/figures/{name}")
-def get_campaign_figure(session: Reader, campaign_id: Id, name: FigureName, theme: Theme = "light") -> FigureCard:
-    """All takeoffs over the set point, the error of each flight, or the gains of each flight."""
-    return figure_card(drawing.campaign_figure(session, campaign_id, name, theme))
+def get_campaign_figure(
+    session: Reader,
+    campaign_id: Id,
+    name: FigureName,
+    theme: Theme = "light",
+    from_s: Annotated[float | None, Query(description="first second of the curves that is looked at")] = None,
+    to_s: Annotated[float | None, Query(description="last second of the curves that is looked at")] = None,
+    flight: Annotated[
+        int | None, Query(ge=1, le=2**31, description="number of a flight that is to have a curve of its own")
+    ] = None,
+) -> FigureCard:
+    """All takeoffs over the set point, the error of each flight, or the gains of each flight.
+
+    Of more than 30 flights the takeoffs are drawn as an envelope, with the first, the best, the latest and that
+    `flight` by themselves. Between `from_s` and `to_s` curves have as many points again.
+    """
+    view = drawing.View(window=_window(from_s, to_s), chosen=flight)
+    return figure_card(drawing.campaign_figure(session, campaign_id, name, theme, view))
+
+
+def _window(from_s: float | None, to_s: float | None) -> Range | None:
+    """Raises InputError when it ends before it begins, or has one end only."""
+    if from_s is None and to_s is None:
+        return None
+    if from_s is None or to_s is None or not from_s < to_s:
+        raise InputError(
+            "These seconds cannot be drawn.",
+            problems=(Problem("to_s", "must be given together with from_s, and be later"),),
+            hint="Give both ends in seconds since the command, or none for the whole flight.",
+        )
+    return Range(from_s, to_s)
 
 
 @router.get("/trials/{trial_id}/figure")

@@ -1,6 +1,7 @@
 """What the figures need, gathered from storage as plain data."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, Literal, TypedDict, cast
 
@@ -18,15 +19,13 @@ from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
+from app.figures.crowd import apart
 from app.figures.flight import FlightFigure, FlightRecordData
 from app.figures.history import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
 from app.figures.theme import ThemeName
 from app.trials import history
 from app.trials import service as trials_service
 from app.trials.states import TrialState
-
-FULL_RECORDS: Final = 30
-"""With more flights than this, all but the best and the latest are drawn from their coarse copies."""
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
@@ -42,11 +41,28 @@ _CONFIDENCE: Final = 0.9
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
 
+@dataclass(frozen=True, slots=True)
+class View:
+    """What somebody looks at: seconds of the curves, None for all; and a flight that is to have one, by its number."""
+
+    window: Range | None = None
+    chosen: int | None = None
+
+
+WHOLE: Final = View()
+
+
 def campaign_figure(
-    session: Session, campaign_id: int, name: Literal["takeoffs", "errors", "gains"], theme: ThemeName
+    session: Session,
+    campaign_id: int,
+    name: Literal["takeoffs", "errors", "gains"],
+    theme: ThemeName,
+    view: View = WHOLE,
 ) -> Card:
     """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
-    return card_of(CAMPAIGN_FIGURES[name](history_of(session, campaign_id, curves=name == "takeoffs"), theme))
+    return card_of(
+        CAMPAIGN_FIGURES[name](history_of(session, campaign_id, curves=name == "takeoffs", view=view), theme)
+    )
 
 
 def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
@@ -57,39 +73,47 @@ def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
     return card_of(FlightFigure(_flight_record(session, row, trials), theme))
 
 
-def history_of(session: Session, campaign_id: int, *, curves: bool) -> History:
-    """The campaign as its figures see it; without `curves` no record is read."""
+def history_of(session: Session, campaign_id: int, *, curves: bool, view: View = WHOLE) -> History:
+    """The campaign as its figures see it; without `curves` no record is read, and with them only of those flights that
+    have a curve of their own: of many flights the rest come as their coarse copies."""
     campaign = repository.get_one(session, campaign_id)
     definition = definition_of(campaign)
     experiment = experiment_of(definition)
     rows = history.trials_of(session, campaign_id)
     flown = [row for row in rows if row.state in history.FLOWN]
-    drawn = _curves(session, flown, experiment.output) if curves else {}
     set_point, reference = _goal(experiment.name)
-    return History(
+    bare = History(
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
         error_unit=experiment.error_unit,
         gains=experiment.space.gains,
         set_point=set_point,
         reference=reference,
-        flights=tuple(
-            FlightData(
-                number=row.number,
-                gains=row.gains,
-                outcome=cast("Outcome", row.state.value),
-                curve=drawn.get(row.id),
-                error=row.error,
-                predicted_error=row.predicted_error,
-                interval=_interval(row.predicted_interval),
-                glitches=_glitches(row),
-            )
-            for row in flown
-        ),
+        flights=tuple(map(_flight, flown)),
         proposal=_next_flight(session, campaign, rows, experiment.output),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
         curves_title=_CURVES.get(experiment.output, "Flight curves"),
+        window=view.window,
+        chosen=view.chosen,
+    )
+    if not curves:
+        return bare
+    drawn = _curves(session, flown, apart(bare, view.chosen), experiment.output)
+    return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
+
+
+def _flight(row: TrialRow) -> FlightData:
+    """A flight without its curve."""
+    return FlightData(
+        number=row.number,
+        gains=row.gains,
+        outcome=cast("Outcome", row.state.value),
+        curve=None,
+        error=row.error,
+        predicted_error=row.predicted_error,
+        interval=_interval(row.predicted_interval),
+        glitches=_glitches(row),
     )
 
 
@@ -118,23 +142,16 @@ def _glitches(row: TrialRow) -> tuple[Range, ...]:
     return tuple(Range(float(glitch["start_s"]), float(glitch["end_s"])) for glitch in row.glitches or [])
 
 
-def _curves(session: Session, flown: Sequence[TrialRow], output: str) -> dict[int, Curve]:
-    """The scored output of each flight that left a record, by trial."""
-    recorded = {row.id: row for row in flown if row.trajectory_id is not None}
-    best = history.best_of(flown)
-    whole = (
-        recorded
-        if len(recorded) <= FULL_RECORDS
-        else {row.id: row for row in (best, flown[-1]) if row is not None and row.id in recorded}
-    )
+def _curves(session: Session, flown: Sequence[TrialRow], whole: Collection[int], output: str) -> dict[int, Curve]:
+    """The scored output of each flight that left a record, by its number: of those in `whole` as it was recorded."""
+    recorded = [row for row in flown if row.trajectory_id is not None]
+    coarse = history.curves_of(session, [row for row in recorded if row.number not in whole])
     records = history.trajectories_of(
-        session, [row.trajectory_id for row in whole.values() if row.trajectory_id is not None]
+        session, [row.trajectory_id for row in recorded if row.trajectory_id is not None and row.number in whole]
     )
     return {
-        identity: _curve(records[row.trajectory_id], output)
-        if identity in whole and row.trajectory_id is not None
-        else _coarse(row)
-        for identity, row in recorded.items()
+        row.number: _curve(records[row.trajectory_id], output) if row.trajectory_id in records else _coarse(coarse, row)
+        for row in recorded
     }
 
 
@@ -142,8 +159,8 @@ def _curve(trajectory: Trajectory, channel: str) -> Curve:
     return Curve(trajectory.time_s, trajectory[channel])
 
 
-def _coarse(row: TrialRow) -> Curve:
-    points = np.array(row.curve or [], dtype=np.float64).reshape(-1, 2)
+def _coarse(curves: Mapping[int, list[list[float]]], row: TrialRow) -> Curve:
+    points = np.array(curves.get(row.id, []), dtype=np.float64).reshape(-1, 2)
     return Curve(points[:, 0], points[:, 1])
 
 

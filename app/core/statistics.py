@@ -20,7 +20,7 @@ from scipy.integrate import trapezoid
 from scipy.special import ndtr, stdtr, stdtrit
 
 from app.core.definition import Flight
-from app.core.experiments.base import Scatter
+from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Gains, Vector
 
 Word = Literal["better", "worse", "unresolved"]
@@ -61,6 +61,8 @@ class Group:
     @property
     def squares(self) -> float:
         """Σ (e − ē)², with size − 1 degrees of freedom."""
+        if self.size == 1:
+            return 0.0
         return float(np.sum((np.array(self.errors) - self.mean) ** 2))
 
     def standard_error(self, scatter: Pooled) -> float:
@@ -185,15 +187,21 @@ def optimism(means: Sequence[float], standard_errors: Sequence[float]) -> float:
     if not (sd > 0.0).all():
         return 0.0
     low, high = centre.min() - _OPTIMISM_REACH * sd.max(), centre.min() + _OPTIMISM_REACH * sd.max()
+    near = centre - _OPTIMISM_REACH * sd <= high
+    centre, sd = centre[near], sd[near]
     observed = np.linspace(low, high, _OPTIMISM_POINTS)
     away = (observed - centre[:, np.newaxis]) / sd[:, np.newaxis]
-    above = ndtr(-away)
     density = np.exp(-0.5 * away**2) / np.sqrt(2.0 * np.pi) / sd[:, np.newaxis]
-    total = 0.0
-    for chosen in range(len(centre)):
-        others_above = np.prod(np.delete(above, chosen, axis=0), axis=0)
-        total += float(trapezoid((centre[chosen] - observed) * density[chosen] * others_above, observed))
-    return total
+    shifted = (centre[:, np.newaxis] - observed) * density * _products_of_others(ndtr(-away))
+    return float(trapezoid(shifted.sum(axis=0), observed))
+
+
+def _products_of_others(factors: Matrix) -> Matrix:
+    """Row i holds the product of all rows of `factors` but the i-th, both (n, k); no division, for some are 0."""
+    before, after = np.ones_like(factors), np.ones_like(factors)
+    np.cumprod(factors[:-1], axis=0, out=before[1:])
+    np.cumprod(factors[:0:-1], axis=0, out=after[-2::-1])
+    return before * after
 
 
 def drift_of(group: Group, scatter: Pooled) -> Drift | None:

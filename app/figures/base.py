@@ -82,7 +82,5 @@ def card_of(figure: Figure) -> Card:
 
 def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:
     """Traces and layout as Plotly's own JSON, every property checked. Raises ValueError on one that does not exist."""
-    figure = go.Figure(data=list(traces), layout=dict(layout))
-    figure.layout.template = None
-    json: PlotlyJson = figure.to_plotly_json()
-    return json
+    go.Figure(data=list(traces), layout=dict(layout))
+    return {"data": list(traces), "layout": dict(layout)}

@@ -5,6 +5,7 @@ from typing import ClassVar, Final
 
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.crowd import MANY
 from app.figures.history import FlightData, History, Range, last_number
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -52,7 +53,11 @@ class ErrorsFigure:
             *self._not_counted(palette, FOOT * span.high),
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
-        traces += [_off_scale(palette, scored[index], span.high, history.error_unit) for index in span.outside]
+        outside = [scored[index] for index in span.outside]
+        if self._is_crowded:
+            traces += _all_off_scale(palette, outside, span.high, history.error_unit)
+        else:
+            traces += [_off_scale(palette, flight, span.high, history.error_unit) for flight in outside]
         layout = theme.layout(
             palette,
             xaxis=theme.titled(
@@ -85,6 +90,7 @@ class ErrorsFigure:
         if not flights:
             return []
         colours = [palette.best if flight is best else palette.ink for flight in flights]
+        size = 4 if self._is_crowded else 8
         return [
             {
                 "type": "scatter",
@@ -96,13 +102,17 @@ class ErrorsFigure:
                 **self._error_bars(palette),
                 "marker": theme.solid(
                     colours,
-                    size=[13 if flight is best else 8 for flight in flights],
+                    size=[13 if flight is best else size for flight in flights],
                     symbol=["star" if flight is best else "circle" for flight in flights],
                 ),
                 "meta": {"role": "measured"},
                 "hovertemplate": f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
             }
         ]
+
+    @property
+    def _is_crowded(self) -> bool:
+        return len(self.history.flights) > MANY
 
     @property
     def _scatter(self) -> str:
@@ -112,7 +122,7 @@ class ErrorsFigure:
     def _error_bars(self, palette: Palette) -> dict[str, object]:
         """One standard error of a single flight, up and down."""
         noise = self.history.noise
-        if noise is None:
+        if noise is None or self._is_crowded:
             return {}
         bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
         return {"error_y": bar}
@@ -172,7 +182,8 @@ class ErrorsFigure:
         ]
 
     def _intervals(self, palette: Palette, top: float) -> list[dict[str, object]]:
-        """Where each flight's error was expected, and the next one's: a bar behind its diamond, cut at the edge."""
+        """Where each flight's error was expected, of many the next one's only: a bar behind its diamond, cut at the
+        edge."""
         known = self._expected()
         if not known:
             return []
@@ -197,7 +208,8 @@ class ErrorsFigure:
         ]
 
     def _expected(self) -> list[tuple[int, Range]]:
-        pairs = [(flight.number, flight.interval) for flight in self.history.flights]
+        flights = () if self._is_crowded else self.history.flights
+        pairs = [(flight.number, flight.interval) for flight in flights]
         if self.history.proposal is not None:
             pairs.append((self.history.proposal.number, self.history.proposal.interval))
         return [(number, interval) for number, interval in pairs if interval is not None]
@@ -274,7 +286,8 @@ class ErrorsFigure:
         ]
 
     def _predicted(self, palette: Palette) -> list[dict[str, object]]:
-        pairs = [(flight.number, flight.predicted_error) for flight in self.history.flights]
+        flights = () if self._is_crowded else self.history.flights
+        pairs = [(flight.number, flight.predicted_error) for flight in flights]
         if self.history.proposal is not None:
             pairs.append((self.history.proposal.number, self.history.proposal.predicted_error))
         known = [(number, round(value, 6)) for number, value in pairs if value is not None]
@@ -371,3 +384,23 @@ def _off_scale(palette: Palette, flight: FlightData, top: float, unit: str) -> d
         "meta": {"role": "off scale", "trial": flight.number},
         "hovertemplate": f"{text}<extra></extra>",
     }
+
+
+def _all_off_scale(palette: Palette, flights: list[FlightData], top: float, unit: str) -> list[dict[str, object]]:
+    """Many at once, without their errors in print."""
+    if not flights:
+        return []
+    return [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "Off the scale",
+            "x": [flight.number for flight in flights],
+            "y": [top] * len(flights),
+            "text": [f"{flight.error:.2f} {unit}" for flight in flights],
+            "marker": {"symbol": "triangle-up", "size": 8, "color": palette.bad},
+            "cliponaxis": False,
+            "meta": {"role": "off scale"},
+            "hovertemplate": "<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+        }
+    ]

@@ -6,6 +6,7 @@ from typing import ClassVar
 from app.core.policy import Gain
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
+from app.figures.crowd import MANY
 from app.figures.history import History, last_number
 from app.figures.theme import PALETTES, Palette, ThemeName
 
@@ -57,13 +58,14 @@ class GainsFigure:
         flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
         common = {"type": "scatter", "xaxis": _axis("x", index), "yaxis": _axis("y", index), "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
+        crowded = len(flights) > MANY
         flown: dict[str, object] = {
             **common,
-            "mode": "lines+markers",
+            "mode": "lines" if crowded else "lines+markers",
             "name": gain.title,
             "x": [flight.number for flight in flights],
             "y": [flight.gains[gain.name] for flight in flights],
-            "line": {**theme.line(colour, 2), "shape": "hv"},
+            "line": {**theme.line(colour, 1 if crowded else 2), "shape": "hv"},
             "marker": theme.solid(
                 colour,
                 size=[13 if flight is best else 7 for flight in flights],
@@ -72,10 +74,20 @@ class GainsFigure:
             "meta": {"role": "flown", "gain": gain.name},
             "hovertemplate": f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
         }
+        drawn = [flown]
+        if crowded:
+            del flown["marker"]
+        if crowded and best is not None:
+            star = {
+                "x": [best.number],
+                "y": [best.gains[gain.name]],
+                "marker": theme.solid(colour, size=13, symbol="star"),
+            }
+            drawn.append({**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}})
         if proposal is None:
-            return [flown]
+            return drawn
         return [
-            flown,
+            *drawn,
             {
                 **common,
                 "mode": "markers",

@@ -35,6 +35,11 @@ class Range:
     def __contains__(self, value: float) -> bool:
         return self.low <= value <= self.high
 
+    def slice_of(self, rising: Samples) -> tuple[int, int]:
+        """First index and end of the part of `rising`, shape (n,), that lies inside, one more on either side."""
+        first = max(0, int(np.searchsorted(rising, self.low, "left")) - 1)
+        return first, min(len(rising), int(np.searchsorted(rising, self.high, "right")) + 1)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightData:
@@ -97,6 +102,8 @@ class History:
 
     `stop_improvement`: the share of the best error by which a flight must beat it to count as progress, None when the
     stop rule does not ask. `flights` in the order of their numbers. `noise`: None while nothing is known of it.
+    `window`: the seconds looked at, which are drawn in more points; None for the whole. `chosen`: the number of
+    a flight that is drawn whatever it is like.
     """
 
     output_title: str
@@ -110,6 +117,8 @@ class History:
     stop_improvement: float | None = None
     noise: Noise | None = None
     curves_title: str = "Takeoff curves"
+    window: Range | None = None
+    chosen: int | None = None
 
     @property
     def valid(self) -> tuple[FlightData, ...]:

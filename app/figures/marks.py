@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
 from app.figures import theme
 from app.figures.history import Band, Curve, Range
 from app.figures.scale import thinned
@@ -13,7 +11,9 @@ from app.figures.theme import Palette
 GLITCH_POINTS: Final = 60
 
 
-def band_traces(palette: Palette, band: Band | None, points: int) -> list[dict[str, object]]:
+def band_traces(
+    palette: Palette, band: Band | None, points: int, window: Range | None = None
+) -> list[dict[str, object]]:
     """Between which curves a flight is expected: two traces (`meta` role band, edge lower and upper), none without."""
     if band is None:
         return []
@@ -25,7 +25,7 @@ def band_traces(palette: Palette, band: Band | None, points: int) -> list[dict[s
         "legendgroup": "band",
         "legendrank": 900,
     }
-    lower, upper = (thinned(curve.time_s, curve.values, points) for curve in (band.lower, band.upper))
+    lower, upper = (thinned(curve.time_s, curve.values, points, window) for curve in (band.lower, band.upper))
     return [
         {
             **quiet,
@@ -77,6 +77,5 @@ def glitch_traces(
 
 def _stretch(curve: Curve, part: Range) -> tuple[list[float], list[float]]:
     """A part of a curve, with the samples just before and after it, so that a gap shows too."""
-    first = max(0, int(np.searchsorted(curve.time_s, part.low, "left")) - 1)
-    last = int(np.searchsorted(curve.time_s, part.high, "right")) + 1
-    return thinned(curve.time_s[first:last], curve.values[first:last], GLITCH_POINTS)
+    first, end = part.slice_of(curve.time_s)
+    return thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from statistics import median_low
 
 import numpy as np
-from tsdownsample import MinMaxLTTBDownsampler
 
+from app.core.thinning import kept
 from app.core.trajectory import Samples
+from app.figures.history import Range
 
 MARGIN = 0.06
 
@@ -45,12 +46,16 @@ def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> tuple[
     return -down.high, up.high, tuple(sorted({*up.outside, *down.outside}))
 
 
-def thinned(time_s: Samples, values: Samples, points: int) -> tuple[list[float], list[float]]:
-    """At most `points` samples that keep the curve's look and its extremes (MinMaxLTTB), at 0.1 ms and 0.1 mm; a curve
-    that stays below 1 keeps a digit more."""
-    if len(time_s) > points:
-        downsampler = MinMaxLTTBDownsampler()  # type: ignore[no-untyped-call]
-        chosen = downsampler.downsample(np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
-        time_s, values = time_s[chosen], values[chosen]
+def thinned(
+    time_s: Samples, values: Samples, points: int, window: Range | None = None
+) -> tuple[list[float], list[float]]:
+    """At most `points` samples that keep the curve's look and its extremes, at 0.1 ms and 0.1 mm; a curve that stays
+    below 1 keeps a digit more. With a `window` of seconds as many again inside it, up to its edges and just past."""
+    chosen = kept(time_s, values, points)
+    if window is not None:
+        first, end = window.slice_of(time_s)
+        inside = first + kept(time_s[first:end], values[first:end], points).astype(np.int64)
+        chosen = np.concatenate([chosen[chosen < first], inside.astype(np.uint64), chosen[chosen >= end]])
+    time_s, values = time_s[chosen], values[chosen]
     digits = 4 if len(values) == 0 or float(np.abs(values).max()) >= 1.0 else 5
     return [round(float(t), 4) for t in time_s], [round(float(v), digits) for v in values]

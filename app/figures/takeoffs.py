@@ -5,6 +5,7 @@ from typing import ClassVar, Final
 
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.crowd import PERCENTILES, Envelope, apart, envelope_of, envelope_traces
 from app.figures.history import Curve, FlightData, History
 from app.figures.marks import band_traces, glitch_traces
 from app.figures.scale import robust_span, thinned
@@ -21,13 +22,15 @@ TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 1
 
 @dataclass(frozen=True, slots=True)
 class TakeoffsFigure:
-    """Table columns: `time_s`, `set_point`, `reference` (where known), `flight_N` for each flight with a record, and
-    `prediction` (where there is one) with `prediction_lower` and `prediction_upper` (where its band is known), at those
-    seconds of `TABLE_TIMES_S` that the experiment lasts.
+    """Table columns: `time_s`, `set_point`, `reference` (where known), `envelope_lower`, `envelope_middle` and
+    `envelope_upper` (of many flights), `flight_N` for each flight that is drawn by itself, and `prediction` (where
+    there is one) with `prediction_lower` and `prediction_upper` (where its band is known), at those seconds of
+    `TABLE_TIMES_S` that the experiment lasts.
 
-    Every trace carries `meta`: `role` (set point, reference, flight, legend, prediction, band, glitch, live, off scale)
-    and, for flights, `trial` and `standing` (best, latest, earlier, invalid). The `live` trace is empty: a page fills
-    it while it flies.
+    Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, band, glitch, live,
+    pointed, off scale) and, for flights, `trial` and `standing` (best, latest, earlier, invalid); a flight's `uid` is
+    `flight-` and its number. The traces `live` and `pointed` are empty: a page fills one while it flies, the other with
+    a flight that is pointed at and has no curve of its own.
     """
 
     history: History
@@ -43,14 +46,23 @@ class TakeoffsFigure:
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history
-        drawn = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
+        emphasised = apart(history, history.chosen)
+        recorded = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
+        drawn = [flight for flight in recorded if flight.number in emphasised]
+        envelope = envelope_of(recorded, self._lasts_s) if len(drawn) < len(recorded) else None
         points = max(60, min(CURVE_POINTS, ALL_POINTS // max(1, len(drawn))))
         band = None if history.proposal is None else history.proposal.band
-        traces = [*band_traces(palette, band, CURVE_POINTS), self._set_point(palette), *self._reference(palette)]
+        traces = [
+            *envelope_traces(palette, envelope, history.output_unit),
+            *band_traces(palette, band, CURVE_POINTS, history.window),
+            self._set_point(palette),
+            *self._reference(palette),
+        ]
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
         for flight in drawn:
             traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
-        traces += [*self._legend(palette, drawn), *self._prediction(palette), self._live(palette)]
+        traces += [*self._legend(palette, drawn), *self._prediction(palette)]
+        traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
         low, high, outside = self._span(drawn)
         traces += [_off_scale(palette, drawn[index], low, high) for index in outside if index < len(drawn)]
         unit = history.output_unit
@@ -66,12 +78,15 @@ class TakeoffsFigure:
             state="ready",
             summary=self._summary(sum(index < len(drawn) for index in outside)),
             figure=plotly_json(traces, layout),
-            table=self._table(drawn),
+            table=self._table(drawn, envelope),
         )
 
+    @property
+    def _lasts_s(self) -> float:
+        return float(self.history.set_point.time_s[-1])
+
     def _time_range(self) -> list[float]:
-        end = float(self.history.set_point.time_s[-1])
-        return [-0.01 * end, end]
+        return [-0.01 * self._lasts_s, self._lasts_s]
 
     def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
         """From the ground to above the set point; where the set point is zero, as far as the first flight strays."""
@@ -105,10 +120,11 @@ class TakeoffsFigure:
             "invalid": f"{flight.number} · {flight.outcome}",
         }[standing]
         error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.history.error_unit}"
-        return _trace(
+        return self._trace(
             f"Flight {label}",
             flight.curve,
             points,
+            uid=f"flight-{flight.number}",
             line=_style(palette, standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
@@ -139,7 +155,7 @@ class TakeoffsFigure:
         ]
 
     def _set_point(self, palette: Palette) -> dict[str, object]:
-        return _trace(
+        return self._trace(
             "Set point",
             self.history.set_point,
             CURVE_POINTS,
@@ -153,7 +169,7 @@ class TakeoffsFigure:
         if self.history.reference is None:
             return []
         return [
-            _trace(
+            self._trace(
                 "Reference",
                 self.history.reference,
                 CURVE_POINTS,
@@ -170,7 +186,7 @@ class TakeoffsFigure:
             return []
         text = f"Flight {proposal.number}, predicted"
         return [
-            _trace(
+            self._trace(
                 "Predicted",
                 proposal.curve,
                 CURVE_POINTS,
@@ -181,21 +197,26 @@ class TakeoffsFigure:
             )
         ]
 
-    def _live(self, palette: Palette) -> dict[str, object]:
+    def _empty(self, palette: Palette, role: str, name: str) -> dict[str, object]:
+        """A curve that the page fills."""
         return {
             "type": "scatter",
             "mode": "lines",
-            "name": "Flying now",
+            "name": name,
             "x": [],
             "y": [],
             "showlegend": False,
             "line": theme.line(palette.ink, 3.5),
-            "meta": {"role": "live"},
+            "meta": {"role": role},
+            "uid": role,
             "legendrank": 1,
             "cliponaxis": True,
-            "hovertemplate": f"<b>Flying now</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}"
-            "<extra></extra>",
+            "hovertemplate": f"<b>{name}</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}<extra></extra>",
         }
+
+    def _trace(self, name: str, curve: Curve, points: int, **style: object) -> dict[str, object]:
+        x, y = thinned(curve.time_s, curve.values, points, self.history.window)
+        return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, **style}
 
     def _summary(self, outside: int) -> str:
         history = self.history
@@ -210,11 +231,17 @@ class TakeoffsFigure:
         noun = "flight" if len(history.flights) == 1 else "flights"
         return f"{history.output_title} over time: {len(history.flights)} {noun}.{best}{off}"
 
-    def _table(self, drawn: list[FlightData]) -> Table:
+    def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
         history, unit = self.history, self.history.output_unit
         named: list[tuple[Column, Curve]] = [(Column("set_point", "Set point", unit, 3), history.set_point)]
         if history.reference is not None:
             named.append((Column("reference", "Reference", unit, 3), history.reference))
+        if envelope is not None:
+            curves = (envelope.band.lower, envelope.median, envelope.band.upper)
+            named += [
+                (Column(f"envelope_{edge}", f"{percent:.0f} % of {envelope.flights} flights lay below", unit, 3), curve)
+                for edge, percent, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
+            ]
         named += [
             (Column(f"flight_{flight.number}", f"Flight {flight.number}", unit, 3), flight.curve)
             for flight in drawn
@@ -244,11 +271,6 @@ def _style(palette: Palette, standing: str) -> dict[str, object]:
         "earlier": theme.line(palette.earlier, 1.25),
         "invalid": theme.line(palette.bad, 1.25, "dot"),
     }[standing]
-
-
-def _trace(name: str, curve: Curve, points: int, **style: object) -> dict[str, object]:
-    x, y = thinned(curve.time_s, curve.values, points)
-    return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, **style}
 
 
 def _off_scale(palette: Palette, flight: FlightData, low: float, high: float) -> dict[str, object]:

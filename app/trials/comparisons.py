@@ -1,28 +1,63 @@
 """A flight's gains against the best before it and against the first ones, with the scatter of repeats allowed for."""
 
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
 from typing import Final, Literal
 
 from app.core.confirming import Standing
-from app.core.statistics import Group, compare
+from app.core.policy import Gains
+from app.core.statistics import Group, Pooled, compare
 from app.db.models import TrialRow
 from app.trials.schemas import TrialComparison
 
 CONFIDENCE: Final = 0.9
 
 
-def comparisons(row: TrialRow, scored: Sequence[tuple[int, float]], now: Standing | None) -> list[TrialComparison]:
+class Field:
+    """The valid flights that a campaign's trials are held against, each found without a search however many there are.
+
+    `scored` holds their numbers and errors, in their order.
+    """
+
+    def __init__(self, scored: Sequence[tuple[int, float]], now: Standing | None) -> None:
+        groups = () if now is None else now.groups
+        self._numbers = [number for number, _ in scored]
+        self._best_so_far = list(accumulate(((error, number) for number, error in scored), min))
+        self._by_number: Mapping[int, Group] = {number: group for group in groups for number in group.numbers}
+        self._by_gains: Mapping[object, Group] = {_key(group.gains): group for group in groups}
+        self.scatter: Final[Pooled | None] = None if now is None else now.scatter
+
+    def best_before(self, number: int) -> tuple[float, int] | None:
+        """Error and number of the best flight before that one."""
+        before = bisect_left(self._numbers, number)
+        return self._best_so_far[before - 1] if before else None
+
+    def first_before(self, number: int) -> int | None:
+        """The first flight, where it was before that one."""
+        return self._numbers[0] if self._numbers and self._numbers[0] < number else None
+
+    def group_of(self, number: int) -> Group | None:
+        """All flights with the gains of that flight."""
+        return self._by_number.get(number)
+
+    def group_with(self, gains: Gains) -> Group | None:
+        """All flights of those gains."""
+        return self._by_gains.get(_key(gains))
+
+
+def comparisons(row: TrialRow, field: Field) -> list[TrialComparison]:
     """Against the best flight before it, then against the first; without those of the same gains. Each side counts with
-    all its flights. `scored` holds number and error of every valid trial."""
-    own = None if now is None else _group_of(now, row.number)
-    if now is None or own is None:
+    all its flights."""
+    own = field.group_of(row.number)
+    if own is None or field.scatter is None:
         return []
     found = []
-    for against, number in _others(row, scored):
-        other = _group_of(now, number)
+    for against, number in _others(row, field):
+        other = field.group_of(number)
         if other is None or other.gains == own.gains:
             continue
-        said = compare(own, other, now.scatter, CONFIDENCE)
+        said = compare(own, other, field.scatter, CONFIDENCE)
         found.append(
             TrialComparison(
                 against=against,
@@ -36,17 +71,14 @@ def comparisons(row: TrialRow, scored: Sequence[tuple[int, float]], now: Standin
     return found
 
 
-def _others(
-    row: TrialRow, scored: Sequence[tuple[int, float]]
-) -> Iterator[tuple[Literal["best before", "first"], int]]:
-    before = [(error, number) for number, error in scored if number < row.number]
-    if not before:
+def _others(row: TrialRow, field: Field) -> Iterator[tuple[Literal["best before", "first"], int]]:
+    best, first = field.best_before(row.number), field.first_before(row.number)
+    if best is None or first is None:
         return
-    best, first = min(before)[1], min(number for _, number in before)
-    yield "best before", best
-    if first != best:
+    yield "best before", best[1]
+    if first != best[1]:
         yield "first", first
 
 
-def _group_of(now: Standing, number: int) -> Group | None:
-    return next((group for group in now.groups if number in group.numbers), None)
+def _key(gains: Gains) -> object:
+    return tuple(sorted(gains.items()))

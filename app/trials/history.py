@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
@@ -30,8 +30,13 @@ BEST_ERROR: Final = repository.BEST_ERROR
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
-    """The trials of one or more campaigns, by campaign and number, without their samples."""
+    """The trials of one or more campaigns, by campaign and number, with the checksums of their records."""
     return repository.of_campaigns(session, campaign_ids)
+
+
+def curves_of(session: Session, trials: Sequence[TrialRow]) -> Mapping[int, list[list[float]]]:
+    """The coarse curves of those of the trials that have one, as [time_s, value] pairs by trial."""
+    return repository.curves(session, [row.id for row in trials])
 
 
 def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:

@@ -27,13 +27,23 @@ def get_one(session: Session, trial_id: int) -> TrialRow:
 
 
 def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[TrialRow]:
-    """Their trials in the order of their numbers, with what describes their records, without the samples."""
+    """Their trials in the order of their numbers, with the checksums of their records. What is large and seldom wanted
+    of all of them (the gate's word, curves, settings, the records' descriptions) is read when it is asked for."""
     return session.scalars(
         select(TrialRow)
         .where(TrialRow.campaign_id.in_(campaign_ids))
-        .options(joinedload(TrialRow.trajectory))
+        .options(
+            joinedload(TrialRow.trajectory).load_only(TrajectoryRow.checksum),
+            *(defer(column) for column in (TrialRow.gate, TrialRow.curve, TrialRow.settings, TrialRow.read_back)),
+        )
         .order_by(TrialRow.campaign_id, TrialRow.number)
     ).all()
+
+
+def curves(session: Session, trial_ids: Collection[int]) -> Mapping[int, list[list[float]]]:
+    """The coarse curves of those trials that have one, by trial."""
+    wanted = select(TrialRow.id, TrialRow.curve).where(TrialRow.id.in_(trial_ids), TrialRow.curve.is_not(None))
+    return {identity: curve for identity, curve in session.execute(wanted) if curve}
 
 
 def page(session: Session, campaign_id: int, *, after_number: int, limit: int) -> tuple[Sequence[TrialRow], int]:

@@ -3,16 +3,12 @@
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-from tsdownsample import MinMaxLTTBDownsampler
-
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
-from app.core.trajectory import Samples, Trajectory
+from app.core.thinning import kept
+from app.core.trajectory import Trajectory
 
 CURVE_POINTS: Final = 48
-_DOWNSAMPLER: Final = MinMaxLTTBDownsampler()  # type: ignore[no-untyped-call]  # the library has no types
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,16 +33,6 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
     )
 
 
-def thinned(time_s: Samples, values: Samples, points: int) -> NDArray[np.uint64]:
-    """Indices of at most `points` samples that keep the peaks of `values`, shape (k,)."""
-    if len(time_s) <= points:
-        return np.arange(len(time_s), dtype=np.uint64)
-    indices: NDArray[np.uint64] = _DOWNSAMPLER.downsample(
-        np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points
-    )
-    return indices
-
-
 def _overshoot(experiment: Experiment, trajectory: Trajectory) -> float | None:
     """How far the output went beyond its last set point; zero when it stayed below. None without samples, and where the
     set point is zero: there is nothing to rise to."""
@@ -65,6 +51,5 @@ def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:
     flown = trajectory.time_s >= 0.0
     time_s, values = trajectory.time_s[flown], trajectory[experiment.output][flown]
     return [
-        [round(float(time_s[index]), 3), round(float(values[index]), 4)]
-        for index in thinned(time_s, values, CURVE_POINTS)
+        [round(float(time_s[index]), 3), round(float(values[index]), 4)] for index in kept(time_s, values, CURVE_POINTS)
     ]

@@ -11,7 +11,7 @@ from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, la
 
 def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
     card = TakeoffsFigure(history(proposal=proposal(1))).compute()
-    assert [one["meta"]["role"] for one in traces(card)] == ["set point", "reference", "prediction", "live"]
+    assert [one["meta"]["role"] for one in traces(card)] == ["set point", "reference", "prediction", "live", "pointed"]
     assert set(trace(card, "set point")["y"]) == {3.0}
     assert trace(card, "live")["x"] == []
 
