@@ -2,9 +2,11 @@ import { ActionIcon } from "@mantine/core";
 import { IconChartLine, IconTable } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
 import type { FigureCard } from "../api/types";
+import type { Topic } from "../lib/explanations";
 import type { PlotlyFigure } from "../lib/traces";
 import { Chart } from "./Chart";
 import { DataTable } from "./DataTable";
+import { Help } from "./Help";
 import { Panel } from "./Panel";
 import classes from "./Panel.module.css";
 import { Trouble } from "./Trouble";
@@ -19,11 +21,24 @@ interface Props {
   liveTrial?: number | null;
   onChoose?: (trial: number) => void;
   tools?: ReactNode;
+  /** What a newcomer asks of it. */
+  topic?: Topic;
   className?: string | undefined;
 }
 
 /** One figure with its table one tap away; says so when there is nothing to draw yet or drawing failed. */
-export function FigurePanel({ title, card, error, height, dressed, liveTrial, onChoose, tools, className }: Props) {
+export function FigurePanel({
+  title,
+  card,
+  error,
+  height,
+  dressed,
+  liveTrial,
+  onChoose,
+  tools,
+  topic,
+  className,
+}: Props) {
   const [asTable, setAsTable] = useState(false);
   const raw = card?.figure;
   const figure = useMemo(() => {
@@ -35,7 +50,11 @@ export function FigurePanel({ title, card, error, height, dressed, liveTrial, on
   const other = asTable ? `${title}: show the chart` : `${title}: show the numbers as a table`;
   return (
     <Panel
-      title={title}
+      title={
+        <>
+          {title} {topic && <Help topic={topic} />}
+        </>
+      }
       className={className}
       tools={
         <>

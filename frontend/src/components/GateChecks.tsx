@@ -31,12 +31,7 @@ export function GateChecks({ gate }: { gate: Gate }) {
         </ul>
         <p className={classes["gateNote"]}>
           Judged before every flight, whoever chose the gains.
-          <Help question="How are gains checked?">
-            <p>
-              Exactly, where a product in the autopilot's 32-bit numbers could wrap; and in flights of the model over
-              the spread of what is not known about the vehicle, aborted at any instant too.
-            </p>
-          </Help>
+          <Help topic="gate" />
         </p>
       </div>
     </details>

@@ -18,12 +18,7 @@ export function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
     <div className={classes["glitches"]}>
       <h3>
         The record has {glitches.length === 1 ? "a glitch" : `${glitches.length} glitches`}
-        <Help question="What is a glitch?">
-          <p>
-            A stretch that no flight can have had: too fast a change, the same value again and again, nothing at all. It
-            is marked on the curve; the stored record is never altered.
-          </p>
-        </Help>
+        <Help topic="glitch" />
       </h3>
       <ul>
         {glitches.map(({ kind, start_s, end_s, sentence }) => (

@@ -1,17 +1,13 @@
 import { UnstyledButton } from "@mantine/core";
 import { IconHelpCircle } from "@tabler/icons-react";
-import { type ReactNode, useId, useState } from "react";
+import { useId, useState } from "react";
 import { createPortal } from "react-dom";
+import { EXPLANATIONS, type Topic } from "../lib/explanations";
 import classes from "./Help.module.css";
 
-interface Props {
-  /** The question that the tap answers: "What is the interval?" */
-  question: string;
-  children: ReactNode;
-}
-
 /** An explanation on demand; a finger's width to hit, a letter's width to look at. */
-export function Help({ question, children }: Props) {
+export function Help({ topic }: { topic: Topic }) {
+  const { question, answer } = EXPLANATIONS[topic];
   const id = useId();
   const [open, setOpen] = useState(false);
   return (
@@ -38,7 +34,7 @@ export function Help({ question, children }: Props) {
             if (event.newState === "open") event.currentTarget.focus();
           }}
         >
-          {open && children}
+          {open && answer.map((said) => <p key={said}>{said}</p>)}
         </div>,
         document.body,
       )}

@@ -20,25 +20,18 @@ export function Predicted({ proposal, best, unit }: Props) {
     <div className={`${classes["predicted"]} numbers`}>
       <span>
         Predicted
-        <IntervalHelp />
+        <Help topic="predicted" />
       </span>
       <span>
         <strong>{withUnit(error, unit)}</strong>
-        {interval && <small>{intervalText(interval, unit)}</small>}
+        {interval && (
+          <small>
+            {intervalText(interval, unit)}
+            <Help topic="interval" />
+          </small>
+        )}
         {change !== null && <small>{against(change, "the best")}</small>}
       </span>
     </div>
-  );
-}
-
-export function IntervalHelp() {
-  return (
-    <Help question="What is the interval?">
-      <p>
-        Of ten flights, nine should end inside it. It counts how much flights with the same gains scatter, and how well
-        the model is known.
-      </p>
-      <p>A flight outside teaches more than one inside: the model is off, or something happened to the vehicle.</p>
-    </Help>
   );
 }

@@ -40,7 +40,11 @@ function Said(all: CampaignStatistics) {
       </div>
       <Groups {...all} />
       <ul className={classes["notes"]}>
-        {drift && <li>{drift.sentence}</li>}
+        {drift && (
+          <li>
+            {drift.sentence} <Help topic="drift" />
+          </li>
+        )}
         {trends.map(({ against, sentence }) => (
           <li key={against}>{sentence}</li>
         ))}
@@ -70,12 +74,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
     <div className={classes["fact"]} data-verdict={verdict}>
       <h3>
         Best against the first
-        <Help question="When is a difference real?">
-          <p>
-            Two flights with the same gains differ too. Better or worse is said only when chance alone would hardly do
-            it; the best of many is judged more strictly, because the luckiest of many looks good.
-          </p>
-        </Help>
+        <Help topic="difference" />
       </h3>
       <p className={classes["big"]}>
         {VERDICTS[verdict]}
@@ -108,12 +107,7 @@ function Scatter({
     <div className={classes["fact"]}>
       <h3>
         Scatter of one flight
-        <Help question="Where does the scatter come from?">
-          <p>
-            The standard deviation of the error from flight to flight with the same gains. Before anything is repeated
-            it is what such flights are known for; every repeat counts from then on.
-          </p>
-        </Help>
+        <Help topic="scatter" />
       </h3>
       <p className={`${classes["big"]} numbers`}>
         {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
@@ -138,12 +132,7 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
     <div className={classes["fact"]} data-verdict={record.trustworthy ? undefined : "worse"}>
       <h3>
         Predictions kept
-        <Help question="What is counted here?">
-          <p>
-            How many flights ended inside the 90 % interval that was predicted for them, and how many changed the error
-            in the direction that was predicted.
-          </p>
-        </Help>
+        <Help topic="record" />
       </h3>
       <p className={`${classes["big"]} numbers`}>
         {record.of === 0 ? "None tested yet" : `${record.inside} of ${record.of}`}
@@ -170,7 +159,9 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
           <tr>
             <th scope="col">[{names.join(" ")}]</th>
             <th scope="col">Flights</th>
-            <th scope="col">Mean error ± standard error</th>
+            <th scope="col">
+              Mean error ± standard error <Help topic="standardError" />
+            </th>
             <th scope="col">Standing</th>
           </tr>
         </thead>

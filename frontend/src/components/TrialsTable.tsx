@@ -4,6 +4,7 @@ import { gainText, NOTHING, withUnit } from "../lib/format";
 import { trialWords, wasFlown } from "../lib/states";
 import { rangeText } from "../lib/uncertainty";
 import { sentenceOf } from "../lib/verdict";
+import { Help } from "./Help";
 import { Kept, Marks } from "./Marks";
 import { StateBadge } from "./StateBadge";
 import classes from "./TrialsTable.module.css";
@@ -33,8 +34,12 @@ export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) 
                 {name} {titles[name] && <small>{titles[name]}</small>}
               </th>
             ))}
-            <th scope="col">Error</th>
-            <th scope="col">Predicted</th>
+            <th scope="col">
+              Error <Help topic="error" />
+            </th>
+            <th scope="col">
+              Predicted <Help topic="interval" />
+            </th>
             <th scope="col" className={classes["text"]}>
               State
             </th>

@@ -4,6 +4,7 @@ import type { ReactNode } from "react";
 import { Link } from "react-router";
 import { recordCsv, useCampaign, useStatistics } from "../api/queries";
 import type { Trial } from "../api/types";
+import type { Topic } from "../lib/explanations";
 import { percentChange, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { intervalText, plusMinus } from "../lib/uncertainty";
@@ -13,6 +14,7 @@ import { Comparisons } from "./Comparisons";
 import { FlightNotes } from "./FlightNotes";
 import { GainList } from "./GainList";
 import { Glitches } from "./Glitches";
+import { Help } from "./Help";
 import { Kept, Marks } from "./Marks";
 import { Panel } from "./Panel";
 import { Promote } from "./Promote";
@@ -45,10 +47,19 @@ function Change({ error, other, unit }: { error: number | null; other: number | 
   );
 }
 
-function Fact({ title, wide = false, children }: { title: string; wide?: boolean; children: ReactNode }) {
+interface FactProps {
+  title: string;
+  topic?: Topic;
+  wide?: boolean;
+  children: ReactNode;
+}
+
+function Fact({ title, topic, wide = false, children }: FactProps) {
   return (
     <div className={wide ? classes["wide"] : undefined}>
-      <dt>{title}</dt>
+      <dt>
+        {title} {topic && <Help topic={topic} />}
+      </dt>
       <dd>{children}</dd>
     </div>
   );
@@ -86,10 +97,10 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </p>
       )}
       <dl className={`${classes["figures"]} numbers`}>
-        <Fact title="Error">
+        <Fact title="Error" topic="error">
           {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± scatter of one flight)</small> : null}
         </Fact>
-        <Fact title="Predicted">
+        <Fact title="Predicted" topic="predicted">
           {withUnit(trial.predicted_error, unit)}{" "}
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <Kept trial={trial} />
@@ -99,11 +110,15 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {!asked && <Change error={trial.error} other={bestBefore?.error} unit={unit} />}
         </Fact>
         {group !== undefined && group.errors.length > 1 && (
-          <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`}>
+          <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`} topic="standardError">
             {plusMinus(group.mean, group.standard_error, unit)} <small>(± standard error)</small>
           </Fact>
         )}
-        {trial.overshoot_m !== null && <Fact title="Overshoot">{withUnit(trial.overshoot_m, "m", 2)}</Fact>}
+        {trial.overshoot_m !== null && (
+          <Fact title="Overshoot" topic="overshoot">
+            {withUnit(trial.overshoot_m, "m", 2)}
+          </Fact>
+        )}
         <Fact title="Gains" wide>
           <span className={classes["gains"]}>
             <GainList gains={trial.gains} experiment={experiment} />

@@ -19,7 +19,9 @@ export function Why({ explanation, unit, gains }: Props) {
       <details className={classes["more"]}>
         <summary>Why these gains</summary>
         <div className={classes["stack"]}>
-          <span>{explanation.summary}</span>
+          <span>
+            {explanation.summary} <Help topic="bias" />
+          </span>
           {lesson && (
             <span>
               <strong>What it will teach:</strong> {lesson}
@@ -28,12 +30,7 @@ export function Why({ explanation, unit, gains }: Props) {
           {trust !== null && (
             <span className="numbers">
               Trusted region: {percent(trust)} of each gain's range
-              <Help question="What is the trusted region?">
-                <p>
-                  How far a step may go from the best gains flown. It grows when predictions hold, and shrinks when a
-                  flight disagrees or is aborted.
-                </p>
-              </Help>
+              <Help topic="trustRegion" />
             </span>
           )}
           {clipped.length > 0 && <span>Stopped by a limit: {clipped.join(", ")}.</span>}
@@ -56,7 +53,9 @@ function withOwnUnit(text: string, unit: string): string {
 function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   return (
     <table className={classes["ladder"]}>
-      <caption>The vehicle as the flights have it (± standard error)</caption>
+      <caption>
+        The vehicle as the flights have it (± standard error) <Help topic="fitted" />
+      </caption>
       {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
         <tbody key={name}>
           <tr>
@@ -88,7 +87,7 @@ function Tried({ explanation, unit, gains }: Props) {
         {slopes.length > 0 && (
           <span className="numbers">
             Gradient of the error: {slopes.map(([name, value]) => `${name} ${value.toPrecision(2)}`).join(", ")} {unit}{" "}
-            per unit of the gain.
+            per unit of the gain. <Help topic="gradient" />
           </span>
         )}
         {ladder.length > 0 && (

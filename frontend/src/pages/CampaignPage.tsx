@@ -80,6 +80,7 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
             card={takeoffs.data}
             error={takeoffs.error}
             height={440}
+            topic="curves"
             dressed={useDressed(chosen, span)}
             liveTrial={campaign.flying?.trial_id ?? null}
             onChoose={choose}
@@ -120,6 +121,7 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
           card={errors.data}
           error={errors.error}
           height={lower}
+          topic="threshold"
           onChoose={choose}
         />
         <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={lower} />

@@ -27,20 +27,22 @@ export function SettingsPage() {
         <h1 className={work["title"]}>Settings</h1>
       </div>
       <div className={classes["columns"]}>
-        <Panel title="This browser">
-          <ThisBrowser />
-        </Panel>
+        <div className={classes["column"]}>
+          <Panel title="This browser">
+            <ThisBrowser />
+          </Panel>
+          {system.data && <About system={system.data} />}
+        </div>
         {system.data === undefined ? (
           <div>
             <Trouble error={system.error} />
             {system.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
           </div>
         ) : (
-          <>
+          <div className={classes["column"]}>
             <Tablet system={system.data} />
-            <About system={system.data} />
             <Backup system={system.data} />
-          </>
+          </div>
         )}
       </div>
     </>

@@ -1,15 +1,21 @@
+import type { Topic } from "../../lib/explanations";
+import { Help } from "../Help";
+
 interface Props {
   title: string;
   value: string;
+  topic?: Topic;
   bad?: boolean;
   stale?: boolean;
 }
 
 /** One reading with its name; grey is what is no longer so. */
-export function Fact({ title, value, bad = false, stale = false }: Props) {
+export function Fact({ title, value, topic, bad = false, stale = false }: Props) {
   return (
     <div data-bad={bad || undefined} data-stale={stale || undefined}>
-      <dt>{title}</dt>
+      <dt>
+        {title} {topic && <Help topic={topic} />}
+      </dt>
       <dd>{value}</dd>
     </div>
   );

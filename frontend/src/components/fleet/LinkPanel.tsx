@@ -24,7 +24,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
       <div className={classes["stack"]}>
         {isLinked ? (
           <dl className={`${classes["facts"]} numbers`}>
-            <Fact title="Last heard" value={linkText(status)} bad={stale} />
+            <Fact title="Last heard" topic="linkAge" value={linkText(status)} bad={stale} />
             <Fact title="Doing" value={said === undefined ? NOTHING : stepWord(said.step)} stale={stale} />
             <Fact title="Motors" value={armedText(said?.armed)} stale={stale} />
             <Fact title="Mode" value={said?.mode || NOTHING} stale={stale} />

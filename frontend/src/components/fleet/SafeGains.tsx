@@ -9,6 +9,7 @@ import type { Entry as Value } from "../../lib/newCampaign";
 import { problemOf, reasonsByField } from "../../lib/problems";
 import { useVehicleStatus } from "../../live/store";
 import { Entry } from "../Entry";
+import { Help } from "../Help";
 import { Panel } from "../Panel";
 import { Time } from "../Time";
 import { Trouble } from "../Trouble";
@@ -41,7 +42,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
                 Holds
               </th>
               <th scope="col" data-number>
-                Safe
+                Safe <Help topic="safeGains" />
               </th>
             </tr>
           </thead>

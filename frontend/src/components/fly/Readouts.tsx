@@ -1,9 +1,11 @@
 import type { Trial } from "../../api/types";
+import type { Topic } from "../../lib/explanations";
 import { isSaturated, secondsLeft } from "../../lib/flyScreen";
 import { withUnit } from "../../lib/format";
 import { type LiveFlight, readingOf } from "../../lib/live";
 import { percent } from "../../lib/uncertainty";
 import { type Aged, ageText, linkText } from "../../lib/vehicle";
+import { Help } from "../Help";
 import classes from "./Fly.module.css";
 
 interface Props {
@@ -20,15 +22,18 @@ interface Props {
 interface ReadingProps {
   title: string;
   value: string;
+  topic?: Topic;
   size?: "huge" | "large" | "usual";
   stale?: boolean;
   bad?: boolean;
 }
 
-function Reading({ title, value, size = "usual", stale = false, bad = false }: ReadingProps) {
+function Reading({ title, value, topic, size = "usual", stale = false, bad = false }: ReadingProps) {
   return (
     <div className={classes["reading"]} data-size={size} data-stale={stale || undefined} data-bad={bad || undefined}>
-      <dt>{title}</dt>
+      <dt>
+        {title} {topic && <Help topic={topic} />}
+      </dt>
       <dd>{value}</dd>
     </div>
   );
@@ -40,7 +45,7 @@ function LinkReading({ status }: { status: Aged | null }) {
     return <Reading title="Link" value={linkText(status)} bad />;
   }
   const title = status.isCurrent ? "Link age" : "Silent for";
-  return <Reading title={title} value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
+  return <Reading title={title} topic="linkAge" value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
 }
 
 /** What can be read from arm's length: altitude and error so far, then the rest. Grey is what is no longer so. */
@@ -62,11 +67,20 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
           size="huge"
           stale={stale}
         />
-        <Reading title={`${errorTitle}${predicted}`} value={withUnit(error, unit)} size="large" />
+        <Reading
+          title={`${errorTitle}${predicted}`}
+          topic={isFlying ? "errorSoFar" : "error"}
+          value={withUnit(error, unit)}
+          size="large"
+        />
       </div>
       <div className={classes["row"]}>
         {live !== null && live.thrust !== null && (
-          <Reading title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"} value={percent(live.thrust)} />
+          <Reading
+            title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"}
+            topic="thrust"
+            value={percent(live.thrust)}
+          />
         )}
         <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
         {hasLink && <LinkReading status={status} />}
