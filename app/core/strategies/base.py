@@ -5,11 +5,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment, FittedParameter, ModelledExperiment
+from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment
 from app.core.options import Option
-from app.core.policy import PolicySpace
+from app.core.policy import PolicySpace, Vector
 from app.core.spread import Spread
 from app.core.trajectory import Trajectory
+
+ErrorsOf = Callable[[Matrix], Vector]
+"""Gains (k, g) → the errors that a model predicts for them, (k,)."""
 
 Kind = Literal["start", "step", "shorter step", "repeat", "baseline", "manual", "none"]
 
@@ -82,6 +85,8 @@ class Proposal:
 class Strategy:
     """A registered strategy: `propose(definition, experiment, space, flights)`, with at least one valid flight.
 
+    `foresee(definition, experiment, flights)` is the model that its proposals' errors come from, for many gain sets.
+
     `experiments` names those it works with; empty: with all. `learns`: whether its predictions are corrected by the
     flight that its explanation names as the base. `needs_model`: whether it finds gains by flying them on a model.
     """
@@ -91,6 +96,7 @@ class Strategy:
     line: str
     options: tuple[Option, ...]
     propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
+    foresee: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
     experiments: tuple[str, ...] = ()
     learns: bool = True
     needs_model: bool = True

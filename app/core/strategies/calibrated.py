@@ -6,6 +6,7 @@ What the gate would refuse is not proposed: such a step is halved until it passe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -15,8 +16,8 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import PolicySpace, Vector
-from app.core.strategies.base import Explanation, Kind, Proposal, Strategy
-from app.core.strategies.foretelling import Foretold, foretell
+from app.core.strategies.base import ErrorsOf, Explanation, Kind, Proposal, Strategy
+from app.core.strategies.foretelling import Foretold, foresee_errors, foretell
 from app.core.strategies.hedging import Box, best_in, merit
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.passing import may_fly
@@ -81,6 +82,13 @@ def propose(
         interval=foretold.interval,
         spread=calibration.spread(),
     )
+
+
+def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors that the calibrated model foretells. At least one flight must be valid."""
+    calibration = calibrate(experiment, flights)
+    base = best_flight([flight for flight in flights if flight.number in calibration.numbers])
+    return partial(foresee_errors, calibration, base)
 
 
 def _choose(
@@ -174,5 +182,6 @@ CALIBRATED: Final = Strategy(
     line="Fits the model to all flights and flies its optimum, hedged over what is left open: about two flights.",
     options=(),
     propose=propose,
+    foresee=foresee,
     experiments=("takeoff",),
 )

@@ -22,6 +22,8 @@ from app.core.trajectory import Samples, Trajectory
 CONFIDENCE: Final = 0.9
 
 _MODELS: Final = 16
+_AT_ONCE: Final = 8
+"""Gain sets that are flown together: their curves are held in memory."""
 _MISFIT: Final = 0.02
 """Share of the error that even the best simple model is off."""
 _WEATHER: Final = 0.5
@@ -66,20 +68,37 @@ def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
     )
 
 
+def foresee_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vector:
+    """The errors that `foretell` gives to many gain sets, a few at a time: (c, n) → (c,)."""
+    experiment = calibration.experiment
+    models = calibration.plausible(runs=_MODELS, next_flight=True)
+    errors = np.empty(len(gains))
+    for first in range(0, len(gains), _AT_ONCE):
+        some = gains[first : first + _AT_ONCE]
+        clean = experiment.outputs(np.repeat(some, _MODELS, axis=0), np.tile(models, (len(some), 1)))
+        beyond = np.repeat(remaining_biases(calibration, base, some), _MODELS, axis=0)
+        errors[first : first + len(some)] = experiment.errors(clean + beyond).reshape(-1, _MODELS).mean(axis=1)
+    return errors
+
+
 def remaining_bias(calibration: Calibration, base: Flight, gains: Vector) -> Samples:
-    """What the flight is expected to do beyond the calibrated model, on the grid."""
+    """What a flight of `gains`, shape (n,), is expected to do beyond the calibrated model, on the grid."""
+    return np.asarray(remaining_biases(calibration, base, gains[np.newaxis])[0])
+
+
+def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> Matrix:
+    """The same for many gain sets: (c, n) → (c, samples)."""
     experiment = calibration.experiment
     flown = experiment.space.vector(base.gains)
     own = calibration.own_models[calibration.numbers.index(base.number)]
     disturbances = experiment.disturbances(base.trajectory.as_stored(), flown, own)
     if disturbances is None:
-        return calibration.residual * _closeness(experiment, gains, flown)
+        return np.stack([calibration.residual * _closeness(experiment, some, flown) for some in gains])
     calm = np.zeros_like(disturbances)
     calm[:, ENTERED] = disturbances[:, ENTERED]
-    disturbed, undisturbed = (
-        experiment.disturbed_outputs(gains[np.newaxis], own, acting)[0] for acting in (disturbances, calm)
-    )
-    return np.asarray(disturbed - undisturbed)
+    disturbed, undisturbed = (experiment.disturbed_outputs(gains, own, acting) for acting in (disturbances, calm))
+    beyond: Matrix = disturbed - undisturbed
+    return beyond
 
 
 def _closeness(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:

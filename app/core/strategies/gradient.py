@@ -17,7 +17,7 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment
 from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
-from app.core.strategies.base import Explanation, LadderStep, Proposal, Strategy
+from app.core.strategies.base import ErrorsOf, Explanation, LadderStep, Proposal, Strategy
 from app.core.strategies.bias import CorrectedModel, corrected_by, corrected_inside_by
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.line_search import Line, try_lengths
@@ -101,6 +101,11 @@ def propose(
         explanation=explanation,
         spread=spread,
     )
+
+
+def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors of the model, corrected by the best flight. At least one flight must be valid."""
+    return _corrected(definition, experiment, best_flight(flights))[0].errors
 
 
 def _first_to_fly(
@@ -197,4 +202,5 @@ GRADIENT: Final = Strategy(
         ),
     ),
     propose=propose,
+    foresee=foresee,
 )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from app.core.options import Option
 from app.core.plants.pitch import STEP_S
 from app.core.policy import PolicySpace, Vector
 from app.core.spread import Spread
-from app.core.strategies.base import Explanation, Interval, Proposal, Strategy, band_channels
+from app.core.strategies.base import ErrorsOf, Explanation, Interval, Proposal, Strategy, band_channels
 from app.core.strategies.bias import nominal
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.simplex import Optimum, model_optimum
@@ -42,7 +43,7 @@ def propose(
     be valid."""
     assert isinstance(experiment, PitchTracking)  # a definition with another experiment is refused
     base = best_flight(flights)
-    fit: Fit = "map" if definition.options.get("fit", "map") == "map" else "least-squares"
+    fit = _fit_of(definition)
     found = identify(experiment, flights, fit)
     if found is None:
         return _nothing_to_fit(experiment, space, base)
@@ -64,6 +65,20 @@ def propose(
         interval=interval,
         explanation=_explanation(experiment, found, fit, base, optimum, space, error, stays=stays),
     )
+
+
+def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors of the model identified from all flights, of the nominal one where none recorded what that takes."""
+    assert isinstance(experiment, PitchTracking)
+    found = identify(experiment, flights, _fit_of(definition))
+    if found is None:
+        return nominal(experiment).errors
+    aircraft = experiment.informed(found.model, np.sqrt(np.diag(found.covariance)))
+    return partial(_expected_errors, aircraft, found)
+
+
+def _fit_of(definition: Definition) -> Fit:
+    return "map" if definition.options.get("fit", "map") == "map" else "least-squares"
 
 
 def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vector, base: Vector) -> Optimum:
@@ -96,8 +111,11 @@ def _restarted(aircraft: PitchTracking, space: PolicySpace, start: Vector) -> Op
 
 def _expected_error(aircraft: PitchTracking, found: Identified, gains: Vector) -> float:
     """What the flight is expected to be scored: the model's error, with the noise of the recorded pitch in it."""
-    outputs = aircraft.outputs(gains[np.newaxis], found.model)
-    return float(aircraft.errors(_folded(outputs, found.pitch_noise_rad))[0])
+    return float(_expected_errors(aircraft, found, gains[np.newaxis])[0])
+
+
+def _expected_errors(aircraft: PitchTracking, found: Identified, gains: Matrix) -> Vector:
+    return aircraft.errors(_folded(aircraft.outputs(gains, found.model), found.pitch_noise_rad))
 
 
 def _folded(outputs: Matrix, noise: float) -> Matrix:
@@ -197,5 +215,6 @@ IDENTIFIED: Final = Strategy(
         ),
     ),
     propose=propose,
+    foresee=foresee,
     experiments=("pitch-tracking",),
 )

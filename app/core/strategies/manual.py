@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from app.core.definition import Definition, Flight
-from app.core.experiments.base import Experiment
+from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.policy import PolicySpace
-from app.core.strategies.base import Explanation, Proposal, Strategy
+from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
 from app.core.strategies.bias import corrected_by
 from app.core.strategies.history import best_flight, describe
 
@@ -31,11 +31,17 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
     )
 
 
+def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors of the model, corrected by the best flight. At least one flight must be valid."""
+    return corrected_by(experiment, best_flight(flights)).errors
+
+
 MANUAL: Final = Strategy(
     name="manual",
     title="By hand",
     line="You choose every gain set; bounds and step limits are checked as for any other.",
     options=(),
     propose=propose,
+    foresee=foresee,
     needs_model=False,
 )

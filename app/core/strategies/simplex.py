@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeResult, minimize
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment, SimplexSearch
 from app.core.policy import PolicySpace, Vector
-from app.core.strategies.base import Explanation, Proposal, Strategy
+from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
 from app.core.strategies.bias import nominal
 from app.core.strategies.history import best_flight, describe, was_flown
 
@@ -104,11 +104,17 @@ def propose(
     )
 
 
+def foresee(_definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors of the nominal model, which no flight changes."""
+    return nominal(experiment).errors
+
+
 SIMPLEX: Final = Strategy(
     name="simplex",
     title="Simplex on the model",
     line="Nelder–Mead on the nominal model alone, then that one set is flown.",
     options=(),
     propose=propose,
+    foresee=foresee,
     learns=False,
 )
