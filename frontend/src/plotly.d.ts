@@ -7,7 +7,12 @@ declare module "plotly.js-cartesian-dist-min" {
       layout: Record<string, unknown>,
       traces: number[],
     ): Promise<unknown>;
+    downloadImage(figure: unknown, options: Record<string, unknown>): Promise<string>;
     purge(element: HTMLElement): void;
+    Fx: {
+      hover(element: HTMLElement, points: { curveNumber: number; pointNumber: number }[], subplots?: string[]): void;
+      unhover(element: HTMLElement): void;
+    };
     Plots: { resize(element: HTMLElement): Promise<unknown> };
   }
   const plotly: Plotly;

@@ -1,6 +1,8 @@
 /** Everything that pages read. Keys are what `lib/events.ts` makes doubtful. */
 
-import { keepPreviousData, useInfiniteQuery, useQuery } from "@tanstack/react-query";
+import { keepPreviousData, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useCallback } from "react";
+import type { Seconds } from "../lib/traces";
 import { answer } from "./client";
 import {
   type CampaignState,
@@ -10,6 +12,7 @@ import {
   getFlightFigure,
   getProposal,
   getStatistics,
+  getTrajectory,
   getTrial,
   listCampaigns,
   listTrials,
@@ -93,12 +96,45 @@ export function useTrial(trialId: number) {
   return useQuery({ queryKey: ["trial", trialId], queryFn: () => answer(getTrial({ path: { trial_id: trialId } })) });
 }
 
-export function useCampaignFigure(campaignId: number, name: FigureName, theme: Theme) {
+/** What of a figure is looked at: these seconds, in more detail, and that flight's own curve among many. */
+export interface FigureView {
+  window: Seconds | null;
+  flight: number | null;
+}
+
+export function useCampaignFigure(campaignId: number, name: FigureName, theme: Theme, view: FigureView | null = null) {
+  const { window = null, flight = null } = view ?? {};
+  const query = {
+    theme,
+    ...(window && { from_s: window[0], to_s: window[1] }),
+    ...(flight !== null && { flight }),
+  };
   return useQuery({
-    queryKey: ["campaign", campaignId, "figure", name, theme],
-    queryFn: () => answer(getCampaignFigure({ path: { campaign_id: campaignId, name }, query: { theme } })),
+    queryKey: ["campaign", campaignId, "figure", name, query],
+    queryFn: () => answer(getCampaignFigure({ path: { campaign_id: campaignId, name }, query })),
     placeholderData: keepPreviousData,
   });
+}
+
+const POINTS = 300;
+
+/** The scored output of a flight in few points; null where it left no record. */
+export function useCurveOf(trials: readonly Trial[], experiment: string) {
+  const client = useQueryClient();
+  const output = useCatalogue().data?.experiments.find(({ name }) => name === experiment)?.output ?? "";
+  return useCallback(
+    async (flight: number) => {
+      const trial = trials.find(({ number, record }) => number === flight && record !== null);
+      if (trial === undefined) return null;
+      const record = await client.fetchQuery({
+        queryKey: ["trial", trial.id, "record", POINTS],
+        queryFn: () => answer(getTrajectory({ path: { trial_id: trial.id }, query: { points: POINTS } })),
+        staleTime: Infinity,
+      });
+      return { x: record.time_s, y: record.channels[output] ?? [] };
+    },
+    [client, trials, output],
+  );
 }
 
 export function useFlightFigure(trialId: number, theme: Theme) {

@@ -1,13 +1,8 @@
 import { useEffect, useRef, useState } from "react";
-import { clickedTrial, narrowed, type PlotlyFigure, traceWithRole, withLive } from "../lib/traces";
+import { narrowed, type PlotlyFigure, type Seconds, traceWithRole, withLive } from "../lib/traces";
 import { liveNow } from "../live/store";
 import classes from "./Chart.module.css";
-import { CONFIG, drawLive, loadPlotly } from "./plotly";
-
-interface PlotlyElement extends HTMLDivElement {
-  on?(event: "plotly_click", listener: (event: { points: { curveNumber: number }[] }) => void): void;
-  removeAllListeners?(event: string): void;
-}
+import { CONFIG, type CurveOf, drawLive, followPointing, listen, loadPlotly, type PlotlyElement } from "./plotly";
 
 interface Props {
   figure: PlotlyFigure;
@@ -16,7 +11,10 @@ interface Props {
   /** In pixels; null fills what holds it. */
   height: number | null;
   liveTrial?: number | null;
-  onChoose?: (trial: number) => void;
+  onChoose?: ((trial: number) => void) | undefined;
+  /** The seconds that a zoom leaves in sight, null for all. */
+  onWindow?: ((window: Seconds | null) => void) | undefined;
+  curveOf?: CurveOf | undefined;
 }
 
 const NARROW_PX = 420;
@@ -28,8 +26,13 @@ function layoutFor({ data, layout }: PlotlyFigure, width: number): Record<string
   return { ...fitting, autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
 }
 
-export function Chart({ figure, label, height, liveTrial = null, onChoose }: Props) {
-  const element = useRef<PlotlyElement>(null);
+function wholeOf({ layout }: PlotlyFigure): Seconds | null {
+  const { xaxis } = layout as { xaxis?: { range?: Seconds } };
+  return xaxis?.range ?? null;
+}
+
+export function Chart({ figure, label, height, liveTrial = null, onChoose, onWindow, curveOf }: Props) {
+  const element = useRef<HTMLDivElement & PlotlyElement>(null);
   const [drawn, setDrawn] = useState(false);
   const [broken, setBroken] = useState<string | null>(null);
   const queue = useRef<Promise<unknown>>(Promise.resolve());
@@ -48,11 +51,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
           layoutFor(figure, target.clientWidth),
           CONFIG,
         );
-        target.removeAllListeners?.("plotly_click");
-        target.on?.("plotly_click", ({ points }) => {
-          const trial = clickedTrial(figure.data, points[0]?.curveNumber ?? -1);
-          if (trial !== null) onChoose?.(trial);
-        });
+        listen(target, figure.data, { whole: wholeOf(figure), onChoose, onWindow });
         setDrawn(true);
         setBroken(null);
       } catch (error) {
@@ -62,7 +61,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
     return () => {
       wanted = false;
     };
-  }, [figure, liveTrial, onChoose]);
+  }, [figure, liveTrial, onChoose, onWindow]);
 
   useEffect(() => {
     const target = element.current;
@@ -70,6 +69,12 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose }: Pro
     if (target === null || !drawn || liveTrial === null || trace < 0) return;
     return drawLive(target, trace, liveTrial);
   }, [drawn, liveTrial, figure]);
+
+  useEffect(() => {
+    const target = element.current;
+    if (target === null || !drawn) return;
+    return followPointing(target, figure.data, curveOf);
+  }, [drawn, figure, curveOf]);
 
   useEffect(() => {
     const target = element.current;

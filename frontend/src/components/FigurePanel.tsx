@@ -3,12 +3,13 @@ import { IconChartLine, IconTable } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
 import type { FigureCard } from "../api/types";
 import type { Topic } from "../lib/explanations";
-import type { PlotlyFigure } from "../lib/traces";
+import type { PlotlyFigure, Seconds } from "../lib/traces";
 import { Chart } from "./Chart";
 import { DataTable } from "./DataTable";
 import { Help } from "./Help";
 import { Panel } from "./Panel";
 import classes from "./Panel.module.css";
+import type { CurveOf } from "./plotly";
 import { Trouble } from "./Trouble";
 
 interface Props {
@@ -20,6 +21,8 @@ interface Props {
   dressed?: (figure: PlotlyFigure) => PlotlyFigure;
   liveTrial?: number | null;
   onChoose?: (trial: number) => void;
+  onWindow?: (window: Seconds | null) => void;
+  curveOf?: CurveOf;
   tools?: ReactNode;
   /** What a newcomer asks of it. */
   topic?: Topic;
@@ -35,6 +38,8 @@ export function FigurePanel({
   dressed,
   liveTrial,
   onChoose,
+  onWindow,
+  curveOf,
   tools,
   topic,
   className,
@@ -83,7 +88,9 @@ export function FigurePanel({
           label={`${title}. ${card?.summary ?? ""}`}
           height={height}
           liveTrial={liveTrial ?? null}
-          {...(onChoose === undefined ? {} : { onChoose })}
+          onChoose={onChoose}
+          onWindow={onWindow}
+          curveOf={curveOf}
         />
       )}
     </Panel>

@@ -1,6 +1,10 @@
+import { Button } from "@mantine/core";
 import { IconStarFilled } from "@tabler/icons-react";
+import { useEffect, useRef, useState } from "react";
 import type { Campaign, Trial } from "../api/types";
 import { gainText, NOTHING, withUnit } from "../lib/format";
+import { onPointed, pointAt } from "../lib/pointing";
+import { lastRows, MORE_ROWS, ROWS } from "../lib/rows";
 import { trialWords, wasFlown } from "../lib/states";
 import { rangeText } from "../lib/uncertainty";
 import { sentenceOf } from "../lib/verdict";
@@ -18,10 +22,28 @@ interface Props {
   onChoose: (trialNumber: number) => void;
 }
 
+function flightOf(target: EventTarget): number | null {
+  const row = target instanceof Element ? target.closest<HTMLElement>("[data-flight]") : null;
+  return row === null ? null : Number(row.dataset["flight"]);
+}
+
 /** The campaign's flights like the paper's Table 1: gains, error, prediction, and what came of each. */
 export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) {
   const names = Object.keys(trials[0]?.gains ?? {});
   const titles = useGainTitles(campaign.definition.experiment ?? "");
+  const [count, setCount] = useState(ROWS);
+  const body = useRef<HTMLTableSectionElement>(null);
+  const best = campaign.best?.trial_id;
+  const listed = lastRows(trials, count, ({ id, number }) => id === best || number === shown);
+  const hidden = Math.max(0, trials.length - count);
+  useEffect(
+    () =>
+      onPointed((flight) => {
+        body.current?.querySelector("[data-pointed]")?.removeAttribute("data-pointed");
+        body.current?.querySelector(`[data-flight="${flight}"]`)?.setAttribute("data-pointed", "");
+      }),
+    [],
+  );
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
     <section className={`${classes["scroll"]} sideways`} aria-label="All flights" tabIndex={0}>
@@ -48,21 +70,41 @@ export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) 
             </th>
           </tr>
         </thead>
-        <tbody>
-          {trials.map((trial) => {
-            const best = trial.id === campaign.best?.trial_id;
+        <tbody
+          ref={body}
+          onPointerOver={({ target }) => pointAt(flightOf(target))}
+          onPointerLeave={() => pointAt(null)}
+          onFocus={({ target }) => pointAt(flightOf(target))}
+          onBlur={() => pointAt(null)}
+        >
+          {hidden > 0 && (
+            <tr>
+              <td colSpan={names.length + 5} className={classes["text"]}>
+                <Button variant="default" onClick={() => setCount(count + MORE_ROWS)}>
+                  Show {Math.min(MORE_ROWS, hidden)} earlier flights ({hidden} are not listed)
+                </Button>
+              </td>
+            </tr>
+          )}
+          {listed.map((trial) => {
+            const isBest = trial.id === best;
             return (
-              <tr key={trial.id} data-best={best || undefined} data-shown={trial.number === shown || undefined}>
+              <tr
+                key={trial.id}
+                data-flight={trial.number}
+                data-best={isBest || undefined}
+                data-shown={trial.number === shown || undefined}
+              >
                 <th scope="row">
                   {wasFlown(trial.state) ? (
                     <button
                       type="button"
                       aria-pressed={trial.number === shown}
-                      aria-label={`Flight ${trial.number}${best ? ", best" : ""}`}
+                      aria-label={`Flight ${trial.number}${isBest ? ", best" : ""}`}
                       onClick={() => onChoose(trial.number)}
                     >
                       {trial.number}
-                      {best && <IconStarFilled size={15} aria-hidden />}
+                      {isBest && <IconStarFilled size={15} aria-hidden />}
                     </button>
                   ) : (
                     <span>{trial.number}</span>

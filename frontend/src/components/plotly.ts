@@ -3,7 +3,8 @@
 import type Plotly from "plotly.js-cartesian-dist-min";
 import type { LiveFlight } from "../lib/live";
 import { paced } from "../lib/pace";
-import { roomFor } from "../lib/traces";
+import { onPointed, pointAt } from "../lib/pointing";
+import { flightAt, marksOver, roomFor, type Seconds, type Trace, traceWithRole, windowFrom } from "../lib/traces";
 import { onLive } from "../live/store";
 
 let loading: Promise<typeof Plotly> | undefined;
@@ -32,8 +33,96 @@ export const CONFIG = {
 
 const SHORTEST_REDRAW_MS = 90;
 
-interface PlotlyElement extends HTMLElement {
+interface Point {
+  curveNumber: number;
+  x: unknown;
+}
+
+export interface PlotlyElement extends HTMLElement {
   layout?: { yaxis?: { range?: [number, number] } };
+  on?(event: "plotly_click" | "plotly_hover", listener: (event: { points: Point[] }) => void): void;
+  on?(event: "plotly_unhover", listener: () => void): void;
+  on?(event: "plotly_relayout", listener: (event: Record<string, unknown>) => void): void;
+  removeAllListeners?(event: string): void;
+}
+
+/** Where a flight without a curve of its own finds one. */
+export type CurveOf = (flight: number) => Promise<{ x: number[]; y: number[] } | null>;
+
+export interface Listeners {
+  /** The seconds that a figure shows before anybody zooms. */
+  whole: Seconds | null;
+  onChoose?: ((flight: number) => void) | undefined;
+  onWindow?: ((window: Seconds | null) => void) | undefined;
+}
+
+const SETTLED_MS = 250;
+
+/** Tell which flight is pointed at and clicked, and, once a zoom has settled, which seconds are looked at. */
+export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, onChoose, onWindow }: Listeners): void {
+  for (const event of ["click", "hover", "unhover", "relayout"]) chart.removeAllListeners?.(`plotly_${event}`);
+  const flightOf = ([point]: Point[]) => (point ? flightAt(traces, point.curveNumber, point.x) : null);
+  chart.on?.("plotly_click", ({ points }) => {
+    const flight = flightOf(points);
+    if (flight !== null) onChoose?.(flight);
+  });
+  chart.on?.("plotly_hover", ({ points }) => chart.matches(":hover") && pointAt(flightOf(points)));
+  chart.on?.("plotly_unhover", () => chart.matches(":hover") && pointAt(null));
+  let settling: ReturnType<typeof setTimeout> | undefined;
+  chart.on?.("plotly_relayout", (event) => {
+    const seconds = whole && onWindow ? windowFrom(event, whole) : undefined;
+    if (seconds === undefined) return;
+    clearTimeout(settling);
+    settling = setTimeout(() => onWindow?.(seconds), SETTLED_MS);
+  });
+}
+
+const DWELL_MS = 150;
+
+/** Let a flight that is pointed at elsewhere stand out: its curve by style alone, its marks by their labels. */
+export function followPointing(chart: PlotlyElement, traces: readonly Trace[], curveOf?: CurveOf): () => void {
+  const spare = traceWithRole(traces, "pointed");
+  let dwelling: ReturnType<typeof setTimeout> | undefined;
+  let wanted: number | null = null;
+  let lent = false;
+
+  async function lend(flight: number | null): Promise<void> {
+    const curve = flight === null ? null : await curveOf?.(flight);
+    if (wanted !== flight || (!curve && !lent)) return;
+    lent = Boolean(curve);
+    chart.toggleAttribute("data-pointing", lent);
+    const change = { x: [curve?.x ?? []], y: [curve?.y ?? []], name: `Flight ${flight}` };
+    await (await loadPlotly()).update(chart, change, {}, [spare]);
+  }
+
+  const unfollow = onPointed((flight) => {
+    wanted = flight;
+    clearTimeout(dwelling);
+    for (const group of chart.querySelectorAll("[data-pointed]")) group.removeAttribute("data-pointed");
+    const group = flight === null ? null : chart.querySelector(`.scatterlayer .traceflight-${flight}`);
+    group?.setAttribute("data-pointed", "");
+    chart.toggleAttribute("data-pointing", group !== null);
+    if (spare >= 0 && (lent || (flight !== null && group === null))) {
+      dwelling = setTimeout(() => void lend(group === null ? flight : null), DWELL_MS);
+    }
+    if (!chart.matches(":hover")) void label(flight === null ? [] : marksOver(traces, flight));
+  });
+
+  async function label(marks: { curveNumber: number; pointNumber: number }[]): Promise<void> {
+    if (spare >= 0) return;
+    const { Fx } = await loadPlotly();
+    if (marks.length === 0) return Fx.unhover(chart);
+    const subplots = marks.map(({ curveNumber }) => {
+      const { xaxis, yaxis } = traces[curveNumber] ?? {};
+      return `${xaxis ?? "x"}${yaxis ?? "y"}`;
+    });
+    Fx.hover(chart, marks, subplots);
+  }
+
+  return () => {
+    unfollow();
+    clearTimeout(dwelling);
+  };
 }
 
 /** Grow the chart's live trace as telemetry of a trial comes; returns the function that ends it. */

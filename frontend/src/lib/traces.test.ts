@@ -1,11 +1,13 @@
 import { expect, test } from "vitest";
 import { begun } from "./live";
 import {
-  clickedTrial,
+  flightAt,
+  marksOver,
   narrowed,
   roomFor,
   type Trace,
   traceWithRole,
+  windowFrom,
   withChosen,
   withLive,
   withTimeRange,
@@ -38,10 +40,14 @@ test("choosing a flight that is not drawn changes nothing", () => {
   expect(withChosen(traces, null)).toEqual(traces);
 });
 
-test("a click on a flight's curve names the flight, a click on the set point nothing", () => {
-  expect(clickedTrial(traces, 2)).toBe(2);
-  expect(clickedTrial(traces, 0)).toBeNull();
-  expect(clickedTrial(traces, 99)).toBeNull();
+test("a point of a flight's curve or a mark over its number names the flight, the set point nothing", () => {
+  const marks: Trace[] = [{ meta: { role: "measured" }, x: [1, 2, 4], y: [0.3, 0.2, 0.1] }];
+  expect(flightAt(traces, 2, 0.5)).toBe(2);
+  expect(flightAt(traces, 0, 0.5)).toBeNull();
+  expect(flightAt(traces, 99, 0.5)).toBeNull();
+  expect(flightAt(marks, 0, 4)).toBe(4);
+  expect(marksOver(marks, 4)).toEqual([{ curveNumber: 0, pointNumber: 2 }]);
+  expect(marksOver(marks, 3)).toEqual([]);
   expect(traceWithRole(traces, "live")).toBe(3);
 });
 
@@ -66,4 +72,11 @@ test("the time axis can be cut without losing the rest of the layout", () => {
     yaxis: layout.yaxis,
   });
   expect(withTimeRange(layout, null)).toBe(layout);
+});
+
+test("a zoom says which seconds are looked at, and the way back that it is all of them", () => {
+  expect(windowFrom({ "xaxis.range[0]": 2, "xaxis.range[1]": 4 }, [0, 32])).toEqual([2, 4]);
+  expect(windowFrom({ "xaxis.range": [2, 4] }, [0, 32])).toEqual([2, 4]);
+  expect(windowFrom({ "xaxis.range[0]": 0, "xaxis.range[1]": 32 }, [0, 32])).toBeNull();
+  expect(windowFrom({ "yaxis.range[0]": 0 }, [0, 32])).toBeUndefined();
 });

@@ -50,10 +50,36 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
   });
 }
 
-/** The flight whose curve was clicked, from Plotly's event. */
-export function clickedTrial(traces: readonly Trace[], curveNumber: number): number | null {
+/** Roles of marks that stand over the number of their flight. */
+const NUMBERED = new Set(["measured", "not counted", "flown", "off scale", "best", "predicted"]);
+
+/** The flight that a point of a chart belongs to, from Plotly's event; the prediction's flight is none yet. */
+export function flightAt(traces: readonly Trace[], curveNumber: number, x: unknown): number | null {
   const meta = traces[curveNumber]?.meta;
-  return meta?.role === "flight" || meta?.role === "off scale" ? (meta.trial ?? null) : null;
+  if (meta?.role === "flight" || meta?.role === "glitch") return meta.trial ?? null;
+  if (meta?.role === undefined || !NUMBERED.has(meta.role)) return null;
+  return meta.trial ?? (typeof x === "number" ? x : null);
+}
+
+/** The points that stand over a flight's number: one for each trace of marks that has it. */
+export function marksOver(traces: readonly Trace[], flight: number): { curveNumber: number; pointNumber: number }[] {
+  return traces.flatMap((trace, curveNumber) => {
+    const role = trace.meta?.role;
+    if (role !== "measured" && role !== "flown" && role !== "not counted") return [];
+    const pointNumber = trace.x?.indexOf(flight) ?? -1;
+    return pointNumber < 0 ? [] : [{ curveNumber, pointNumber }];
+  });
+}
+
+export type Seconds = readonly [number, number];
+
+/** The part of the time axis that is looked at, from Plotly's event: null for all of it, undefined for no change. */
+export function windowFrom(event: Record<string, unknown>, whole: Seconds): Seconds | null | undefined {
+  if (event["xaxis.autorange"] === true) return null;
+  const range = event["xaxis.range"];
+  const [from, to] = Array.isArray(range) ? range : [event["xaxis.range[0]"], event["xaxis.range[1]"]];
+  if (typeof from !== "number" || typeof to !== "number") return undefined;
+  return from <= whole[0] && to >= whole[1] ? null : [from, to];
 }
 
 const LETTER_PX = 5.8;

@@ -1,7 +1,7 @@
-import { SegmentedControl, Skeleton, useComputedColorScheme } from "@mantine/core";
-import { useCallback, useState } from "react";
-import { useParams } from "react-router";
-import { useCampaign, useCampaignFigure, useProposal, useTrials } from "../api/queries";
+import { Anchor, SegmentedControl, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { useCallback, useEffect, useState } from "react";
+import { Link, useParams } from "react-router";
+import { useCampaign, useCampaignFigure, useCurveOf, useProposal, useTrials } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
 import { CampaignHeader } from "../components/CampaignHeader";
 import { FigurePanel } from "../components/FigurePanel";
@@ -14,7 +14,8 @@ import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import { useUnits } from "../components/useUnits";
 import { VerdictPanel } from "../components/VerdictPanel";
-import { type PlotlyFigure, withChosen, withTimeRange } from "../lib/traces";
+import { pointAt } from "../lib/pointing";
+import { type PlotlyFigure, type Seconds, withChosen, withTimeRange } from "../lib/traces";
 import { shownTrial } from "../lib/verdict";
 import classes from "./CampaignPage.module.css";
 import { NotFoundPage } from "./NotFoundPage";
@@ -28,9 +29,10 @@ function CampaignById({ campaignId }: { campaignId: number }) {
   const campaign = useCampaign(campaignId);
   const trials = useTrials(campaignId);
   useTitle(campaign.data?.name ?? "Campaign");
-  const error = campaign.error ?? trials.error;
-  if (campaign.data && trials.data) return <CampaignView campaign={campaign.data} trials={trials.data} />;
-  if (error) return <Missing error={error} />;
+  if (campaign.data) {
+    return <CampaignView campaign={campaign.data} trials={trials.data ?? null} trouble={trials.error} />;
+  }
+  if (campaign.error) return <Missing error={campaign.error} />;
   return (
     <div aria-busy="true" className={classes["columns"]}>
       <Skeleton height={480} radius="md" />
@@ -43,6 +45,9 @@ function CampaignById({ campaignId }: { campaignId: number }) {
 const LOWER_PX = 300;
 const PANEL_PX = 84;
 const FIRST_SECONDS = [-0.3, 8] as const;
+const NONE: readonly Trial[] = [];
+/** Of more flights the server gives an envelope, and a flight's own curve when it is asked for. */
+const EACH_DRAWN = 30;
 
 function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure) => PlotlyFigure {
   return useCallback(
@@ -54,19 +59,33 @@ function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure)
   );
 }
 
-function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readonly Trial[] }) {
+interface View {
+  campaign: Campaign;
+  /** Null while they are read: of a thousand flights the charts need not wait for them. */
+  trials: readonly Trial[] | null;
+  trouble: unknown;
+}
+
+function CampaignView({ campaign, trials: read, trouble }: View) {
+  const trials = read ?? NONE;
   const theme = useComputedColorScheme("light");
   const [chosen, setChosen] = useState<number | null>(null);
   const [span, setSpan] = useState("whole");
+  const [zoom, setZoom] = useState<Seconds | null>(null);
   const next = useProposal(campaign.id);
-  const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme);
+  const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme, {
+    window: zoom ?? (span === "first" ? FIRST_SECONDS : null),
+    flight: campaign.trials.flown > EACH_DRAWN ? chosen : null,
+  });
   const errors = useCampaignFigure(campaign.id, "errors", theme);
   const gains = useCampaignFigure(campaign.id, "gains", theme);
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
-  const lower = Math.max(LOWER_PX, PANEL_PX * Object.keys(trials[0]?.gains ?? {}).length);
+  const curveOf = useCurveOf(trials, experiment);
+  const lower = Math.max(LOWER_PX, PANEL_PX * ((gains.data?.table?.columns.length ?? 1) - 1));
   const shown = shownTrial(trials, chosen);
   const choose = useCallback((number: number) => setChosen((before) => (before === number ? null : number)), []);
+  useEffect(() => () => pointAt(null), []);
   return (
     <>
       <p className="visually-hidden" role="status">
@@ -84,12 +103,17 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
             dressed={useDressed(chosen, span)}
             liveTrial={campaign.flying?.trial_id ?? null}
             onChoose={choose}
+            onWindow={setZoom}
+            curveOf={curveOf}
             tools={
               <SegmentedControl
                 aria-label="Time shown"
                 size="sm"
                 value={span}
-                onChange={setSpan}
+                onChange={(value) => {
+                  setSpan(value);
+                  setZoom(null);
+                }}
                 data={[
                   { value: "first", label: "First 8 s" },
                   { value: "whole", label: "Whole flight" },
@@ -108,10 +132,11 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
           )}
         </div>
         <div className={classes["next"]}>
-          {next.data ? (
+          {read === null && trouble === null && <Skeleton height={480} radius="md" />}
+          {next.data && read !== null ? (
             <NextFlightCard campaign={campaign} next={next.data} trials={trials} onChoose={setChosen} />
           ) : (
-            <Trouble error={next.error} />
+            <Trouble error={next.error ?? trouble} />
           )}
         </div>
       </div>
@@ -124,13 +149,23 @@ function CampaignView({ campaign, trials }: { campaign: Campaign; trials: readon
           topic="threshold"
           onChoose={choose}
         />
-        <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={lower} />
+        <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={lower} onChoose={choose} />
       </div>
-      <div className={classes["row"]}>
-        <StatisticsPanel campaignId={campaign.id} />
-      </div>
-      <Panel title="All flights" className={classes["row"]}>
-        {trials.length === 0 ? (
+      <div className={classes["row"]}>{read !== null && <StatisticsPanel campaignId={campaign.id} />}</div>
+      <Panel
+        title="All flights"
+        className={classes["row"]}
+        tools={
+          trials.length > 0 && (
+            <Anchor component={Link} to={`/compare?campaign=${campaign.id}`} py={12}>
+              Compare flights
+            </Anchor>
+          )
+        }
+      >
+        {read === null ? (
+          <Skeleton height={320} radius="md" />
+        ) : trials.length === 0 ? (
           <p className={classes["none"]}>
             Nothing has flown yet. The first flight will stand here with its gains and error.
           </p>

@@ -2,7 +2,7 @@
 
 import { type Client, type ClientMeta, formDataBodySerializer, type Options as Options2, type RequestResult, type ServerSentEventsResult, type TDataShape } from './client';
 import { client } from './client.gen';
-import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetAddressCodeData, GetAddressCodeErrors, GetAddressCodeResponses, GetBackupData, GetBackupErrors, GetBackupResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetSystemData, GetSystemErrors, GetSystemResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, PromoteBestData, PromoteBestErrors, PromoteBestResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, RehearseCampaignData, RehearseCampaignErrors, RehearseCampaignResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
+import type { AbortTrialData, AbortTrialErrors, AbortTrialResponses, AddPhotoData, AddPhotoErrors, AddPhotoResponses, ArchiveCampaignData, ArchiveCampaignErrors, ArchiveCampaignResponses, BringInBundleData, BringInBundleErrors, BringInBundleResponses, CancelJobData, CancelJobErrors, CancelJobResponses, CancelTrialData, CancelTrialErrors, CancelTrialResponses, CheckControllerData, CheckControllerErrors, CheckControllerResponses, CheckExampleControllerData, CheckExampleControllerErrors, CheckExampleControllerResponses, CheckVehicleData, CheckVehicleErrors, CheckVehicleResponses, ClassifyTrialData, ClassifyTrialErrors, ClassifyTrialResponses, CloneCampaignData, CloneCampaignErrors, CloneCampaignResponses, CompareFlightsData, CompareFlightsErrors, CompareFlightsResponses, ComputeProposalData, ComputeProposalErrors, ComputeProposalResponses, ConnectVehicleData, ConnectVehicleErrors, ConnectVehicleResponses, CreateCampaignData, CreateCampaignErrors, CreateCampaignResponses, CreateTrialData, CreateTrialErrors, CreateTrialResponses, DeleteCampaignData, DeleteCampaignErrors, DeleteCampaignResponses, DeleteControllerCheckData, DeleteControllerCheckErrors, DeleteControllerCheckResponses, DeletePhotoData, DeletePhotoErrors, DeletePhotoResponses, DisconnectVehicleData, DisconnectVehicleErrors, DisconnectVehicleResponses, EditCampaignData, EditCampaignErrors, EditCampaignResponses, EditTrialData, EditTrialErrors, EditTrialResponses, EditVehicleData, EditVehicleErrors, EditVehicleResponses, EventsData, EventsErrors, EventsResponses, FinishCampaignData, FinishCampaignErrors, FinishCampaignResponses, FlyTrialData, FlyTrialErrors, FlyTrialResponses, GetAddressCodeData, GetAddressCodeErrors, GetAddressCodeResponses, GetBackupData, GetBackupErrors, GetBackupResponses, GetBundleData, GetBundleErrors, GetBundleResponses, GetCampaignData, GetCampaignErrors, GetCampaignFigureData, GetCampaignFigureErrors, GetCampaignFigureResponses, GetCampaignResponses, GetCatalogueData, GetCatalogueErrors, GetCatalogueResponses, GetComparisonCsvData, GetComparisonCsvErrors, GetComparisonCsvResponses, GetComparisonFigureData, GetComparisonFigureErrors, GetComparisonFigureResponses, GetControllerCheckData, GetControllerCheckErrors, GetControllerCheckFigureData, GetControllerCheckFigureErrors, GetControllerCheckFigureResponses, GetControllerCheckResponses, GetFlightFigureData, GetFlightFigureErrors, GetFlightFigureResponses, GetHealthData, GetHealthErrors, GetHealthResponses, GetJobData, GetJobErrors, GetJobLogData, GetJobLogErrors, GetJobLogResponses, GetJobResponses, GetPhotoData, GetPhotoErrors, GetPhotoResponses, GetProposalData, GetProposalErrors, GetProposalResponses, GetReportAsPdfData, GetReportAsPdfErrors, GetReportAsPdfResponses, GetReportData, GetReportErrors, GetReportResponses, GetReproductionData, GetReproductionErrors, GetReproductionFigureData, GetReproductionFigureErrors, GetReproductionFigureResponses, GetReproductionResponses, GetStatisticsData, GetStatisticsErrors, GetStatisticsResponses, GetSystemData, GetSystemErrors, GetSystemResponses, GetTelemetryLogData, GetTelemetryLogErrors, GetTelemetryLogResponses, GetTrajectoryCsvData, GetTrajectoryCsvErrors, GetTrajectoryCsvResponses, GetTrajectoryData, GetTrajectoryErrors, GetTrajectoryResponses, GetTrialData, GetTrialErrors, GetTrialResponses, GetVehicleData, GetVehicleErrors, GetVehicleResponses, GiveUpControlData, GiveUpControlErrors, GiveUpControlResponses, LandVehicleData, LandVehicleErrors, LandVehicleResponses, ListActsData, ListActsErrors, ListActsResponses, ListCampaignsData, ListCampaignsErrors, ListCampaignsResponses, ListControllerChecksData, ListControllerChecksErrors, ListControllerChecksResponses, ListGivenGainsData, ListGivenGainsErrors, ListGivenGainsResponses, ListJobsData, ListJobsErrors, ListJobsResponses, ListPhotosData, ListPhotosErrors, ListPhotosResponses, ListReproductionsData, ListReproductionsErrors, ListReproductionsResponses, ListTrialsData, ListTrialsErrors, ListTrialsResponses, ListVehiclesData, ListVehiclesErrors, ListVehiclesResponses, PromoteBestData, PromoteBestErrors, PromoteBestResponses, ReadParametersData, ReadParametersErrors, ReadParametersResponses, RegisterVehicleData, RegisterVehicleErrors, RegisterVehicleResponses, RehearseCampaignData, RehearseCampaignErrors, RehearseCampaignResponses, ReleaseVehicleData, ReleaseVehicleErrors, ReleaseVehicleResponses, RestoreSafeGainsData, RestoreSafeGainsErrors, RestoreSafeGainsResponses, RetryJobData, RetryJobErrors, RetryJobResponses, RunReproductionData, RunReproductionErrors, RunReproductionResponses, StageTrialData, StageTrialErrors, StageTrialResponses, StopMotorsData, StopMotorsErrors, StopMotorsResponses, TakeControlData, TakeControlErrors, TakeControlResponses, TakeOffTrialData, TakeOffTrialErrors, TakeOffTrialResponses, UnstageTrialData, UnstageTrialErrors, UnstageTrialResponses, UploadTrajectoryData, UploadTrajectoryErrors, UploadTrajectoryResponses } from './types.gen';
 
 export type Options<TData extends TDataShape = TDataShape, ThrowOnError extends boolean = boolean, TResponse = unknown> = Options2<TData, ThrowOnError, TResponse> & {
     /**
@@ -334,6 +334,40 @@ export const getTrajectoryCsv = <ThrowOnError extends boolean = false>(options: 
 export const getTelemetryLog = <ThrowOnError extends boolean = false>(options: Options<GetTelemetryLogData, ThrowOnError>): RequestResult<GetTelemetryLogResponses, GetTelemetryLogErrors, ThrowOnError> => (options.client ?? client).get<GetTelemetryLogResponses, GetTelemetryLogErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/tlog', ...options });
 
 /**
+ * List Photos
+ *
+ * The photos of a flight, in the order in which they were added.
+ */
+export const listPhotos = <ThrowOnError extends boolean = false>(options: Options<ListPhotosData, ThrowOnError>): RequestResult<ListPhotosResponses, ListPhotosErrors, ThrowOnError> => (options.client ?? client).get<ListPhotosResponses, ListPhotosErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/photos', ...options });
+
+/**
+ * Add Photo
+ *
+ * Add a photo (JPEG, PNG or WebP, told by its content; at most 10 MiB) to a flight, as the form field `file`.
+ */
+export const addPhoto = <ThrowOnError extends boolean = false>(options: Options<AddPhotoData, ThrowOnError>): RequestResult<AddPhotoResponses, AddPhotoErrors, ThrowOnError> => (options.client ?? client).post<AddPhotoResponses, AddPhotoErrors, ThrowOnError>({
+    ...formDataBodySerializer,
+    url: '/api/trials/{trial_id}/photos',
+    ...options,
+    headers: {
+        'Content-Type': null,
+        ...options.headers
+    }
+});
+
+/**
+ * Delete Photo
+ */
+export const deletePhoto = <ThrowOnError extends boolean = false>(options: Options<DeletePhotoData, ThrowOnError>): RequestResult<DeletePhotoResponses, DeletePhotoErrors, ThrowOnError> => (options.client ?? client).delete<DeletePhotoResponses, DeletePhotoErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/photos/{photo_id}', ...options });
+
+/**
+ * Get Photo
+ *
+ * A picture as it was handed in; opened by itself it may run nothing and load nothing.
+ */
+export const getPhoto = <ThrowOnError extends boolean = false>(options: Options<GetPhotoData, ThrowOnError>): RequestResult<GetPhotoResponses, GetPhotoErrors, ThrowOnError> => (options.client ?? client).get<GetPhotoResponses, GetPhotoErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/photos/{photo_id}', ...options });
+
+/**
  * List Vehicles
  *
  * Every registered vehicle, and every shared simulation that a campaign has used.
@@ -499,6 +533,13 @@ export const listJobs = <ThrowOnError extends boolean = false>(options?: Options
 export const getJob = <ThrowOnError extends boolean = false>(options: Options<GetJobData, ThrowOnError>): RequestResult<GetJobResponses, GetJobErrors, ThrowOnError> => (options.client ?? client).get<GetJobResponses, GetJobErrors, ThrowOnError>({ url: '/api/jobs/{job_id}', ...options });
 
 /**
+ * Get Job Log
+ *
+ * What the worker wrote down about a job, its last lines.
+ */
+export const getJobLog = <ThrowOnError extends boolean = false>(options: Options<GetJobLogData, ThrowOnError>): RequestResult<GetJobLogResponses, GetJobLogErrors, ThrowOnError> => (options.client ?? client).get<GetJobLogResponses, GetJobLogErrors, ThrowOnError>({ url: '/api/jobs/{job_id}/log', ...options });
+
+/**
  * Cancel Job
  *
  * End a job that waits or runs; what it has computed is dropped.
@@ -548,9 +589,120 @@ export const runReproduction = <ThrowOnError extends boolean = false>(options: O
 export const getReproductionFigure = <ThrowOnError extends boolean = false>(options: Options<GetReproductionFigureData, ThrowOnError>): RequestResult<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError> => (options.client ?? client).get<GetReproductionFigureResponses, GetReproductionFigureErrors, ThrowOnError>({ url: '/api/reproductions/{name}/figures/{figure}', ...options });
 
 /**
+ * List Controller Checks
+ *
+ * Recordings that were held against the replica, the newest first.
+ */
+export const listControllerChecks = <ThrowOnError extends boolean = false>(options?: Options<ListControllerChecksData, ThrowOnError>): RequestResult<ListControllerChecksResponses, ListControllerChecksErrors, ThrowOnError> => (options?.client ?? client).get<ListControllerChecksResponses, ListControllerChecksErrors, ThrowOnError>({ url: '/api/controller-checks', ...options });
+
+/**
+ * Check Controller
+ *
+ * Hold a recording of the vertical loop against the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
+ * form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept.
+ */
+export const checkController = <ThrowOnError extends boolean = false>(options: Options<CheckControllerData, ThrowOnError>): RequestResult<CheckControllerResponses, CheckControllerErrors, ThrowOnError> => (options.client ?? client).post<CheckControllerResponses, CheckControllerErrors, ThrowOnError>({
+    ...formDataBodySerializer,
+    url: '/api/controller-checks',
+    ...options,
+    headers: {
+        'Content-Type': null,
+        ...options.headers
+    }
+});
+
+/**
+ * Check Example Controller
+ *
+ * The same with a takeoff that comes with the program, recorded from the autopilot's own code.
+ */
+export const checkExampleController = <ThrowOnError extends boolean = false>(options?: Options<CheckExampleControllerData, ThrowOnError>): RequestResult<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError> => (options?.client ?? client).post<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError>({ url: '/api/controller-checks/example', ...options });
+
+/**
+ * Delete Controller Check
+ *
+ * Remove a check; it can be made again from its recording.
+ */
+export const deleteControllerCheck = <ThrowOnError extends boolean = false>(options: Options<DeleteControllerCheckData, ThrowOnError>): RequestResult<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError> => (options.client ?? client).delete<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}', ...options });
+
+/**
+ * Get Controller Check
+ */
+export const getControllerCheck = <ThrowOnError extends boolean = false>(options: Options<GetControllerCheckData, ThrowOnError>): RequestResult<GetControllerCheckResponses, GetControllerCheckErrors, ThrowOnError> => (options.client ?? client).get<GetControllerCheckResponses, GetControllerCheckErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}', ...options });
+
+/**
+ * Get Controller Check Figure
+ *
+ * The signals of the reference model and the integrator, or the commands, recorded and replica overlaid.
+ */
+export const getControllerCheckFigure = <ThrowOnError extends boolean = false>(options: Options<GetControllerCheckFigureData, ThrowOnError>): RequestResult<GetControllerCheckFigureResponses, GetControllerCheckFigureErrors, ThrowOnError> => (options.client ?? client).get<GetControllerCheckFigureResponses, GetControllerCheckFigureErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}/figures/{name}', ...options });
+
+/**
+ * Compare Flights
+ *
+ * Flights of any campaigns side by side, in the order given: their gains, settings and errors, what differs, and
+ * which of each two is better.
+ */
+export const compareFlights = <ThrowOnError extends boolean = false>(options: Options<CompareFlightsData, ThrowOnError>): RequestResult<CompareFlightsResponses, CompareFlightsErrors, ThrowOnError> => (options.client ?? client).get<CompareFlightsResponses, CompareFlightsErrors, ThrowOnError>({ url: '/api/compare', ...options });
+
+/**
+ * Get Comparison Figure
+ *
+ * Their curves over the set point, and below them how each differs from the first.
+ */
+export const getComparisonFigure = <ThrowOnError extends boolean = false>(options: Options<GetComparisonFigureData, ThrowOnError>): RequestResult<GetComparisonFigureResponses, GetComparisonFigureErrors, ThrowOnError> => (options.client ?? client).get<GetComparisonFigureResponses, GetComparisonFigureErrors, ThrowOnError>({ url: '/api/compare/figure', ...options });
+
+/**
+ * Get Comparison Csv
+ *
+ * Their curves on one grid of time, every 0.02 s; each flight's own CSV has the record as it was stored.
+ */
+export const getComparisonCsv = <ThrowOnError extends boolean = false>(options: Options<GetComparisonCsvData, ThrowOnError>): RequestResult<GetComparisonCsvResponses, GetComparisonCsvErrors, ThrowOnError> => (options.client ?? client).get<GetComparisonCsvResponses, GetComparisonCsvErrors, ThrowOnError>({ url: '/api/compare/curves.csv', ...options });
+
+/**
+ * Get Report
+ *
+ * The whole campaign as one page that can be saved and sent: it needs neither this program nor a network.
+ */
+export const getReport = <ThrowOnError extends boolean = false>(options: Options<GetReportData, ThrowOnError>): RequestResult<GetReportResponses, GetReportErrors, ThrowOnError> => (options.client ?? client).get<GetReportResponses, GetReportErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/report.html', ...options });
+
+/**
+ * Get Report As Pdf
+ *
+ * The same, printed by a Chromium on the server; 503 where there is none, or it is printing already.
+ */
+export const getReportAsPdf = <ThrowOnError extends boolean = false>(options: Options<GetReportAsPdfData, ThrowOnError>): RequestResult<GetReportAsPdfResponses, GetReportAsPdfErrors, ThrowOnError> => (options.client ?? client).get<GetReportAsPdfResponses, GetReportAsPdfErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/report.pdf', ...options });
+
+/**
+ * Get Bundle
+ *
+ * The whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log.
+ */
+export const getBundle = <ThrowOnError extends boolean = false>(options: Options<GetBundleData, ThrowOnError>): RequestResult<GetBundleResponses, GetBundleErrors, ThrowOnError> => (options.client ?? client).get<GetBundleResponses, GetBundleErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/bundle', ...options });
+
+/**
+ * Bring In Bundle
+ *
+ * A new campaign from a bundle, every number as it was. What was flown on a registered vehicle becomes history: it
+ * can be read, compared and cloned, and nothing flies from it.
+ */
+export const bringInBundle = <ThrowOnError extends boolean = false>(options: Options<BringInBundleData, ThrowOnError>): RequestResult<BringInBundleResponses, BringInBundleErrors, ThrowOnError> => (options.client ?? client).post<BringInBundleResponses, BringInBundleErrors, ThrowOnError>({
+    ...formDataBodySerializer,
+    url: '/api/bundles',
+    ...options,
+    headers: {
+        'Content-Type': null,
+        ...options.headers
+    }
+});
+
+/**
  * Get Campaign Figure
  *
  * All takeoffs over the set point, the error of each flight, or the gains of each flight.
+ *
+ * Of more than 30 flights the takeoffs are drawn as an envelope, with the first, the best, the latest and that
+ * `flight` by themselves. Between `from_s` and `to_s` curves have as many points again.
  */
 export const getCampaignFigure = <ThrowOnError extends boolean = false>(options: Options<GetCampaignFigureData, ThrowOnError>): RequestResult<GetCampaignFigureResponses, GetCampaignFigureErrors, ThrowOnError> => (options.client ?? client).get<GetCampaignFigureResponses, GetCampaignFigureErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/figures/{name}', ...options });
 

@@ -455,6 +455,72 @@ export type Check = {
 };
 
 /**
+ * CheckFigure
+ *
+ * A drawing of the check that there is.
+ */
+export type CheckFigure = {
+    /**
+     * Name
+     */
+    name: 'reference' | 'commands';
+    /**
+     * Title
+     */
+    title: string;
+};
+
+/**
+ * CheckedSignal
+ *
+ * One signal of the loop. `exact`: no difference at all; `agrees`: none that is not allowed; `differs`.
+ */
+export type CheckedSignal = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Largest Difference
+     */
+    largest_difference: number;
+    /**
+     * Difference Unit
+     */
+    difference_unit: string;
+    /**
+     * Tolerance
+     *
+     * the largest difference allowed, in the same unit
+     */
+    tolerance: number;
+    /**
+     * Allowance
+     *
+     * what the tolerance means, in words
+     */
+    allowance: string;
+    /**
+     * Verdict
+     */
+    verdict: 'exact' | 'agrees' | 'differs';
+    /**
+     * Different
+     *
+     * how many samples differ by more than is allowed
+     */
+    different: number;
+    /**
+     * First Different S
+     */
+    first_different_s: number | null;
+};
+
+/**
  * Classification
  *
  * A person's word on a finished flight.
@@ -492,6 +558,75 @@ export type Clone = {
      * Warm Start
      */
     warm_start?: boolean;
+};
+
+/**
+ * ComparedFlight
+ *
+ * One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
+ * all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight.
+ */
+export type ComparedFlight = {
+    /**
+     * Trial Id
+     */
+    trial_id: number;
+    /**
+     * Label
+     */
+    label: string;
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Number
+     */
+    number: number;
+    /**
+     * Campaign Id
+     */
+    campaign_id: number;
+    /**
+     * Campaign Name
+     */
+    campaign_name: string;
+    /**
+     * Vehicle
+     */
+    vehicle: string;
+    /**
+     * Is Real
+     */
+    is_real: boolean;
+    /**
+     * Experiment
+     */
+    experiment: string;
+    state: TrialState;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Error
+     */
+    error: number | null;
+    group: GroupBrief | null;
+    /**
+     * Scatter
+     */
+    scatter: number;
+    /**
+     * Flown At
+     */
+    flown_at: string | null;
+    /**
+     * Settings
+     */
+    settings: Array<FlightSetting>;
 };
 
 /**
@@ -538,6 +673,104 @@ export type Control = {
      * Until
      */
     until: string;
+};
+
+/**
+ * ControllerCheck
+ *
+ * The result in a sentence, what it rests on, and one line for each signal.
+ */
+export type ControllerCheck = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * File Name
+     */
+    file_name: string;
+    /**
+     * Kind
+     */
+    kind: 'log' | 'trace';
+    /**
+     * Passed
+     */
+    passed: boolean;
+    /**
+     * Checked At
+     */
+    checked_at: string;
+    /**
+     * Sentence
+     */
+    sentence: string;
+    /**
+     * Rows
+     *
+     * how many samples or steps were compared
+     */
+    rows: number;
+    /**
+     * Gains
+     *
+     * null where they change within the recording
+     */
+    gains: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Gains From
+     */
+    gains_from: string;
+    /**
+     * Better Gains
+     *
+     * other gains that more of the commands follow from
+     */
+    better_gains: {
+        [key: string]: number | number;
+    } | null;
+    /**
+     * Notes
+     */
+    notes: Array<string>;
+    /**
+     * Signals
+     */
+    signals: Array<CheckedSignal>;
+    /**
+     * Figures
+     */
+    figures: Array<CheckFigure>;
+};
+
+/**
+ * ControllerCheckSummary
+ *
+ * A recording that was held against the replica: `log`, Paparazzi's of a flight, or `trace`, with every step.
+ */
+export type ControllerCheckSummary = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * File Name
+     */
+    file_name: string;
+    /**
+     * Kind
+     */
+    kind: 'log' | 'trace';
+    /**
+     * Passed
+     */
+    passed: boolean;
+    /**
+     * Checked At
+     */
+    checked_at: string;
 };
 
 /**
@@ -1006,6 +1239,78 @@ export type FlightBrief = {
 };
 
 /**
+ * FlightComparison
+ *
+ * Flights side by side, in the order in which they were named; every later one of each pair stands against the
+ * earlier. `sentence` is the verdict on all of them: the lowest against the first one, or against the next lowest.
+ */
+export type FlightComparison = {
+    /**
+     * Error Unit
+     */
+    error_unit: string;
+    /**
+     * Verdict
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | null;
+    /**
+     * Sentence
+     */
+    sentence: string;
+    /**
+     * Notes
+     */
+    notes: Array<string>;
+    /**
+     * Flights
+     */
+    flights: Array<ComparedFlight>;
+    /**
+     * Gains
+     */
+    gains: Array<FlightDifference>;
+    /**
+     * Settings
+     */
+    settings: Array<FlightDifference>;
+    /**
+     * Pairs
+     */
+    pairs: Array<FlightPair>;
+    /**
+     * File Stem
+     *
+     * for the names of files made of this comparison
+     */
+    file_stem: string;
+};
+
+/**
+ * FlightDifference
+ *
+ * A gain or setting that is not the same in all flights: its value in each, in their order, null where a flight has
+ * no such thing, and its change against the first flight's, where both are numbers.
+ */
+export type FlightDifference = {
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Values
+     */
+    values: Array<boolean | number | number | string | null>;
+    /**
+     * Changes
+     */
+    changes: Array<number | number | null>;
+};
+
+/**
  * FlightOrder
  *
  * How a simulated flight is to run: simulated time over wall time, null as fast as possible.
@@ -1015,6 +1320,70 @@ export type FlightOrder = {
      * Speed
      */
     speed?: number | null;
+};
+
+/**
+ * FlightPair
+ *
+ * One flight's gains against another's, each with all their flights. `difference` is trial − against; `confidence`
+ * that of the likelier direction, for `repeats` in one campaign that anything has changed.
+ */
+export type FlightPair = {
+    /**
+     * Trial Id
+     */
+    trial_id: number;
+    /**
+     * Against Id
+     */
+    against_id: number;
+    /**
+     * Basis
+     *
+     * what the difference is of: other `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, for their vehicles or experiments differ; or there is none, because one of them has `no error`
+     */
+    basis: 'gains' | 'repeats' | 'apart' | 'no error';
+    /**
+     * Verdict
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | null;
+    /**
+     * Confidence
+     */
+    confidence: number | null;
+    /**
+     * Difference
+     */
+    difference: number | null;
+    /**
+     * Standard Error
+     */
+    standard_error: number | null;
+    further: FurtherFlights | null;
+    /**
+     * Sentence
+     */
+    sentence: string;
+};
+
+/**
+ * FlightSetting
+ *
+ * Something that a flight was flown with.
+ */
+export type FlightSetting = {
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Value
+     */
+    value: boolean | number | number | string;
 };
 
 /**
@@ -1057,6 +1426,22 @@ export type FlyingTrial = {
      * Trial Number
      */
     trial_number: number;
+};
+
+/**
+ * FurtherFlights
+ *
+ * Further flights of the gains of each after which the difference, if it stays, would be decided.
+ */
+export type FurtherFlights = {
+    /**
+     * Trial
+     */
+    trial: number;
+    /**
+     * Against
+     */
+    against: number;
 };
 
 /**
@@ -1355,6 +1740,52 @@ export type Job = {
 };
 
 /**
+ * JobLog
+ *
+ * The last lines about a job, the oldest first; `total` counts all that are kept.
+ */
+export type JobLog = {
+    /**
+     * Lines
+     */
+    lines: Array<JobLogLine>;
+    /**
+     * Total
+     */
+    total: number;
+};
+
+/**
+ * JobLogLine
+ *
+ * A line of the worker's log about a job. `exception` is a traceback, empty without one.
+ */
+export type JobLogLine = {
+    /**
+     * At
+     */
+    at: string;
+    /**
+     * Level
+     */
+    level: string;
+    /**
+     * Message
+     */
+    message: string;
+    /**
+     * Details
+     */
+    details: {
+        [key: string]: string;
+    };
+    /**
+     * Exception
+     */
+    exception: string;
+};
+
+/**
  * JobState
  *
  * Numeric work. It is pure, so a job whose worker died simply waits again.
@@ -1640,6 +2071,24 @@ export type PageCampaignSummary = {
      * Items
      */
     items: Array<CampaignSummary>;
+    /**
+     * Total
+     */
+    total: number;
+    /**
+     * Next Cursor
+     */
+    next_cursor: string | null;
+};
+
+/**
+ * Page[ControllerCheckSummary]
+ */
+export type PageControllerCheckSummary = {
+    /**
+     * Items
+     */
+    items: Array<ControllerCheckSummary>;
     /**
      * Total
      */
@@ -2726,6 +3175,30 @@ export type TrialEdit = {
      * Note
      */
     note: string;
+};
+
+/**
+ * TrialPhoto
+ *
+ * A photo of a flight; the picture itself is at `/api/trials/{trial_id}/photos/{id}`.
+ */
+export type TrialPhoto = {
+    /**
+     * Id
+     */
+    id: number;
+    /**
+     * Trial Id
+     */
+    trial_id: number;
+    /**
+     * Media Type
+     */
+    media_type: string;
+    /**
+     * Added At
+     */
+    added_at: string;
 };
 
 /**
@@ -4362,6 +4835,146 @@ export type GetTelemetryLogResponses = {
 
 export type GetTelemetryLogResponse = GetTelemetryLogResponses[keyof GetTelemetryLogResponses];
 
+export type ListPhotosData = {
+    body?: never;
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/photos';
+};
+
+export type ListPhotosErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type ListPhotosError = ListPhotosErrors[keyof ListPhotosErrors];
+
+export type ListPhotosResponses = {
+    /**
+     * Response List Photos
+     *
+     * Successful Response
+     */
+    200: Array<TrialPhoto>;
+};
+
+export type ListPhotosResponse = ListPhotosResponses[keyof ListPhotosResponses];
+
+export type AddPhotoData = {
+    body: {
+        file: Blob | File;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/photos';
+};
+
+export type AddPhotoErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type AddPhotoError = AddPhotoErrors[keyof AddPhotoErrors];
+
+export type AddPhotoResponses = {
+    /**
+     * Successful Response
+     */
+    201: TrialPhoto;
+};
+
+export type AddPhotoResponse = AddPhotoResponses[keyof AddPhotoResponses];
+
+export type DeletePhotoData = {
+    body?: never;
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+        /**
+         * Photo Id
+         */
+        photo_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/photos/{photo_id}';
+};
+
+export type DeletePhotoErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type DeletePhotoError = DeletePhotoErrors[keyof DeletePhotoErrors];
+
+export type DeletePhotoResponses = {
+    /**
+     * Successful Response
+     */
+    204: void;
+};
+
+export type DeletePhotoResponse = DeletePhotoResponses[keyof DeletePhotoResponses];
+
+export type GetPhotoData = {
+    body?: never;
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+        /**
+         * Photo Id
+         */
+        photo_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/photos/{photo_id}';
+};
+
+export type GetPhotoErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetPhotoError = GetPhotoErrors[keyof GetPhotoErrors];
+
+export type GetPhotoResponses = {
+    /**
+     * Successful Response
+     */
+    200: Blob | File;
+};
+
+export type GetPhotoResponse = GetPhotoResponses[keyof GetPhotoResponses];
+
 export type ListVehiclesData = {
     body?: never;
     path?: never;
@@ -5067,6 +5680,43 @@ export type GetJobResponses = {
 
 export type GetJobResponse = GetJobResponses[keyof GetJobResponses];
 
+export type GetJobLogData = {
+    body?: never;
+    path: {
+        /**
+         * Job Id
+         */
+        job_id: number;
+    };
+    query?: {
+        /**
+         * Limit
+         *
+         * how many items the page may hold
+         */
+        limit?: number;
+    };
+    url: '/api/jobs/{job_id}/log';
+};
+
+export type GetJobLogErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetJobLogError = GetJobLogErrors[keyof GetJobLogErrors];
+
+export type GetJobLogResponses = {
+    /**
+     * Successful Response
+     */
+    200: JobLog;
+};
+
+export type GetJobLogResponse = GetJobLogResponses[keyof GetJobLogResponses];
+
 export type CancelJobData = {
     body?: never;
     headers?: {
@@ -5280,6 +5930,451 @@ export type GetReproductionFigureResponses = {
 
 export type GetReproductionFigureResponse = GetReproductionFigureResponses[keyof GetReproductionFigureResponses];
 
+export type ListControllerChecksData = {
+    body?: never;
+    path?: never;
+    query?: {
+        /**
+         * Limit
+         *
+         * how many items the page may hold
+         */
+        limit?: number;
+        /**
+         * Cursor
+         *
+         * `next_cursor` of the page before
+         */
+        cursor?: string | null;
+    };
+    url: '/api/controller-checks';
+};
+
+export type ListControllerChecksErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type ListControllerChecksError = ListControllerChecksErrors[keyof ListControllerChecksErrors];
+
+export type ListControllerChecksResponses = {
+    /**
+     * Successful Response
+     */
+    200: PageControllerCheckSummary;
+};
+
+export type ListControllerChecksResponse = ListControllerChecksResponses[keyof ListControllerChecksResponses];
+
+export type CheckControllerData = {
+    body: {
+        file: Blob | File;
+        /**
+         * the .log file that Paparazzi writes beside a .data file
+         */
+        companion?: Blob | File;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path?: never;
+    query?: {
+        /**
+         * Gains
+         *
+         * KP,KI,KD that were flown, where the log does not say so
+         */
+        gains?: string | null;
+    };
+    url: '/api/controller-checks';
+};
+
+export type CheckControllerErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type CheckControllerError = CheckControllerErrors[keyof CheckControllerErrors];
+
+export type CheckControllerResponses = {
+    /**
+     * Successful Response
+     */
+    201: ControllerCheck;
+};
+
+export type CheckControllerResponse = CheckControllerResponses[keyof CheckControllerResponses];
+
+export type CheckExampleControllerData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path?: never;
+    query?: never;
+    url: '/api/controller-checks/example';
+};
+
+export type CheckExampleControllerErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type CheckExampleControllerError = CheckExampleControllerErrors[keyof CheckExampleControllerErrors];
+
+export type CheckExampleControllerResponses = {
+    /**
+     * Successful Response
+     */
+    201: ControllerCheck;
+};
+
+export type CheckExampleControllerResponse = CheckExampleControllerResponses[keyof CheckExampleControllerResponses];
+
+export type DeleteControllerCheckData = {
+    body?: never;
+    path: {
+        /**
+         * Check Id
+         */
+        check_id: number;
+    };
+    query?: never;
+    url: '/api/controller-checks/{check_id}';
+};
+
+export type DeleteControllerCheckErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type DeleteControllerCheckError = DeleteControllerCheckErrors[keyof DeleteControllerCheckErrors];
+
+export type DeleteControllerCheckResponses = {
+    /**
+     * Successful Response
+     */
+    204: void;
+};
+
+export type DeleteControllerCheckResponse = DeleteControllerCheckResponses[keyof DeleteControllerCheckResponses];
+
+export type GetControllerCheckData = {
+    body?: never;
+    path: {
+        /**
+         * Check Id
+         */
+        check_id: number;
+    };
+    query?: never;
+    url: '/api/controller-checks/{check_id}';
+};
+
+export type GetControllerCheckErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetControllerCheckError = GetControllerCheckErrors[keyof GetControllerCheckErrors];
+
+export type GetControllerCheckResponses = {
+    /**
+     * Successful Response
+     */
+    200: ControllerCheck;
+};
+
+export type GetControllerCheckResponse = GetControllerCheckResponses[keyof GetControllerCheckResponses];
+
+export type GetControllerCheckFigureData = {
+    body?: never;
+    path: {
+        /**
+         * Check Id
+         */
+        check_id: number;
+        /**
+         * Name
+         */
+        name: 'reference' | 'commands';
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+    };
+    url: '/api/controller-checks/{check_id}/figures/{name}';
+};
+
+export type GetControllerCheckFigureErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetControllerCheckFigureError = GetControllerCheckFigureErrors[keyof GetControllerCheckFigureErrors];
+
+export type GetControllerCheckFigureResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetControllerCheckFigureResponse = GetControllerCheckFigureResponses[keyof GetControllerCheckFigureResponses];
+
+export type CompareFlightsData = {
+    body?: never;
+    path?: never;
+    query: {
+        /**
+         * Trial
+         *
+         * 2 to 20 flights; the first is what others change
+         */
+        trial: Array<number>;
+    };
+    url: '/api/compare';
+};
+
+export type CompareFlightsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type CompareFlightsError = CompareFlightsErrors[keyof CompareFlightsErrors];
+
+export type CompareFlightsResponses = {
+    /**
+     * Successful Response
+     */
+    200: FlightComparison;
+};
+
+export type CompareFlightsResponse = CompareFlightsResponses[keyof CompareFlightsResponses];
+
+export type GetComparisonFigureData = {
+    body?: never;
+    path?: never;
+    query: {
+        /**
+         * Trial
+         *
+         * 2 to 20 flights; the first is what others change
+         */
+        trial: Array<number>;
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+    };
+    url: '/api/compare/figure';
+};
+
+export type GetComparisonFigureErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetComparisonFigureError = GetComparisonFigureErrors[keyof GetComparisonFigureErrors];
+
+export type GetComparisonFigureResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetComparisonFigureResponse = GetComparisonFigureResponses[keyof GetComparisonFigureResponses];
+
+export type GetComparisonCsvData = {
+    body?: never;
+    path?: never;
+    query: {
+        /**
+         * Trial
+         *
+         * 2 to 20 flights; the first is what others change
+         */
+        trial: Array<number>;
+    };
+    url: '/api/compare/curves.csv';
+};
+
+export type GetComparisonCsvErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetComparisonCsvError = GetComparisonCsvErrors[keyof GetComparisonCsvErrors];
+
+export type GetComparisonCsvResponses = {
+    /**
+     * Successful Response
+     */
+    200: string;
+};
+
+export type GetComparisonCsvResponse = GetComparisonCsvResponses[keyof GetComparisonCsvResponses];
+
+export type GetReportData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/report.html';
+};
+
+export type GetReportErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetReportError = GetReportErrors[keyof GetReportErrors];
+
+export type GetReportResponses = {
+    /**
+     * Successful Response
+     */
+    200: string;
+};
+
+export type GetReportResponse = GetReportResponses[keyof GetReportResponses];
+
+export type GetReportAsPdfData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/report.pdf';
+};
+
+export type GetReportAsPdfErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetReportAsPdfError = GetReportAsPdfErrors[keyof GetReportAsPdfErrors];
+
+export type GetReportAsPdfResponses = {
+    /**
+     * Successful Response
+     */
+    200: Blob | File;
+};
+
+export type GetReportAsPdfResponse = GetReportAsPdfResponses[keyof GetReportAsPdfResponses];
+
+export type GetBundleData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/bundle';
+};
+
+export type GetBundleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetBundleError = GetBundleErrors[keyof GetBundleErrors];
+
+export type GetBundleResponses = {
+    /**
+     * Successful Response
+     */
+    200: Blob | File;
+};
+
+export type GetBundleResponse = GetBundleResponses[keyof GetBundleResponses];
+
+export type BringInBundleData = {
+    body: {
+        file: Blob | File;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path?: never;
+    query?: never;
+    url: '/api/bundles';
+};
+
+export type BringInBundleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type BringInBundleError = BringInBundleErrors[keyof BringInBundleErrors];
+
+export type BringInBundleResponses = {
+    /**
+     * Successful Response
+     */
+    201: Campaign;
+};
+
+export type BringInBundleResponse = BringInBundleResponses[keyof BringInBundleResponses];
+
 export type GetCampaignFigureData = {
     body?: never;
     path: {
@@ -5299,6 +6394,24 @@ export type GetCampaignFigureData = {
          * colours for a light or a dark page
          */
         theme?: 'light' | 'dark';
+        /**
+         * From S
+         *
+         * first second of the curves that is looked at
+         */
+        from_s?: number | null;
+        /**
+         * To S
+         *
+         * last second of the curves that is looked at
+         */
+        to_s?: number | null;
+        /**
+         * Flight
+         *
+         * number of a flight that is to have a curve of its own
+         */
+        flight?: number | null;
     };
     url: '/api/campaigns/{campaign_id}/figures/{name}';
 };

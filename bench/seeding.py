@@ -1,0 +1,190 @@
+"""Databases as years of use leave them: campaigns with many flights, each with its whole record, written row by row."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from sqlalchemy import insert, update
+
+from app.campaigns import service as campaigns
+from app.campaigns.definitions import definition_of, frozen_digest
+from app.campaigns.proposing import gate_json
+from app.campaigns.schemas import NewCampaign
+from app.campaigns.states import CampaignState
+from app.core.definition import Definition
+from app.core.experiments.takeoff import WINDOW_S, Takeoff
+from app.core.gate import check_policy
+from app.core.strategies.base import Explanation, Interval, band_channels
+from app.core.trajectory import Trajectory
+from app.db.migrate import migrate
+from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrajectoryRow, TrialRow
+from app.db.session import Database
+from app.fleet.schemas import VehicleChoice
+from app.jobs.states import JobState
+from app.settings import Settings
+from app.trials import history
+from app.trials.codec import pack
+from app.trials.scoring import score
+from app.trials.states import TrialState
+
+SAMPLES: Final = 16_700
+SEED: Final = 20261122
+SPOILT_EVERY: Final = 25
+"""Every so many flights one does not count."""
+_GOOD: Final = np.array([1600.0, 900.0, 130.0])
+_TRUTH: Final = np.array([0.66, 0.2, 0.05, 0.15, 0.0, 0.1, 0.0, 0.0])
+_NOISE_M: Final = 0.008
+
+
+@cache
+def _gate() -> JsonObject:
+    """The gate's whole word on gains that it lets pass."""
+    experiment = Takeoff()
+    space = experiment.space
+    return gate_json(check_policy(Definition(), experiment, space, space.mapping(space.default), ()))
+
+
+@dataclass(frozen=True, slots=True)
+class Takeoffs:
+    """Flights of random gains that get better, on a vehicle that the model's fit would find."""
+
+    randomness: np.random.Generator
+
+    def gains(self, number: int) -> dict[str, float]:
+        """Whole ones, nearer to good ones with every flight."""
+        gains = Takeoff.space.gains
+        lower, upper = (np.array([getattr(gain, end) for gain in gains]) for end in ("lower", "upper"))
+        spread = (upper - lower) * max(0.03, 0.3 * 0.98**number)
+        chosen = np.clip(self.randomness.normal(_GOOD, spread), lower + 0.02 * (upper - lower), upper)
+        return {gain.name: float(round(value)) for gain, value in zip(gains, chosen, strict=True)}
+
+    def record(self, gains: Mapping[str, float]) -> Trajectory:
+        """16 700 samples of a takeoff, with what a tracking system adds to it."""
+        flown = Takeoff().simulate(np.array(list(gains.values())), _TRUTH)
+        time_s = np.linspace(0.0, WINDOW_S, SAMPLES)
+        channels = {name: np.interp(time_s, flown.time_s, values) for name, values in flown.channels.items()}
+        wander = np.cumsum(self.randomness.normal(0.0, 1e-3, SAMPLES)) * np.exp(-time_s / WINDOW_S)
+        channels["altitude_m"] += wander + self.randomness.normal(0.0, _NOISE_M, SAMPLES)
+        return Trajectory(time_s, channels, "jsbsim", "simulation")
+
+
+def seed_database(data_dir: Path, *, flights: Mapping[str, int], campaigns_of_five: int = 0) -> dict[str, int]:
+    """A database with a campaign of so many flights under each name, a proposal ready in each; and as many small ones
+    as asked for, all alike. Ids of the former, by name."""
+    file = Settings(data_dir=data_dir).database_file
+    migrate(file)
+    database = Database(file)
+    takeoffs = Takeoffs(np.random.default_rng(SEED))
+    try:
+        made = {name: _campaign(database, name, count, takeoffs) for name, count in flights.items()}
+        if campaigns_of_five:
+            small = _campaign(database, "Small 1", 5, takeoffs)
+            _copies(database, small, campaigns_of_five - 1)
+    finally:
+        database.close()
+    return made
+
+
+def _campaign(database: Database, name: str, flights: int, takeoffs: Takeoffs) -> int:
+    new = NewCampaign(name=name, vehicle=VehicleChoice(kind="jsbsim"))
+    with database.write() as session:
+        campaign_id = campaigns.create_campaign(session, new).id
+    for first in range(1, flights + 1, 50):
+        with database.write() as session:
+            for number in range(first, min(first + 50, flights + 1)):
+                gains = takeoffs.gains(number)
+                record = takeoffs.record(gains)
+                row = _trial(campaign_id, number, gains)
+                row.trajectory = history.store_trajectory(session, record)
+                judged = score(Takeoff(), record)
+                row.overshoot_m, row.curve = judged.overshoot, judged.curve
+                if number % SPOILT_EVERY == 0:
+                    row.state, row.reason = TrialState.INVALID, "wind gust"
+                else:
+                    assert judged.error is not None
+                    row.error, row.predicted_error = judged.error, 0.97 * judged.error
+                    row.predicted_interval = asdict(Interval(lower=0.9 * judged.error, upper=1.06 * judged.error))
+                session.add(row)
+    _propose(database, campaign_id, takeoffs, flights + 1)
+    return campaign_id
+
+
+def _trial(campaign_id: int, number: int, gains: Mapping[str, float]) -> TrialRow:
+    return TrialRow(
+        campaign_id=campaign_id,
+        number=number,
+        state=TrialState.VALID,
+        kind="start" if number == 1 else "step",
+        gains=dict(gains),
+        read_back=dict(gains),
+        gate=_gate(),
+        ending="completed",
+        glitches=[],
+        seed=number,
+    )
+
+
+def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: int) -> None:
+    """A fresh proposal with its predicted curve and band, as a strategy would have left it."""
+    with database.write() as session:
+        campaign = campaigns.get_row(session, campaign_id)
+        campaign.state, campaign.definition_digest = CampaignState.DECIDING, frozen_digest(campaign)
+        campaign.safe_gains = campaign.vehicle.safe_gains
+        session.execute(update(JobRow).where(JobRow.campaign_id == campaign_id).values(state=JobState.DONE))
+        gains = takeoffs.gains(number)
+        modelled = Takeoff().simulate(np.array(list(gains.values())), _TRUTH)
+        lower, upper = band_channels(Takeoff.output)
+        altitude_m = modelled["altitude_m"]
+        band = {Takeoff.output: altitude_m, lower: altitude_m - 0.15, upper: altitude_m + 0.15}
+        predicted = history.store_trajectory(session, Trajectory(modelled.time_s, band, "model", "simulation"))
+        row = ProposalRow(
+            campaign_id=campaign_id,
+            history_digest=history.history_digest(definition_of(campaign), history.trials_of(session, campaign_id)),
+            kind="step",
+            gains=gains,
+            predicted_error=0.21,
+            predicted_id=predicted.id,
+            explanation=asdict(Explanation(summary="A step of the gradient.")),
+            gate=_gate(),
+            stop_verdict={"stop": False, "reason": None, "why": "The flights still get better.", "threshold": None},
+            interval=asdict(Interval(lower=0.19, upper=0.24)),
+            advice={"kind": "step", "gains": gains, "why": "It is expected to be better."},
+            spread=None,
+        )
+        session.add(row)
+
+
+def _copies(database: Database, campaign_id: int, count: int) -> None:
+    """So many campaigns with the flights of that one, their records thinned out to a few samples."""
+    with database.write() as session:
+        campaign = _columns(session.get_one(CampaignRow, campaign_id))
+        trials = history.trials_of(session, campaign_id)
+        thin = [pack(_thinned(history.record_of(session, row))) for row in trials]
+        columns = [_columns(row) for row in trials]
+        for number in range(2, count + 2):
+            copy = CampaignRow(**campaign | {"name": f"Small {number}"})
+            session.add(copy)
+            records = [TrajectoryRow(**asdict(packed)) for packed in thin]
+            session.add_all(records)
+            session.flush()
+            session.execute(
+                insert(TrialRow),
+                [
+                    trial | {"campaign_id": copy.id, "trajectory_id": record.id}
+                    for trial, record in zip(columns, records, strict=True)
+                ],
+            )
+
+
+def _thinned(record: Trajectory) -> Trajectory:
+    every = slice(None, None, len(record) // 60)
+    channels = {name: values[every] for name, values in record.channels.items()}
+    return Trajectory(record.time_s[every], channels, record.source, record.clock)
+
+
+def _columns(row: CampaignRow | TrialRow) -> dict[str, object]:
+    """What a row holds, but for its own id."""
+    return {column.key: getattr(row, column.key) for column in row.__table__.columns if column.key != "id"}
