@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
-from app.api import catalogue, errors, events, figures, system
+from app.api import catalogue, errors, events, figures, landscapes, system
 from app.api.headers import HeadersMiddleware
 from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
@@ -71,6 +71,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         recordings,
         reports,
         compare,
+        landscapes.router,
         figures.router,
         events.router,
     )

@@ -22,8 +22,9 @@ from typing import Final
 import structlog
 
 from app import __version__
+from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
-from app.campaigns.tasks import Proposer, prepare
+from app.campaigns.tasks import Proposer, Surveyor, prepare
 from app.data_dir import prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
@@ -47,6 +48,7 @@ FLIGHTS_AT_ONCE: Final = 8
 ACTS_AT_ONCE: Final = 8
 SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
 REPRODUCTIONS_AT_ONCE: Final = 1
+LANDSCAPES_AT_ONCE: Final = 1
 LOOK_ANYWAY_S: Final = 1.0
 SWITCH_EVERY_S: Final = 0.001
 """How long a thread that keeps books may make the one that passes aborts on wait for the interpreter; Python's own 5 ms
@@ -152,7 +154,7 @@ class Worker:
             stack.enter_context(live)  # from here on flights can be asked for, which recovery would withdraw
             acting = stack.enter_context(ThreadPoolExecutor(ACTS_AT_ONCE, thread_name_prefix="act"))
             stack.callback(sessions.close)
-            threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE
+            threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
             desks = self._desks(database, pool)
@@ -196,6 +198,7 @@ class Worker:
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
+            (LANDSCAPE_JOB, Surveyor(database, pool, worker=self._name), LANDSCAPES_AT_ONCE),
         )
         return tuple(
             Desk(database, kind, perform, room=room, worker=self._name, lease_s=self._settings.lease_s)

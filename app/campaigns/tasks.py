@@ -1,17 +1,23 @@
-"""Carrying out proposal jobs: stored flights in, a stored proposal out, the mathematics in a process of the pool."""
+"""Carrying out a campaign's jobs: stored flights in, a stored proposal or landscape out, computed by the pool."""
 
 from time import monotonic
+from typing import Final
 
+import numpy as np
 import structlog
 
-from app.campaigns import proposing
+from app.campaigns import landscapes, proposing
 from app.core.definition import Definition, Flight
 from app.core.experiments.takeoff import Takeoff
+from app.core.landscape import foreseen, plan_survey
 from app.db.session import Database
 from app.errors import GainlineError
 from app.jobs import service as jobs
 from app.jobs.tasks import Claimed
 from app.pool import Pool
+
+POINTS_AT_ONCE: Final = 48
+"""So many gain sets of a landscape are asked of the pool together: a proposal waits for no more."""
 
 _log = structlog.get_logger(__name__)
 
@@ -37,6 +43,34 @@ class Proposer:
             if jobs.finish_job(session, job.id, worker=self._worker):
                 proposing.store_proposal(session, job.campaign_id, computed)
         _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
+
+
+class Surveyor:
+    """What a desk for landscape jobs performs."""
+
+    def __init__(self, database: Database, pool: Pool, *, worker: str) -> None:
+        self._database = database
+        self._pool = pool
+        self._worker = worker
+
+    def __call__(self, job: Claimed) -> None:
+        """From the stored proposal to the stored landscape, a few points at a time. Raises GainlineError, and
+        CancelledError when the pool is closed meanwhile."""
+        if job.campaign_id is None:
+            raise GainlineError("It names no campaign.", hint="")
+        started_s = monotonic()
+        with self._database.read() as session:
+            plan = landscapes.read_plan(session, job.campaign_id, job.order)
+        survey = self._pool.run(plan_survey, plan)
+        if survey is None:
+            raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
+        points = survey.points()
+        parts = np.array_split(points, -(-len(points) // POINTS_AT_ONCE))
+        errors = np.concatenate([self._pool.run(foreseen, survey.foresee, part) for part in parts])
+        result = landscapes.as_json(survey.landscape(errors), job.order)
+        with self._database.write() as session:
+            jobs.finish_job(session, job.id, worker=self._worker, result=result)
+        _log.info("landscape stored", points=len(points), seconds=round(monotonic() - started_s, 3))
 
 
 def prepare() -> None:

@@ -1,0 +1,157 @@
+"""The model's error around a campaign's gains: computed as a job for one proposal, kept as that job's result.
+
+For a worker: `read_plan`, then `app.core.landscape` (pure, in any process), then the result `as_json`. Only the newest
+landscape of a campaign is kept.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from pydantic import TypeAdapter
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.campaigns.definitions import definition_of
+from app.campaigns.drawing import history_of
+from app.campaigns.proposing import History, is_stale, read_history
+from app.core.experiments import experiment_of
+from app.core.landscape import Landscape, Plan, free_gains, space_of
+from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
+from app.errors import ConflictError, GainlineError
+from app.figures.base import Card, card_of
+from app.figures.landscape import LandscapeFigure, Search, Tried
+from app.figures.theme import ThemeName
+from app.jobs import service as jobs
+from app.jobs.states import JobState
+from app.trials import history
+
+LANDSCAPE_JOB: Final = "landscape"
+
+_TITLE: Final = "Error landscape of the model"
+_STORED: Final = TypeAdapter(Landscape)
+_EVERY: Final = tuple(JobState)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The card, and whether a job has yet to be asked for what it is to show."""
+
+    card: Card
+    wanted: bool = False
+
+
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> Asked:
+    """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
+    campaign = repository.get_one(session, campaign_id)
+    proposal = repository.latest_proposal(session, campaign_id)
+    if (never := _impossible(campaign)) is not None:
+        return _waiting(never)
+    if proposal is None:
+        return _waiting("The landscape appears here once the first gains are proposed.")
+    found = _result(session, campaign_id, proposal.id)
+    if found is None:
+        return _not_yet(session, campaign, proposal)
+    drawn = history_of(session, campaign_id, curves=False)
+    return Asked(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
+
+
+def request_landscape(session: Session, campaign_id: int) -> None:
+    """A job computes the landscape of the latest proposal, unless one does or did already."""
+    proposal = repository.latest_proposal(session, campaign_id)
+    if proposal is None or _job(session, campaign_id, proposal.id) is not None:
+        return
+    order: JsonObject = {"name": _name(campaign_id), "proposal_id": proposal.id}
+    job = jobs.enqueue_job(session, LANDSCAPE_JOB, campaign_id=campaign_id, order=order)
+    job.order = order  # one that still waits was meant for a proposal that is overtaken
+
+
+def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Plan:
+    """What the job's proposal was computed from. Raises ConflictError once the campaign's flights are others."""
+    past = read_history(session, campaign_id)
+    named = order.get("proposal_id")
+    proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None
+    if proposal is None:
+        raise GainlineError("The order names no proposal.", hint="Open the campaign to have it computed anew.")
+    if proposal.history_digest != past.digest:
+        raise ConflictError(
+            "The campaign's flights have changed since these gains were proposed.",
+            hint="Nothing is to be done: the landscape of the next proposal takes its place.",
+        )
+    return Plan(
+        definition=past.definition,
+        flights=past.flights,
+        donor=past.donor,
+        centre=_centre(past, proposal),
+        marks=(*(flight.gains for flight in past.flights), proposal.gains),
+    )
+
+
+def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
+    """The job's result."""
+    return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
+
+
+def _impossible(campaign: CampaignRow) -> str | None:
+    definition = definition_of(campaign)
+    if experiment_of(definition).modelled is None:
+        return "There is no model of this vehicle's controller, so there is no landscape to draw: only flights tell."
+    if free_gains(space_of(definition)) < 2:
+        return "The campaign's bounds leave fewer than two gains free: a landscape takes two."
+    return None
+
+
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> Asked:
+    if is_stale(campaign, proposal, history.trials_of(session, campaign.id)):
+        return _waiting("The next gains are being computed; the landscape that they lie in follows.")
+    job = _job(session, campaign.id, proposal.id)
+    if job is not None and job.state in {JobState.FAILED, JobState.CANCELLED}:
+        said = jobs.trouble(job)
+        why = "It was cancelled." if said is None else f"{said.title} {said.hint}"
+        return _waiting(f"The landscape could not be computed. {why} The page Jobs can start it again.")
+    reason = (
+        "The model is being flown with several hundred gain sets around the flown and the proposed ones. That takes "
+        "seconds, or half a minute with the calibrated model; the landscape appears here by itself."
+    )
+    return Asked(_card(reason), wanted=job is None)
+
+
+def _waiting(reason: str) -> Asked:
+    return Asked(_card(reason))
+
+
+def _card(reason: str) -> Card:
+    return Card(name=LandscapeFigure.name, title=_TITLE, state="waiting", reason=reason)
+
+
+def _name(campaign_id: int) -> str:
+    return f"campaign {campaign_id}"
+
+
+def _job(session: Session, campaign_id: int, proposal_id: int) -> JobRow | None:
+    """The newest job for that proposal."""
+    job = jobs.latest_ordered(session, LANDSCAPE_JOB, _name(campaign_id), _EVERY)
+    return job if job is not None and (job.order or {}).get("proposal_id") == proposal_id else None
+
+
+def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape | None:
+    job = jobs.latest_result(session, LANDSCAPE_JOB, _name(campaign_id))
+    if job is None or job.result is None or job.result["proposal_id"] != proposal_id:
+        return None
+    return _STORED.validate_python(job.result["landscape"])
+
+
+def _centre(past: History, proposal: ProposalRow) -> dict[str, float]:
+    """The gains of the flight that the proposal starts from, else its own."""
+    number = proposal.explanation.get("base_flight")
+    base = next((flight for flight in past.flights if flight.number == number), None)
+    return dict(proposal.gains if base is None else base.gains)
+
+
+def _search(proposal: ProposalRow) -> Search:
+    """How the strategy looked for the next gains, as its explanation has it."""
+    said = proposal.explanation
+    return Search(
+        gradient=dict(said.get("gradient", {})),
+        direction=dict(said.get("direction", {})),
+        tried=tuple(Tried(dict(step["gains"]), float(step["predicted_error"])) for step in said.get("ladder", ())),
+    )

@@ -1,0 +1,383 @@
+"""A campaign's gains as a path over its model's error: contours over two gains at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, floor, log10
+from typing import ClassVar, Final
+
+import numpy as np
+
+from app.core.landscape import Landscape, Slice
+from app.core.policy import Gain, Gains
+from app.figures import theme
+from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.history import FlightData, History
+from app.figures.theme import PALETTES, Palette, ThemeName
+
+LEVELS: Final = 9
+"""Contours, about."""
+SHOWN_SHARE: Final = 0.8
+"""Share of all points that the scale covers; what lies beyond is shaded as off the scale."""
+MOST_NUMBERED: Final = 12
+"""Of more flights only the first, the best and the latest bear their number."""
+_GAP: Final = 0.09
+_STACK_GAP: Final = 0.085
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """One step that was tried on the model, and what it predicted there."""
+
+    gains: Gains
+    predicted_error: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """How the next gains were looked for: the slopes of the error, the direction of the line, the steps tried on it."""
+
+    gradient: Gains
+    direction: Gains
+    tried: tuple[Tried, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Contours from `low` to `high` every `step`, in the error's unit; what is above is off the scale."""
+
+    low: float
+    high: float
+    step: float
+
+
+@dataclass(frozen=True, slots=True)
+class LandscapeFigure:
+    """Table columns: `what`, one per gain, `predicted` and `measured` error; the rows are the flights, the steps tried,
+    the proposal, and the lowest point of each slice.
+
+    Traces bear in `meta` their role (model, beyond, path, best, line, tried, proposed) and their slice, from 1 on.
+    """
+
+    history: History
+    landscape: Landscape
+    search: Search
+    theme: ThemeName = "light"
+    stacked: bool = False
+    name: ClassVar[str] = "landscape"
+    title: ClassVar[str] = "Error landscape of the model"
+
+    def not_ready(self) -> str | None:
+        return None if self.landscape.slices else "There is nothing to draw: no gain is free."
+
+    def compute(self) -> Card:
+        palette, slices = PALETTES[self.theme], self.landscape.slices
+        scale = scale_of(slices)
+        traces: list[dict[str, object]] = []
+        axes: dict[str, object] = {}
+        for index, one in enumerate(slices, start=1):
+            traces += self._slice(palette, index, one, scale)
+            axes |= self._axes(palette, index, one)
+        layout = theme.layout(palette, uirevision="landscape", margin={"l": 8, "r": 14, "t": 12, "b": 8}, **axes)
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=self._summary(scale),
+            figure=plotly_json(traces, layout),
+            table=self._table(),
+        )
+
+    def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> list[dict[str, object]]:
+        return [
+            *_ground(palette, index, one, scale, self.history.error_unit),
+            *self._line(palette, index, one),
+            *self._tried(palette, index, one),
+            *self._path(palette, index, one),
+            *self._proposed(palette, index, one),
+        ]
+
+    def _path(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+        flights, best = self.history.flights, self.history.best
+        if not flights:
+            return []
+        unit = self.history.error_unit
+        path = _marks(index, one, [flight.gains for flight in flights], "path") | {
+            "name": "Flights, in their order",
+            "mode": "lines+markers+text",
+            "line": theme.line(palette.ink, 1.5),
+            "marker": {"size": 7, "color": palette.surface, "opacity": 1, "line": {"width": 1.5, "color": palette.ink}},
+            "text": _numbers(flights, best, one),
+            "textposition": "top center",
+            "textfont": {"size": 12, "color": palette.ink, "weight": 700},
+            "hovertext": [_told(flight, unit) for flight in flights],
+        }
+        if best is None:
+            return [path]
+        star = _marks(index, one, [best.gains], "best") | {
+            "name": f"Best, flight {best.number}",
+            "mode": "markers",
+            "marker": {
+                "size": 17,
+                "symbol": "star",
+                "color": palette.best,
+                "opacity": 1,
+                "line": {"width": 1.5, "color": palette.surface},
+            },
+            "hovertext": [_told(best, unit)],
+        }
+        return [path, star]
+
+    def _line(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+        """From the centre along the direction that was searched, to the edge of the slice."""
+        ends = _to_edge(one, self.landscape.centre, self.search.direction)
+        if ends is None:
+            return []
+        is_gradient = bool(self.search.tried)
+        line = _marks(index, one, ends, "line") | {
+            "name": "Along the gradient" if is_gradient else "Towards the model's optimum",
+            "mode": "lines",
+            "line": theme.line(palette.prediction, 2, "dot"),
+            "hoverinfo": "skip",
+        }
+        del line["hovertemplate"]
+        return [line]
+
+    def _tried(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+        inside = [step for step in self.search.tried if _holds(one, step.gains)]
+        if not inside:
+            return []
+        unit = self.history.error_unit
+        steps = _marks(index, one, [step.gains for step in inside], "tried") | {
+            "name": "Steps tried on the model",
+            "mode": "markers",
+            "marker": {
+                "size": 6,
+                "symbol": "circle-open",
+                "color": palette.prediction,
+                "opacity": 1,
+                "line": {"width": 1.5},
+            },
+            "hovertext": [f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
+        }
+        return [steps]
+
+    def _proposed(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+        proposal = self.history.proposal
+        if proposal is None:
+            return []
+        told = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
+        mark = _marks(index, one, [proposal.gains], "proposed") | {
+            "name": f"Flight {proposal.number}, proposed",
+            "mode": "markers",
+            "marker": {
+                "size": 13,
+                "symbol": "diamond",
+                "color": palette.prediction,
+                "opacity": 1,
+                "line": {"width": 1.5, "color": palette.surface},
+            },
+            "hovertext": [f"Flight {proposal.number}, proposed{told} {self.history.error_unit if told else ''}"],
+        }
+        return [mark]
+
+    def _axes(self, palette: Palette, index: int, one: Slice) -> dict[str, object]:
+        across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
+        named = {gain.name: gain for gain in self.history.gains}
+        suffix = _suffix(index)
+        return {
+            f"xaxis{suffix}": theme.titled(
+                palette,
+                _title(named[one.x]),
+                domain=across,
+                anchor=f"y{suffix}",
+                range=[one.x_values[0], one.x_values[-1]],
+                nticks=5,
+                showgrid=False,
+            ),
+            f"yaxis{suffix}": theme.titled(
+                palette,
+                _title(named[one.y]),
+                domain=up,
+                anchor=f"x{suffix}",
+                range=[one.y_values[0], one.y_values[-1]],
+                nticks=6,
+                showgrid=False,
+            ),
+        }
+
+    def _summary(self, scale: Scale) -> str:
+        pairs = ", ".join(f"{one.y} over {one.x}" for one in self.landscape.slices)
+        held = ", ".join(f"{name} {value:g}" for name, value in self.landscape.centre.items())
+        parts = [
+            f"The error that the model predicts, {pairs}.",
+            f"What a slice does not vary is held at {held}; flights with other values there are drawn all the same.",
+            f"Contours every {scale.step:g} {self.history.error_unit}; shaded is what lies above {scale.high:g}.",
+        ]
+        if self.landscape.still:
+            parts.append(
+                f"Varied are the gains that hold most of the gradient; {', '.join(self.landscape.still)} stand still."
+            )
+        return " ".join(parts)
+
+    def _table(self) -> Table:
+        history = self.history
+        columns = (
+            Column("what", "What"),
+            *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in history.gains),
+            Column("predicted", "Predicted error", history.error_unit, 4),
+            Column("measured", "Measured error", history.error_unit, 4),
+        )
+        rows: list[tuple[Cell, ...]] = [
+            self._row(f"Flight {flight.number}", flight.gains, flight.predicted_error, flight.error)
+            for flight in history.flights
+        ]
+        rows += [self._row("Tried on the model", step.gains, step.predicted_error, None) for step in self.search.tried]
+        if history.proposal is not None:
+            next_one = history.proposal
+            rows.append(
+                self._row(f"Flight {next_one.number}, proposed", next_one.gains, next_one.predicted_error, None)
+            )
+        for one in self.landscape.slices:
+            gains, error = lowest(one, self.landscape.centre)
+            rows.append(self._row(f"Lowest of {one.y} over {one.x}", gains, error, None))
+        return Table(columns, tuple(rows))
+
+    def _row(self, what: str, gains: Gains, predicted: float | None, measured: float | None) -> tuple[Cell, ...]:
+        return (what, *(gains[gain.name] for gain in self.history.gains), predicted, measured)
+
+
+def scale_of(slices: Sequence[Slice]) -> Scale:
+    """One for all slices: from their lowest error to what four fifths of their points stay below, in steps of 1, 2 or
+    5."""
+    errors = np.array([error for one in slices for row in one.errors for error in row if error is not None])
+    low, high = float(errors.min()), float(np.quantile(errors, SHOWN_SHARE))
+    step = _nice(max(high - low, 1e-3 * max(abs(high), 1e-9)) / LEVELS)
+    return Scale(low=floor(low / step) * step, high=ceil(high / step) * step, step=step)
+
+
+def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
+    """The gains with the lowest error of a slice, and that error."""
+    errors = np.array([[np.inf if error is None else error for error in row] for row in one.errors])
+    row, column = divmod(int(np.argmin(errors)), errors.shape[1])
+    return {**centre, one.x: one.x_values[column], one.y: one.y_values[row]}, float(errors[row, column])
+
+
+def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -> list[dict[str, object]]:
+    """The contours, and a shade over what lies above them."""
+    suffix = _suffix(index)
+    common: dict[str, object] = {
+        "type": "contour",
+        "x": list(one.x_values),
+        "y": list(one.y_values),
+        "z": [list(row) for row in one.errors],
+        "xaxis": f"x{suffix}",
+        "yaxis": f"y{suffix}",
+        "showscale": False,
+        "line": {"width": 0.9, "color": theme.faint(palette.dim, 0.75), "smoothing": 1},
+    }
+    ground = common | {
+        "name": "Predicted error",
+        "showlegend": False,
+        "contours": {
+            "start": scale.low,
+            "end": scale.high,
+            "size": scale.step,
+            "coloring": "fill",
+            "showlabels": True,
+            "labelfont": {"size": 11, "color": palette.dim},
+        },
+        "zmin": scale.low,
+        "zmax": scale.high,
+        "colorscale": [
+            [0, theme.faint(palette.best, 0.55)],
+            [0.35, theme.faint(palette.best, 0.2)],
+            [1, theme.faint(palette.best, 0.0)],
+        ],
+        "meta": {"role": "model", "slice": index},
+        "hovertemplate": f"{one.x} %{{x:.4~g}}, {one.y} %{{y:.4~g}}<br>"
+        f"<b>%{{z:.4f}} {unit}</b> predicted<extra></extra>",
+    }
+    beyond = common | {
+        "name": f"Above {scale.high:g} {unit}",
+        "showlegend": index == 1,
+        "legendgroup": "beyond",
+        "contours": {"type": "constraint", "operation": ">", "value": scale.high},
+        "fillcolor": theme.faint(palette.earlier, 0.28),
+        "line": {"width": 0.9, "color": palette.earlier, "smoothing": 1},
+        "hoverinfo": "skip",
+        "meta": {"role": "beyond", "slice": index},
+    }
+    return [ground, beyond]
+
+
+def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str) -> dict[str, object]:
+    """A trace through these gains, as they lie in the slice."""
+    suffix = _suffix(index)
+    return {
+        "type": "scatter",
+        "xaxis": f"x{suffix}",
+        "yaxis": f"y{suffix}",
+        "x": [each[one.x] for each in gains],
+        "y": [each[one.y] for each in gains],
+        "legendgroup": role,
+        "showlegend": index == 1,
+        "cliponaxis": True,
+        "meta": {"role": role, "slice": index},
+        "hovertemplate": f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>",
+    }
+
+
+def _numbers(flights: Sequence[FlightData], best: FlightData | None, one: Slice) -> list[str]:
+    """The numbers beside the path, those of one place together at its first flight."""
+    named = flights if len(flights) <= MOST_NUMBERED else [flights[0], *([best] if best else []), flights[-1]]
+    numbers: dict[tuple[float, float], list[int]] = {}
+    for flight in sorted({flight.number: flight for flight in named}.values(), key=lambda flight: flight.number):
+        numbers.setdefault((flight.gains[one.x], flight.gains[one.y]), []).append(flight.number)
+    return [", ".join(map(str, numbers.pop((flight.gains[one.x], flight.gains[one.y]), []))) for flight in flights]
+
+
+def _told(flight: FlightData, unit: str) -> str:
+    error = "no error" if flight.error is None else f"{flight.error:.4f} {unit} measured"
+    return f"Flight {flight.number}, {error}"
+
+
+def _to_edge(one: Slice, centre: Gains, direction: Gains) -> list[Gains] | None:
+    """The centre, and where the direction leaves the slice; None where it does not lead anywhere in it."""
+    lengths = []
+    for name, values in ((one.x, one.x_values), (one.y, one.y_values)):
+        if slope := direction.get(name, 0.0):
+            edge = values[-1] if slope > 0.0 else values[0]
+            lengths.append((edge - centre[name]) / slope)
+    if not lengths or min(lengths) <= 0.0:
+        return None
+    return [centre, {name: value + min(lengths) * direction.get(name, 0.0) for name, value in centre.items()}]
+
+
+def _holds(one: Slice, gains: Gains) -> bool:
+    return all(
+        values[0] <= gains[name] <= values[-1] for name, values in ((one.x, one.x_values), (one.y, one.y_values))
+    )
+
+
+def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[float]]:
+    """A slice's share of the width and of the height: side by side, or one below the other, the first on top."""
+    gap = _STACK_GAP if stacked else _GAP
+    size = (1.0 - gap * (count - 1)) / count
+    first = (index - 1) * (size + gap)
+    if stacked:
+        return [0.0, 1.0], [max(0.0, 1.0 - first - size), 1.0 - first]
+    return [first, min(1.0, first + size)], [0.0, 1.0]
+
+
+def _nice(width: float) -> float:
+    """1, 2 or 5 times a power of ten, at least `width`."""
+    decade = 10.0 ** floor(log10(width))
+    return next(round(factor * decade, 12) for factor in (1, 2, 5, 10) if factor * decade >= width)
+
+
+def _title(gain: Gain) -> str:
+    return f"{gain.name} ({gain.unit})" if gain.unit else gain.name
+
+
+def _suffix(index: int) -> str:
+    return "" if index == 1 else str(index)

@@ -1,0 +1,136 @@
+"""The landscape over HTTP: asked for once, computed as a job, drawn with the campaign's own flights."""
+
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.campaigns import landscapes
+from app.core.landscape import foreseen, plan_survey
+from app.db.session import Database
+from app.jobs import service as jobs
+from tests.builders import WORKER, create_flown_trial, create_ready_campaign, get
+
+Json = dict[str, Any]
+
+
+def waiting_jobs(client: TestClient) -> list[Json]:
+    every: list[Json] = get(client, "/api/jobs")["items"]
+    return [job for job in every if job["kind"] == "landscape" and job["state"] == "queued"]
+
+
+def run_landscapes(database: Database) -> int:
+    """Carry out every waiting landscape job as a worker does; how many there were."""
+    count = 0
+    while True:
+        with database.write() as session:
+            job = jobs.claim_job(session, worker=WORKER, kinds=(landscapes.LANDSCAPE_JOB,), lease_s=30.0)
+            if job is None:
+                return count
+            job_id, campaign_id, order = job.id, job.campaign_id, dict(job.order or {})
+        assert campaign_id is not None
+        with database.read() as session:
+            plan = landscapes.read_plan(session, campaign_id, order)
+        survey = plan_survey(plan)
+        assert survey is not None
+        landscape = survey.landscape(foreseen(survey.foresee, survey.points()))
+        with database.write() as session:
+            jobs.finish_job(session, job_id, worker=WORKER, result=landscapes.as_json(landscape, order))
+        count += 1
+
+
+def card_of(client: TestClient, campaign_id: int, query: str = "") -> Json:
+    card: Json = get(client, f"/api/campaigns/{campaign_id}/figures/landscape{query}")
+    return card
+
+
+def traces(card: Json, role: str) -> list[Json]:
+    assert card["state"] == "ready", card["reason"]
+    return [trace for trace in card["figure"]["data"] if trace["meta"]["role"] == role]
+
+
+@pytest.fixture
+def campaign_id(client: TestClient, database: Database) -> int:
+    """A campaign with one flight and the gains for the next."""
+    campaign = create_ready_campaign(client, database, definition={"strategy": "gradient"})
+    create_flown_trial(client, database, campaign["id"], 2.0)
+    return int(campaign["id"])
+
+
+def test_asked_for_twice_it_is_computed_once_and_drawn_when_done(
+    client: TestClient, database: Database, campaign_id: int
+) -> None:
+    assert [card_of(client, campaign_id)["state"] for _ in range(2)] == ["waiting", "waiting"]
+    assert len(waiting_jobs(client)) == 1
+    assert run_landscapes(database) == 1
+    assert card_of(client, campaign_id)["state"] == "ready"
+    assert waiting_jobs(client) == []
+
+
+def test_the_path_goes_through_the_gains_of_the_trials(
+    client: TestClient, database: Database, campaign_id: int
+) -> None:
+    card_of(client, campaign_id)
+    run_landscapes(database)
+    card = card_of(client, campaign_id)
+    trials = get(client, f"/api/campaigns/{campaign_id}/trials")["items"]
+    proposed = get(client, f"/api/campaigns/{campaign_id}/proposal")["proposal"]
+    for path, best, diamond, (x, y) in zip(
+        traces(card, "path"),
+        traces(card, "best"),
+        traces(card, "proposed"),
+        (("kp", "ki"), ("kp", "kd"), ("ki", "kd")),
+        strict=True,
+    ):
+        assert path["x"] == [trial["gains"][x] for trial in trials]
+        assert path["y"] == [trial["gains"][y] for trial in trials]
+        assert (best["x"], best["y"]) == ([trials[0]["gains"][x]], [trials[0]["gains"][y]])
+        assert (diamond["x"], diamond["y"]) == ([proposed["gains"][x]], [proposed["gains"][y]])
+    tried = [row for row in card["table"]["rows"] if row[0] == "Tried on the model"]
+    ladder = proposed["explanation"]["ladder"]
+    assert [row[4] for row in tried] == pytest.approx([step["predicted_error"] for step in ladder])
+
+
+def test_another_proposal_has_a_landscape_of_its_own(client: TestClient, database: Database, campaign_id: int) -> None:
+    card_of(client, campaign_id)
+    run_landscapes(database)
+    create_flown_trial(client, database, campaign_id, 1.9)
+    assert card_of(client, campaign_id)["state"] == "waiting"
+    assert run_landscapes(database) == 1
+    assert len(traces(card_of(client, campaign_id), "path")[0]["x"]) == 2
+
+
+def test_stacked_slices_stand_one_below_the_other(client: TestClient, database: Database, campaign_id: int) -> None:
+    card_of(client, campaign_id)
+    run_landscapes(database)
+    beside, below = (card_of(client, campaign_id, query)["figure"]["layout"] for query in ("", "?stacked=true"))
+    assert beside["xaxis"]["domain"][1] < beside["xaxis2"]["domain"][0]
+    assert below["xaxis"]["domain"] == [0.0, 1.0]
+    assert below["yaxis2"]["domain"][1] < below["yaxis"]["domain"][0]
+
+
+def test_without_a_model_the_card_says_so_and_nothing_is_computed(client: TestClient, database: Database) -> None:
+    vehicle = client.post(
+        "/api/vehicles",
+        json={
+            "name": "Moth",
+            "kind": "mavlink",
+            "options": {"autopilot": "px4", "address": "udpin:127.0.0.1:14997", "simulated": True},
+        },
+    ).json()
+    campaign = client.post(
+        "/api/campaigns",
+        json={
+            "name": "By hand",
+            "vehicle": {"kind": "mavlink", "id": vehicle["id"]},
+            "definition": {"experiment": "takeoff-px4", "strategy": "manual"},
+        },
+    ).json()
+    card = card_of(client, campaign["id"])
+    assert card["state"] == "waiting"
+    assert "no model" in card["reason"]
+    assert waiting_jobs(client) == []
+
+
+def test_an_unknown_campaign_is_refused(client: TestClient) -> None:
+    assert client.get("/api/campaigns/999/figures/landscape").status_code == 404

@@ -1,0 +1,43 @@
+"""Contours that one cliff cannot flatten, and a path whose numbers can be read."""
+
+import pytest
+
+from app.core.landscape import Landscape, Slice
+from app.figures.landscape import LandscapeFigure, Search, Tried, lowest, scale_of
+from tests.figures.builders import flight, history, proposal, trace
+
+VALUES = tuple(float(value) for value in range(10))
+BOWL = tuple(tuple(0.1 + 0.01 * ((x - 4) ** 2 + (y - 6) ** 2) for x in VALUES) for y in VALUES)
+CENTRE = {"kp": 281.0, "ki": 10.0, "kd": 80.0}
+
+
+def cliff(error: float | None) -> Slice:
+    """A bowl whose first row fell off the model."""
+    return Slice(x="kp", y="ki", x_values=VALUES, y_values=VALUES, errors=((error,) * 10, *BOWL[1:]))
+
+
+def test_a_cliff_does_not_set_the_scale() -> None:
+    scale = scale_of([cliff(1e6)])
+    assert scale.low <= 0.1
+    assert 0.2 < scale.high < 1.0
+    assert 4 <= (scale.high - scale.low) / scale.step <= 12
+
+
+def test_points_without_a_finite_error_stay_empty() -> None:
+    assert lowest(cliff(None), CENTRE) == ({"kp": 4.0, "ki": 6.0, "kd": 80.0}, pytest.approx(0.1))
+
+
+def test_flights_of_one_place_share_a_number_and_the_line_ends_at_the_edge() -> None:
+    land = Landscape(centre={"kp": 4.0, "ki": 6.0, "kd": 80.0}, slices=(cliff(None),))
+    search = Search(
+        gradient={"kp": 1.0},
+        direction={"kp": -2.0, "ki": 1.0, "kd": 0.0},
+        tried=(Tried({"kp": 2, "ki": 7, "kd": 80}, 0.2),),
+    )
+    flown = history(flight(1, 0.3), flight(2, 0.2), proposal=proposal(3))
+    twice = history(flown.flights[0], flown.flights[0], flown.flights[1])
+    card = LandscapeFigure(flown, land, search).compute()
+    assert trace(card, "path")["text"] == ["1", "2"]
+    assert (trace(card, "line")["x"], trace(card, "line")["y"]) == ([4.0, 0.0], [6.0, 8.0])
+    assert (trace(card, "tried")["x"], trace(card, "proposed")["x"]) == ([2], [500])
+    assert trace(LandscapeFigure(twice, land, search).compute(), "path")["text"] == ["1", "", "2"]
