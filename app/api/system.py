@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from app import __version__
 from app.api.deps import CurrentDatabase, CurrentSettings, Live
 from app.data_dir import folder_bytes
-from app.db.backup import take_backup
+from app.db.backup import database_bytes, take_backup
 from app.db.migrate import revision_of
 from app.errors import InputError, Problem
 from app.network import EXPOSES, addresses_elsewhere, exposure, is_in_container
@@ -63,7 +63,7 @@ def get_system(request: Request, settings: CurrentSettings, database: CurrentDat
         data_dir=str(settings.data_dir.resolve()),
         data_bytes=folder_bytes(settings.data_dir),
         free_bytes=shutil.disk_usage(settings.data_dir).free,
-        database_bytes=database.file.stat().st_size,
+        database_bytes=database_bytes(database.file),
         database_revision=revision_of(database.file) or "none",
     )
 

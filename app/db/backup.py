@@ -27,3 +27,10 @@ def take_backup(database_file: Path) -> BinaryIO:
             source.backup(copy)
             copy.execute("PRAGMA journal_mode = DELETE")  # one file, readable without -wal beside it
         return copied.open("rb")
+
+
+def database_bytes(database_file: Path) -> int:
+    """What a copy takes now: with what lies in the write-ahead log still. Raises StorageError."""
+    with translated(database_file), closing(sqlite3.connect(database_file)) as source:
+        (pages,), (page_bytes,) = (source.execute(f"PRAGMA {of}").fetchone() for of in ("page_count", "page_size"))
+    return int(pages) * int(page_bytes)

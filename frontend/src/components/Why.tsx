@@ -86,8 +86,9 @@ function Tried({ explanation, unit, gains }: Props) {
       <div className={classes["stack"]}>
         {slopes.length > 0 && (
           <span className="numbers">
-            Gradient of the error: {slopes.map(([name, value]) => `${name} ${value.toPrecision(2)}`).join(", ")} {unit}{" "}
-            per unit of the gain. <Help topic="gradient" />
+            Gradient of the error:{" "}
+            {slopes.map(([name, value]) => `${name} ${value.toPrecision(2).replace("-", "−")}`).join(", ")} {unit} per
+            unit of the gain. <Help topic="gradient" />
           </span>
         )}
         {ladder.length > 0 && (

@@ -65,3 +65,13 @@ test("sizes are told in the digits that matter", () => {
     "1.4 TB",
   ]);
 });
+
+test("large counts come in groups of three", () => {
+  expect([7, 999, 1000, 16_700, 1_234_567].map(grouped)).toEqual([
+    "7",
+    "999",
+    "1\u2009000",
+    "16\u2009700",
+    "1\u2009234\u2009567",
+  ]);
+});

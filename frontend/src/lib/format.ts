@@ -49,6 +49,11 @@ export function count(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+/** A large count in groups of three, apart by a thin space: neither point nor comma, which elsewhere mean other things. */
+export function grouped(number: number): string {
+  return String(number).replace(/\B(?=(\d{3})+$)/g, "\u2009");
+}
+
 const SIZES = ["kB", "MB", "GB", "TB"] as const;
 
 /** `1.4 GB`: what a disk or a file holds, in powers of a thousand as disks are sold. */

@@ -7,6 +7,7 @@ import { Missing } from "../components/Missing";
 import { useTitle } from "../components/useTitle";
 import { useUnits } from "../components/useUnits";
 import { VerdictPanel } from "../components/VerdictPanel";
+import { grouped } from "../lib/format";
 import classes from "./FlightPage.module.css";
 import { NotFoundPage } from "./NotFoundPage";
 
@@ -50,8 +51,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
       <div className={classes["facts"]}>
         {record !== null && (
           <p className="numbers">
-            {record.samples.toLocaleString()} samples over {record.duration_s.toFixed(1)} s, source {record.source},
-            clock {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
+            {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
+            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
           </p>
         )}
         <GateChecks gate={gate} />
