@@ -145,3 +145,31 @@ def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switch
     error = dashboard.trials(campaign_id)[-1]["error"]
     dashboard.until(lambda: f"Landed, valid, {error:.2f} metres." in said(dashboard))
     assert "Taking off." in said(dashboard)
+
+
+def test_every_number_that_one_may_ask_about_is_explained_by_keyboard(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", strategy="calibrated", stop={"kind": "budget", "max_flights": 20})
+    dashboard.fly_headless(campaign_id, 2)
+    dashboard.fly_headless_body(campaign_id, {"variant": "repeat"})
+    dashboard.when_ready(campaign_id)
+    dashboard.open_campaign(campaign_id)
+    dashboard.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    expect(dashboard.page.get_by_role("button", name="What was learned of the vehicle?")).to_be_visible()
+    asked = set()
+    for question in dashboard.page.locator("main button[aria-haspopup=dialog]:visible").all():
+        words = question.get_attribute("aria-label") or ""
+        question.focus()
+        dashboard.page.keyboard.press("Enter")
+        answer = dashboard.page.locator(f"[role=dialog][aria-label='{words}']:popover-open")
+        expect(answer).to_be_focused()
+        assert len(answer.inner_text()) > 60, words
+        dashboard.page.keyboard.press("Escape")
+        expect(answer).to_have_count(0)
+        expect(question).to_be_focused()
+        asked.add(words)
+    assert asked >= {
+        "What is the error?", "What is the predicted error?", "What is the interval?", "What is the overshoot?",
+        "How is the model corrected by the flights?", "How are gains checked?", "Where does the scatter come from?",
+        "What is the standard error?", "When is a difference real?", "What do the lines mean?",
+        "What has the next flight to beat?",
+    }  # fmt: skip

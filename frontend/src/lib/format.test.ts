@@ -4,6 +4,7 @@ import {
   bytesText,
   count,
   gainText,
+  grouped,
   localTime,
   NOTHING,
   percentChange,
