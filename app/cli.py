@@ -4,7 +4,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Literal, ParamSpec
 
 import typer
 
@@ -33,6 +33,7 @@ CampaignSource = Annotated[
         metavar="PRESET|FILE.yaml", show_default=False, help="A preset, as ardrone-takeoff, or a campaign file."
     ),
 ]
+GivenCampaign = Annotated[str, typer.Argument(metavar="ID|NAME", show_default=False, help="The campaign.")]
 StartGains = Annotated[
     str | None,
     typer.Option(
@@ -277,6 +278,54 @@ def import_log(
 
     settings = _settings(data_dir=data_dir)
     run(file, settings, campaign=campaign, trial=trial, takeoff=takeoff, yes=yes, json_out=json_out)
+
+
+@app.command()
+@plainly
+def report(
+    campaign: GivenCampaign,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", show_default=False, help="Where to.  [default: campaign-ID-report.html]"),
+    ] = None,
+    kind: Annotated[
+        Literal["html", "pdf"] | None,
+        typer.Option("--format", show_default=False, help="html or pdf.  [default: what FILE ends in, else html]"),
+    ] = None,
+    data_dir: DataDir = None,
+) -> None:
+    """Write a campaign's report as one file that needs neither this program nor a network; PDF needs a Chromium."""
+    from app.commands.report import report as run
+
+    run(campaign, _settings(data_dir=data_dir), out=out, kind=kind)
+
+
+@app.command()
+@plainly
+def bundle(
+    campaign: GivenCampaign,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", show_default=False, help="Where to.  [default: campaign-ID.gainline.zip]"),
+    ] = None,
+    data_dir: DataDir = None,
+) -> None:
+    """Write a whole campaign, records, photos and logs included, as one file for another installation."""
+    from app.commands.bundles import bundle as run
+
+    run(campaign, _settings(data_dir=data_dir), out=out)
+
+
+@app.command()
+@plainly
+def unbundle(
+    file: Annotated[Path, typer.Argument(metavar="FILE", show_default=False, help="What `gainline bundle` wrote.")],
+    data_dir: DataDir = None,
+) -> None:
+    """Bring in a campaign from another installation, every number as it was."""
+    from app.commands.bundles import unbundle as run
+
+    run(file, _settings(data_dir=data_dir))
 
 
 @controller.command()

@@ -13,6 +13,7 @@ from app.api.headers import HeadersMiddleware
 from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
 from app.api.origin import OriginMiddleware
+from app.bundles.router import router as bundles
 from app.campaigns.router import router as campaigns
 from app.compare.router import router as compare
 from app.controller_checks.router import recordings
@@ -69,8 +70,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         reproductions,
         controller_checks,
         recordings,
-        reports,
         compare,
+        reports,
+        bundles,
         landscapes.router,
         figures.router,
         events.router,

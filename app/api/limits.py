@@ -13,14 +13,22 @@ JSON_BYTES: Final = 2**20
 """Largest JSON body."""
 PHOTO_BYTES: Final = 10 * 2**20 + 2**12
 """Largest photo, with the form that it comes in."""
+BUNDLE_BYTES: Final = 2**30
+"""Largest campaign in one file; `gainline unbundle` has no such limit."""
 
 
 class BodyLimitMiddleware:
-    """Bounds every request's body: flight records to `upload_bytes`, photos to 10 MiB, everything else to 1 MiB."""
+    """Bounds every request's body: flight records to `upload_bytes`, photos to 10 MiB, bundles to 1 GiB, everything
+    else to 1 MiB."""
 
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
-        self._uploads = {"/trajectory": upload_bytes, "/controller-checks": upload_bytes, "/photos": PHOTO_BYTES}
+        self._uploads = {
+            "/trajectory": upload_bytes,
+            "/controller-checks": upload_bytes,
+            "/photos": PHOTO_BYTES,
+            "/api/bundles": BUNDLE_BYTES,
+        }
         self._refuse = refuse
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -30,7 +30,9 @@ def one_or_none(session: Session, vehicle_id: int) -> VehicleRow | None:
 
 
 def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
-    return session.scalar(select(VehicleRow).where(VehicleRow.kind == kind, VehicleRow.registered.is_(False)))
+    """The one that campaigns share; those that stand for a vehicle elsewhere say where it comes from."""
+    rows = session.scalars(select(VehicleRow).where(VehicleRow.kind == kind, VehicleRow.registered.is_(False)))
+    return next((row for row in rows if not row.options), None)
 
 
 def of_name_or_none(session: Session, name: str) -> VehicleRow | None:

@@ -36,7 +36,7 @@ from app.trials.schemas import Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
 from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, TrialKind, TrialState
-from app.trials.telemetry_logs import telemetry_log
+from app.trials.telemetry_logs import log_of_trial, telemetry_log
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
 
@@ -232,10 +232,11 @@ class TelemetryLog:
 
 
 def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> TelemetryLog:
-    """Of the trial's last flight that left one. Raises NotFoundError when none did."""
+    """Of the trial's last flight that left one, else the one that came in with it from elsewhere. Raises NotFoundError
+    when there is none."""
     row = repository.get_one(session, trial_id)
-    for flight_id in repository.flight_ids(session, trial_id):
-        file = telemetry_log(data_dir, flight_id)
+    flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
+    for file in (*flown, log_of_trial(data_dir, trial_id)):
         if file.is_file():
             return TelemetryLog(file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog")
     raise NotFoundError(

@@ -1,0 +1,1 @@
+"""A campaign as one file: out of one installation, and into another with every number as it was."""

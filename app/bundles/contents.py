@@ -1,0 +1,194 @@
+"""What a bundle holds, version 1, and what of it can be believed.
+
+A zip of `manifest.json` (who wrote it, and the SHA-256 of every other part), `contents.json` (the campaign, after those
+that it starts from), and one part for each record, photo and telemetry log. A record is stored as in the database
+(`app.trials.codec`), with its own checksum.
+"""
+
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+
+from app.campaigns.schemas import Definition
+from app.campaigns.states import CampaignState, Outcome
+from app.core.advice import Advice
+from app.core.spread import Spread
+from app.core.stopping import StopVerdict
+from app.core.strategies.base import Explanation
+from app.core.strategies.base import Kind as ProposalKind
+from app.schemas import Gate, Interval, Name, OptionValue
+from app.trials.schemas import Glitch
+from app.trials.states import Ending, TrialKind, TrialState
+
+FORMAT: Final = "gainline-campaign"
+VERSION: Final = 1
+MANIFEST: Final = "manifest.json"
+CONTENTS: Final = "contents.json"
+
+JsonObject = dict[str, Any]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=0, le=2**53)]
+Word = Annotated[str, Field(max_length=200)]
+Sentence = Annotated[str, Field(max_length=10_000)]
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Part = Annotated[str, Field(pattern=r"^(records|photos|telemetry)/[0-9a-z-]{1,60}\.[a-z]{3,5}$")]
+Gains = Annotated[dict[Word, int | Finite], Field(min_length=1, max_length=50)]
+Options = Annotated[dict[Word, OptionValue], Field(max_length=100)]
+
+
+def _fits(kind: Any) -> AfterValidator:
+    """The same object, once it has been seen to be one of this kind: stored numbers must not change their type."""
+    adapter: TypeAdapter[Any] = TypeAdapter(kind)
+
+    def check(given: JsonObject) -> JsonObject:
+        adapter.validate_python(given)
+        return given
+
+    return AfterValidator(check)
+
+
+def _spread_of(given: JsonObject) -> JsonObject:
+    TypeAdapter(Spread).validate_python({name: value for name, value in given.items() if name != "flights"})
+    TypeAdapter(list[int] | None).validate_python(given.get("flights"))
+    return given
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", from_attributes=True)
+
+
+class Manifest(_Strict):
+    """`parts`: the SHA-256 of every other file in the zip, by its name."""
+
+    format: Literal["gainline-campaign"]
+    version: Literal[1]
+    program: Word
+    made_at: AwareDatetime
+    parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
+
+
+class Record(_Strict):
+    """A stored trajectory; `part` holds its samples, compressed."""
+
+    part: Part
+    codec: Literal[1]
+    columns: Annotated[list[Word], Field(min_length=2, max_length=64)]
+    samples: Annotated[int, Field(ge=1, le=1_000_000)]
+    duration_s: Finite
+    source: Word
+    clock: Word
+    checksum: Digest
+    created_at: AwareDatetime
+
+
+class Photo(_Strict):
+    part: Part
+    media_type: Word
+    added_at: AwareDatetime
+
+
+class Trial(_Strict):
+    """As the database has it. `proposal` counts the campaign's proposals from 0."""
+
+    number: Annotated[int, Field(ge=1, le=2**31)]
+    state: TrialState
+    kind: TrialKind
+    gains: Gains
+    read_back: Gains | None
+    proposal: Annotated[int, Field(ge=0)] | None
+    predicted_error: Finite | None
+    predicted_interval: Annotated[JsonObject, _fits(Interval)] | None
+    gate: Annotated[JsonObject, _fits(Gate)]
+    record: Record | None
+    error: Finite | None
+    overshoot_m: Finite | None
+    curve: Annotated[list[tuple[Finite, Finite]], Field(max_length=5000)] | None
+    ending: Ending | None
+    settings: Options
+    reason: Sentence
+    note: Sentence
+    overrule_reason: Sentence
+    glitches: list[Annotated[JsonObject, _fits(Glitch)]] | None
+    repaired_error: Finite | None
+    landing_battery_v: Finite | None
+    seed: Count
+    created_at: AwareDatetime
+    flown_at: AwareDatetime | None
+    photos: Annotated[list[Photo], Field(max_length=100)]
+    telemetry: Part | None
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.state in {TrialState.STAGED, TrialState.FLYING}:
+            raise ValueError(f"is {self.state}: a flight that is under way belongs to the vehicle that flies it")
+        if self.state == TrialState.VALID and self.error is None:
+            raise ValueError("is valid without an error")
+        return self
+
+
+class Proposal(_Strict):
+    history_digest: Digest
+    kind: ProposalKind
+    gains: Gains
+    predicted_error: Finite | None
+    predicted: Record | None
+    explanation: Annotated[JsonObject, _fits(Explanation)]
+    gate: Annotated[JsonObject, _fits(Gate)]
+    stop_verdict: Annotated[JsonObject, _fits(StopVerdict)]
+    interval: Annotated[JsonObject, _fits(Interval)] | None
+    advice: Annotated[JsonObject, _fits(Advice)] | None
+    spread: Annotated[JsonObject, AfterValidator(_spread_of)] | None
+    computed_at: AwareDatetime
+
+
+class Vehicle(_Strict):
+    """What the campaign was flown on, as it was called there."""
+
+    kind: Word
+    name: Name
+    title: Name
+    is_real: bool
+    registered: bool
+    safe_gains: Gains
+
+
+class Campaign(_Strict):
+    """`id` is the one that it had; the new one is its own."""
+
+    id: Annotated[int, Field(ge=1, le=2**63 - 1)]
+    name: Name
+    state: CampaignState
+    outcome: Outcome | None
+    stop_reason: Sentence
+    definition: Annotated[JsonObject, _fits(Definition)]
+    definition_digest: Digest | None
+    safe_gains: Gains | None
+    vehicle: Vehicle
+    vehicle_options: Options
+    created_at: AwareDatetime
+    trials: Annotated[list[Trial], Field(max_length=5000)]
+    proposals: Annotated[list[Proposal], Field(max_length=10_000)]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        numbers = [trial.number for trial in self.trials]
+        if len(set(numbers)) < len(numbers):
+            raise ValueError("has two trials of the same number")
+        if self.state == CampaignState.FLYING:
+            raise ValueError("is flying: a flight that is under way belongs to the vehicle that flies it")
+        for trial in self.trials:
+            if trial.proposal is not None and trial.proposal >= len(self.proposals):
+                raise ValueError(f"trial {trial.number} names proposal {trial.proposal}, which is not there")
+        return self
+
+    def records(self) -> list[tuple[str, Record]]:
+        """Every record with the field that it stands in."""
+        flown = [(f"trials.{i}.record", trial.record) for i, trial in enumerate(self.trials)]
+        predicted = [(f"proposals.{i}.predicted", proposal.predicted) for i, proposal in enumerate(self.proposals)]
+        return [(field, record) for field, record in (*flown, *predicted) if record is not None]
+
+
+class Contents(_Strict):
+    """The campaign last, after those that it starts from, the first of them first."""
+
+    campaigns: Annotated[list[Campaign], Field(min_length=1, max_length=20)]

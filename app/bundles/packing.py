@@ -1,0 +1,146 @@
+"""A campaign on its way out: rows into the parts of a zip."""
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO, Final
+
+from sqlalchemy.orm import Session
+
+from app import __version__
+from app.bundles import repository
+from app.bundles.contents import (
+    CONTENTS,
+    FORMAT,
+    MANIFEST,
+    VERSION,
+    Campaign,
+    Contents,
+    Manifest,
+    Photo,
+    Proposal,
+    Record,
+    Trial,
+    Vehicle,
+)
+from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
+from app.db.types import utc_now
+from app.fleet.elsewhere import origin_of
+from app.trials import history
+from app.trials.photos import ENDINGS
+from app.trials.telemetry_logs import log_of_trial, telemetry_log
+
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+"""The time that every part says it has, so that the same campaign makes the same parts."""
+
+
+class Packer:
+    """Writes the parts of one bundle, each as soon as it is read, and remembers what the manifest says of them."""
+
+    def __init__(self, session: Session, data_dir: Path, out: IO[bytes]) -> None:
+        self._session = session
+        self._data_dir = data_dir
+        self._zip = zipfile.ZipFile(out, "w", allowZip64=True)
+        self._digests: dict[str, str] = {}
+
+    def pack(self, campaigns: Sequence[CampaignRow]) -> None:
+        """All of it; the campaign last, after those that it starts from."""
+        with self._zip:
+            contents = Contents(campaigns=[self._campaign(row) for row in campaigns])
+            self._write(CONTENTS, _json(contents.model_dump(mode="json")), squeeze=True)
+            manifest = Manifest(
+                format=FORMAT, version=VERSION, program=__version__, made_at=utc_now(), parts=self._digests
+            )
+            self._write(MANIFEST, _json(manifest.model_dump(mode="json")), squeeze=True)
+
+    def _write(self, name: str, data: bytes, *, squeeze: bool = False) -> str:
+        """`squeeze`: for what is not compressed already."""
+        described = zipfile.ZipInfo(name, _EPOCH)
+        described.compress_type = zipfile.ZIP_DEFLATED if squeeze else zipfile.ZIP_STORED
+        self._zip.writestr(described, data)
+        self._digests[name] = hashlib.sha256(data).hexdigest()
+        return name
+
+    def _campaign(self, row: CampaignRow) -> Campaign:
+        proposals = repository.proposals(self._session, row.id)
+        places = {proposal.id: place for place, proposal in enumerate(proposals)}
+        flights = dict(repository.flights(self._session, row.id))
+        photos: dict[int, list[TrialPhotoRow]] = {}
+        for photo in repository.photos(self._session, row.id):
+            photos.setdefault(photo.trial_id, []).append(photo)
+        return Campaign(
+            id=row.id,
+            name=row.name,
+            state=row.state,
+            outcome=row.outcome,
+            stop_reason=row.stop_reason,
+            definition=row.definition,
+            definition_digest=row.definition_digest,
+            safe_gains=row.safe_gains,
+            vehicle=_vehicle(row.vehicle),
+            vehicle_options=row.vehicle_options,
+            created_at=row.created_at,
+            trials=[
+                self._trial(
+                    trial,
+                    None if trial.proposal_id is None else places.get(trial.proposal_id),
+                    photos.get(trial.id, []),
+                    flights.get(trial.id),
+                )
+                for trial in history.trials_of(self._session, row.id)
+            ],
+            proposals=[self._proposal(proposal) for proposal in proposals],
+        )
+
+    def _trial(self, row: TrialRow, proposal: int | None, photos: list[TrialPhotoRow], flight: int | None) -> Trial:
+        kept = {name: getattr(row, name) for name in Trial.model_fields.keys() & row.__mapper__.columns.keys()}
+        return Trial(
+            **kept,
+            proposal=proposal,
+            record=self._record(row.trajectory),
+            photos=[self._photo(photo) for photo in photos],
+            telemetry=self._telemetry(row, flight),
+        )
+
+    def _proposal(self, row: ProposalRow) -> Proposal:
+        kept = {name: getattr(row, name) for name in Proposal.model_fields.keys() & row.__mapper__.columns.keys()}
+        return Proposal(**kept, predicted=self._record(row.predicted))
+
+    def _record(self, row: TrajectoryRow | None) -> Record | None:
+        if row is None:
+            return None
+        part = self._write(f"records/{row.id}.zst", row.data)
+        self._session.expire(row, ["data"])
+        return Record(
+            part=part,
+            codec=1,
+            **{name: getattr(row, name) for name in Record.model_fields.keys() - {"part", "codec"}},
+        )
+
+    def _photo(self, row: TrialPhotoRow) -> Photo:
+        part = self._write(f"photos/{row.id}.{ENDINGS[row.media_type]}", row.data)
+        self._session.expire(row, ["data"])
+        return Photo(part=part, media_type=row.media_type, added_at=row.added_at)
+
+    def _telemetry(self, row: TrialRow, flight: int | None) -> str | None:
+        """Of the trial's last flight, or the log that came with an earlier bundle."""
+        logs = [log_of_trial(self._data_dir, row.id)]
+        if flight is not None:
+            logs.insert(0, telemetry_log(self._data_dir, flight))
+        found = next((log for log in logs if log.is_file()), None)
+        return None if found is None else self._write(f"telemetry/{row.id}.tlog", found.read_bytes(), squeeze=True)
+
+
+def _vehicle(row: VehicleRow) -> Vehicle:
+    """One that stands for another is told of as that one."""
+    said = Vehicle.model_validate(row)
+    if (origin := origin_of(row)) is None:
+        return said
+    kind, name = origin
+    return said.model_copy(update={"kind": kind, "name": name, "registered": True})
+
+
+def _json(document: object) -> bytes:
+    return json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()

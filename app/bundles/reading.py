@@ -1,0 +1,211 @@
+"""A bundle on its way in: nothing of it is believed before it was looked at.
+
+Parts are read by name and never written where they say; each is bounded while it is read, whatever it claims to hold.
+"""
+
+import hashlib
+import json
+import zipfile
+import zlib
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
+
+import numpy as np
+import zstandard
+from pydantic import BaseModel, ValidationError
+
+from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Photo, Record
+from app.core.experiments import EXPERIMENTS
+from app.errors import GainlineError, InputError, Problem
+from app.trials.codec import Packed, unpack
+from app.trials.photos import MAX_BYTES as PHOTO_BYTES
+from app.trials.photos import media_type_of
+
+MAX_PARTS: Final = 20_000
+MAX_JSON_BYTES: Final = 64 * 2**20
+MAX_PART_BYTES: Final = 256 * 2**20
+MAX_TOTAL_BYTES: Final = 4 * 2**30
+MAX_NUMBERS: Final = 20_000_000
+"""In one record: columns times samples."""
+_METHODS: Final = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
+_ENCRYPTED: Final = 0x1
+_WIDTH: Final = 4
+
+M = TypeVar("M", bound=BaseModel)
+
+
+class Bundle:
+    """An opened bundle whose manifest and contents were read; `check` looks at everything else."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        """Raises InputError naming what is wrong with it."""
+        try:
+            self._zip = zipfile.ZipFile(file)
+        except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+            _refuse("file", f"is no zip file: {error}")
+        self._look_at_directory()
+        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_JSON_BYTES), Manifest, look=_version)
+        listed = self.manifest.parts.keys() | {MANIFEST}
+        if odd := sorted(listed ^ set(self._zip.namelist())):
+            _refuse(f"{MANIFEST}: parts", f"and the files in the zip are not the same: {odd[0][:80]!r}")
+        self.contents = _parsed(CONTENTS, self.part(CONTENTS, MAX_JSON_BYTES), Contents)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
+    ) -> None:
+        self._zip.close()
+
+    def part(self, name: str, limit: int = MAX_PART_BYTES) -> bytes:
+        """A part as it was written. Raises InputError when it is missing, too large, or not the one of the manifest."""
+        if name not in self.manifest.parts:
+            _refuse(name, "is named in the contents, and is not in the bundle")
+        data = self._read(name, limit)
+        if hashlib.sha256(data).hexdigest() != self.manifest.parts[name]:
+            _refuse(name, "does not have the SHA-256 that the manifest says: the file was damaged or changed")
+        return data
+
+    def check(self) -> None:
+        """Look at every record and photo: checksums, sizes, kinds. Raises InputError naming the first that is wrong."""
+        used = {CONTENTS}
+        for place, campaign in enumerate(self.contents.campaigns):
+            field = f"{CONTENTS}: campaigns.{place}"
+            output = _output_of(field, campaign)
+            for where, record in campaign.records():
+                used.add(_once(used, f"{field}.{where}.part", record.part))
+                self._check_record(f"{field}.{where}", record, output)
+            for number, trial in enumerate(campaign.trials):
+                for photo in trial.photos:
+                    used.add(_once(used, f"{field}.trials.{number}.photos", photo.part))
+                    self._check_photo(f"{field}.trials.{number}.photos", photo)
+                if trial.telemetry is not None:
+                    used.add(_once(used, f"{field}.trials.{number}.telemetry", trial.telemetry))
+                    self.part(trial.telemetry)
+        if idle := sorted(self.manifest.parts.keys() - used):
+            _refuse(idle[0], "belongs to nothing in the contents")
+
+    def _look_at_directory(self) -> None:
+        infos = self._zip.infolist()
+        names = [info.filename for info in infos]
+        if len(infos) > MAX_PARTS:
+            _refuse("file", f"holds {len(infos)} parts; {MAX_PARTS} are the most")
+        if len(set(names)) < len(names):
+            _refuse("file", "holds two parts of the same name")
+        if MANIFEST not in names:
+            _refuse(MANIFEST, "is missing: this zip was not written by Gainline")
+        for info in infos:
+            if info.flag_bits & _ENCRYPTED or info.compress_type not in _METHODS:
+                _refuse(info.filename[:80], "is encrypted, or compressed in a way that is not read here")
+        if (total := sum(info.file_size for info in infos)) > MAX_TOTAL_BYTES:
+            _refuse("file", f"would unpack to {total / 2**30:.1f} GiB; {MAX_TOTAL_BYTES / 2**30:g} GiB is the most")
+
+    def _read(self, name: str, limit: int) -> bytes:
+        """At most `limit` bytes are ever unpacked, whatever the directory says."""
+        try:
+            with self._zip.open(name) as stream:
+                data = stream.read(limit + 1)
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError) as error:
+            _refuse(name, f"cannot be unpacked: {error}")
+        if len(data) > limit:
+            _refuse(name, f"is larger than {limit / 2**20:g} MiB")
+        return data
+
+    def _check_record(self, field: str, record: Record, output: str) -> None:
+        columns = record.columns
+        if columns[0] != "time_s" or len(set(columns)) < len(columns) or output not in columns:
+            _refuse(f"{field}.columns", f"must begin with time_s, hold {output}, and each once")
+        size = len(columns) * record.samples
+        if size > MAX_NUMBERS:
+            _refuse(f"{field}.samples", f"make {size} numbers; {MAX_NUMBERS} are the most")
+        data = self.part(record.part)
+        try:
+            plain = zstandard.get_frame_parameters(data).content_size
+        except zstandard.ZstdError as error:
+            _refuse(f"{field}.part", f"cannot be unpacked: {error}")
+        if plain != _WIDTH * size:  # else the library would take the room that the frame asks for
+            _refuse(f"{field}.part", f"would unpack to {plain} bytes, not the {_WIDTH * size} of its samples")
+        try:
+            trajectory = unpack(packed(record, data))
+        except GainlineError:
+            _refuse(f"{field}.checksum", "does not belong to the samples")
+        values = (trajectory.time_s, *trajectory.channels.values())
+        if not all(np.isfinite(each).all() for each in values) or (np.diff(trajectory.time_s) <= 0).any():
+            _refuse(f"{field}.part", "holds a number that is not finite, or time that does not rise")
+
+    def _check_photo(self, field: str, photo: Photo) -> None:
+        if media_type_of(self.part(photo.part, PHOTO_BYTES)) != photo.media_type:
+            _refuse(f"{field}.media_type", f"is not what {photo.part} holds")
+
+
+def packed(record: Record, data: bytes) -> Packed:
+    """As the codec knows it."""
+    return Packed(
+        codec=record.codec,
+        columns=record.columns,
+        samples=record.samples,
+        duration_s=record.duration_s,
+        source=record.source,
+        clock=record.clock,
+        checksum=record.checksum,
+        data=data,
+    )
+
+
+def _output_of(field: str, campaign: Campaign) -> str:
+    """The channel that its flights are scored by. Raises InputError when its gains are not the experiment's."""
+    experiment = EXPERIMENTS.get(str(campaign.definition.get("experiment")))
+    if experiment is None:
+        _refuse(f"{field}.definition.experiment", "is none that this version knows")
+    names = set(experiment.space.names)
+    for where, given in (
+        *((f"trials.{place}", trial.gains) for place, trial in enumerate(campaign.trials)),
+        *((f"proposals.{place}", proposal.gains) for place, proposal in enumerate(campaign.proposals)),
+    ):
+        if set(given) != names:
+            _refuse(f"{field}.{where}.gains", f"must be {', '.join(experiment.space.names)}")
+    return experiment.output
+
+
+def _once(used: set[str], field: str, part: str) -> str:
+    if part in used:
+        _refuse(field, f"{part} stands for something else already")
+    return part
+
+
+def _version(document: object) -> None:
+    if isinstance(document, dict) and isinstance(found := document.get("version"), int) and found > VERSION:
+        _refuse(f"{MANIFEST}: version", f"is {found}, written by a newer Gainline; this one reads up to {VERSION}")
+
+
+def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], None] | None = None) -> M:
+    try:
+        document: Any = json.loads(data, parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        _refuse(name, f"is not JSON: {error}")
+    if look is not None:
+        look(document)
+    try:
+        return kind.model_validate(document)
+    except (ValidationError, RecursionError) as error:
+        found = error.errors()[:10] if isinstance(error, ValidationError) else []
+        problems = tuple(Problem(f"{name}: {'.'.join(map(str, each['loc']))}", each["msg"]) for each in found)
+        raise _refusal(problems or (Problem(name, "is nested too deeply"),)) from error
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number")
+
+
+def _refuse(field: str, reason: str) -> NoReturn:
+    raise _refusal((Problem(field, reason),))
+
+
+def _refusal(problems: tuple[Problem, ...]) -> InputError:
+    return InputError(
+        "This bundle cannot be brought in; nothing was stored.",
+        problems=problems,
+        hint="Download the bundle again where the campaign is, and bring in that file as it is.",
+    )

@@ -1,0 +1,51 @@
+"""Campaigns out as one file, and in again: new ids, and every number as it was."""
+
+from pathlib import Path
+from typing import IO
+
+from sqlalchemy.orm import Session
+
+from app.bundles.packing import Packer
+from app.bundles.reading import Bundle
+from app.bundles.storing import keep_telemetry, store
+from app.campaigns import service as campaigns
+from app.campaigns.schemas import Campaign
+from app.db.models import CampaignRow
+from app.errors import BusyError
+from app.trials import history
+
+
+def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[bytes]) -> str:
+    """Write the campaign, after those that it starts from; gives the name for the file.
+
+    Raises NotFoundError, and BusyError while it has a flight under way.
+    """
+    row = campaigns.get_row(session, campaign_id)
+    chain = _chain(session, row)
+    for each in chain:
+        if history.flight_under_way(session, each.id) is not None:
+            raise BusyError(
+                f"Campaign {each.id} has a flight under way.", hint="Wait until it is over, then take the bundle."
+            )
+    Packer(session, data_dir, out).pack(chain)
+    return f"campaign-{row.id}.gainline.zip"
+
+
+def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
+    """The campaign and those that it starts from, the first of them first: without them its first gains could not be
+    computed again."""
+    chain = [row]
+    while (donor := (chain[0].definition.get("start") or {}).get("donor")) is not None:
+        found = campaigns.get_row(session, donor["campaign_id"])
+        if any(found is known for known in chain):
+            break
+        chain.insert(0, found)
+    return chain
+
+
+def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> Campaign:
+    """A new campaign from a checked bundle, and those that it starts from. Raises InputError for what this version
+    cannot hold."""
+    arrived = store(session, bundle)
+    keep_telemetry(bundle, arrived, data_dir)
+    return campaigns.get_campaign(session, arrived.rows[-1].id)

@@ -1,0 +1,163 @@
+"""A bundle that was looked at, into rows: new ids for everything, every number and time as it was."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+
+from app.bundles.contents import CONTENTS, Campaign, Proposal, Record, Trial
+from app.bundles.reading import Bundle
+from app.campaigns.definitions import core_definition
+from app.campaigns.proposing import is_stale, request_proposal
+from app.campaigns.schemas import Definition
+from app.core.checking import problems_of
+from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
+from app.db.types import utc_now
+from app.errors import InputError, Problem
+from app.fleet import service as fleet
+from app.fleet.elsewhere import vehicle_elsewhere
+from app.fleet.schemas import VehicleChoice
+from app.trials import history
+from app.trials.telemetry_logs import log_of_trial
+from app.vehicles.open import VEHICLE_KINDS, check_options
+
+JsonObject = dict[str, Any]
+_HINT: Final = "Bring it in with the version of Gainline that wrote it, or update this one."
+
+
+@dataclass(slots=True)
+class Arrived:
+    """The campaigns that a bundle became, the wanted one last, and the telemetry logs to be kept once they are
+    committed: each by the trial's new id."""
+
+    rows: list[CampaignRow] = field(default_factory=list)
+    telemetry: dict[int, str] = field(default_factory=dict)
+
+
+def store(session: Session, bundle: Bundle) -> Arrived:
+    """Raises InputError for what this version cannot hold. The bundle must have been checked."""
+    arrived, new_ids = Arrived(), dict[int, int]()
+    for place, campaign in enumerate(bundle.contents.campaigns):
+        row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
+        new_ids[campaign.id] = row.id
+        proposals = [_proposal(session, bundle, row, each) for each in campaign.proposals]
+        for trial in campaign.trials:
+            made = _trial(session, bundle, row, trial, proposals)
+            if trial.telemetry is not None:
+                arrived.telemetry[made.id] = trial.telemetry
+        session.flush()
+        _propose(session, row, proposals)
+        arrived.rows.append(row)
+    return arrived
+
+
+def keep_telemetry(bundle: Bundle, arrived: Arrived, data_dir: Path) -> None:
+    """Write the logs beside those of flights made here."""
+    for trial_id, part in arrived.telemetry.items():
+        file = log_of_trial(data_dir, trial_id)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(bundle.part(part))
+
+
+def _campaign(session: Session, where: str, said: Campaign, new_ids: Mapping[int, int]) -> CampaignRow:
+    definition = _definition(where, said.definition, new_ids)
+    vehicle, options = _vehicle(session, where, said)
+    row = CampaignRow(
+        name=said.name,
+        state=said.state,
+        outcome=said.outcome,
+        stop_reason=said.stop_reason,
+        experiment=definition["experiment"],
+        strategy=definition["strategy"],
+        definition=definition,
+        definition_digest=said.definition_digest,
+        safe_gains=said.safe_gains or (said.vehicle.safe_gains if said.vehicle.registered else None),
+        vehicle=vehicle,
+        vehicle_options=options,
+        created_at=said.created_at,
+        updated_at=utc_now(),
+    )
+    session.add(row)
+    session.flush()
+    return row
+
+
+def _definition(where: str, said: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
+    """As it was, but for the new id of the campaign that it starts from."""
+    donor = (said.get("start") or {}).get("donor")
+    if donor is not None and donor["campaign_id"] not in new_ids:
+        raise _refused(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle")
+    if donor is not None:
+        said = {**said, "start": {**said["start"], "donor": {**donor, "campaign_id": new_ids[donor["campaign_id"]]}}}
+    if wrong := problems_of(core_definition(Definition.model_validate(said))):
+        raise _refused(f"{where}.definition.{wrong[0].field}", wrong[0].reason)
+    return said
+
+
+def _vehicle(session: Session, where: str, said: Campaign) -> tuple[VehicleRow, JsonObject]:
+    """A simulation is the same everywhere. Any other vehicle is not here, whatever it is called: it is history."""
+    vehicle = said.vehicle
+    if vehicle.registered:
+        row = vehicle_elsewhere(
+            session, name=vehicle.name, kind=vehicle.kind, is_real=vehicle.is_real, safe_gains=vehicle.safe_gains
+        )
+        return row, {}
+    if vehicle.kind not in VEHICLE_KINDS:
+        raise _refused(f"{where}.vehicle.kind", f"{vehicle.kind!r} is none that this version knows")
+    options = check_options(vehicle.kind, said.vehicle_options, field=f"{where}.vehicle")
+    choice = VehicleChoice(kind=vehicle.kind, options=options)
+    return fleet.chosen_vehicle(session, choice, default_gains=vehicle.safe_gains), options
+
+
+def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, said: Proposal) -> ProposalRow:
+    row = ProposalRow(
+        campaign_id=campaign.id, predicted=_record(bundle, said.predicted), **_fields(said, {"predicted"})
+    )
+    session.add(row)
+    session.flush()
+    return row
+
+
+def _trial(
+    session: Session, bundle: Bundle, campaign: CampaignRow, said: Trial, proposals: Sequence[ProposalRow]
+) -> TrialRow:
+    kept = _fields(said, {"proposal", "record", "photos", "telemetry", "curve"})
+    row = TrialRow(
+        campaign_id=campaign.id,
+        proposal_id=None if said.proposal is None else proposals[said.proposal].id,
+        trajectory=_record(bundle, said.record),
+        curve=None if said.curve is None else [list(point) for point in said.curve],
+        **kept,
+    )
+    session.add(row)
+    session.flush()
+    for photo in said.photos:
+        data = bundle.part(photo.part)
+        session.add(TrialPhotoRow(trial=row, media_type=photo.media_type, data=data, added_at=photo.added_at))
+    session.flush()
+    return row
+
+
+def _record(bundle: Bundle, said: Record | None) -> TrajectoryRow | None:
+    return None if said is None else TrajectoryRow(data=bundle.part(said.part), **_fields(said, {"part"}))
+
+
+def _propose(session: Session, campaign: CampaignRow, proposals: Sequence[ProposalRow]) -> None:
+    """Where the last proposal does not hold any more under the new ids, it is computed again, to the same gains."""
+    trials = history.trials_of(session, campaign.id)
+    if not proposals or is_stale(campaign, proposals[-1], trials):
+        request_proposal(session, campaign)
+
+
+def _fields(said: BaseModel, without: set[str]) -> JsonObject:
+    """Field by field as they came: a dump would make other types of stored numbers."""
+    return {name: getattr(said, name) for name in type(said).model_fields.keys() - without}
+
+
+def _refused(field: str, reason: str) -> InputError:
+    return InputError(
+        "This bundle cannot be brought in; nothing was stored.", problems=(Problem(field, reason),), hint=_HINT
+    )

@@ -1,0 +1,60 @@
+"""Vehicles that stand for others: campaigns came from elsewhere with them, and they never fly from here."""
+
+from collections.abc import Mapping
+from itertools import count
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.db.models import VehicleRow
+from app.fleet import repository
+from app.fleet.states import VehicleState
+from app.schemas import OptionValue
+from app.vehicles.imported import IMPORT
+
+_ROOM: Final = 90
+_KIND: Final = "origin"
+_NAME: Final = "origin_name"
+
+
+def vehicle_elsewhere(
+    session: Session, *, name: str, kind: str, is_real: bool, safe_gains: Mapping[str, float]
+) -> VehicleRow:
+    """The one that stands for a vehicle of that name and kind, made when it is wanted first.
+
+    It is of the kind whose flights are made elsewhere, so that nothing can be flown on it; it has no ledger, because it
+    was given nothing from here.
+    """
+    origin: dict[str, OptionValue] = {_KIND: kind, _NAME: name}
+    for number in count(1):
+        called = f"{name[:_ROOM]} (elsewhere{'' if number == 1 else f', {number}'})"
+        known = repository.of_name_or_none(session, called)
+        if known is None:
+            return _made(session, called, is_real=is_real, options=origin, safe_gains=safe_gains)
+        if (known.kind, known.registered, known.is_real, known.options) == (IMPORT.name, False, is_real, origin):
+            return known
+    raise AssertionError("numbers do not end")
+
+
+def origin_of(row: VehicleRow) -> tuple[str, str] | None:
+    """Kind and name of the vehicle that this one stands for; None for one of our own."""
+    if row.registered or _KIND not in row.options:
+        return None
+    return str(row.options[_KIND]), str(row.options[_NAME])
+
+
+def _made(
+    session: Session, name: str, *, is_real: bool, options: dict[str, OptionValue], safe_gains: Mapping[str, float]
+) -> VehicleRow:
+    row = VehicleRow(
+        kind=IMPORT.name,
+        name=name,
+        title=IMPORT.title,
+        is_real=is_real,
+        options=options,
+        safe_gains=dict(safe_gains),
+        state=VehicleState.DISCONNECTED,
+    )
+    session.add(row)
+    session.flush()
+    return row

@@ -1,0 +1,203 @@
+"""A campaign out of one installation and into another: every number is the same, and nothing more than it can be."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
+from app.db.session import Database
+from app.settings import Settings
+from app.trials.telemetry_logs import telemetry_log
+from tests.builders import Json, create_ready_campaign, create_trial, get, land, lift_off, run_jobs
+from tests.bundles.builders import another_installation, bring, parts_of, take
+from tests.campaigns.test_recomputing import told
+from tests.campaigns.test_statistics import modelled
+
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(200))
+NAMED_ANEW = {"id", "campaign_id", "proposal_id", "created_at", "updated_at", "version", "actions", "flight", "speed"}
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, migrated_file: Path) -> Iterator[tuple[TestClient, Database]]:
+    with another_installation(tmp_path / "elsewhere", migrated_file) as both:
+        yield both
+
+
+@pytest.fixture
+def campaign(client: TestClient, database: Database) -> Json:
+    """Three flights with the calibrated strategy, the first ruled out; a note, a photo."""
+    ready = create_ready_campaign(
+        client, database, definition={"strategy": "calibrated", "stop": {"kind": "noise", "max_flights": 8}}
+    )
+    flown = [fly(client, database, ready["id"]) for _ in range(3)]
+    said = {"version": flown[1]["version"], "outcome": "invalid", "reason": "Gust, ≈ 4 m/s"}
+    assert client.post(f"/api/trials/{flown[1]['id']}/classify", json=said).status_code == 200
+    noted = client.patch(f"/api/trials/{flown[0]['id']}", json={"version": flown[0]["version"], "note": "Cold. ☃"})
+    assert noted.status_code == 200
+    with database.write() as session:
+        first = session.get_one(TrialRow, flown[0]["id"])
+        session.add(TrialPhotoRow(trial=first, media_type="image/png", data=PNG))
+    run_jobs(database)
+    found: Json = get(client, f"/api/campaigns/{ready['id']}")
+    return found
+
+
+def fly(client: TestClient, database: Database, campaign_id: int) -> Json:
+    trial = create_trial(client, campaign_id, fly={"speed": None})
+    land(database, lift_off(database), modelled(trial["gains"]))
+    run_jobs(database)
+    flown: Json = get(client, f"/api/trials/{trial['id']}")
+    return flown
+
+
+def brought(client: TestClient, bundle: bytes) -> Json:
+    answer = bring(client, bundle)
+    assert answer.status_code == 201, answer.text
+    arrived: Json = answer.json()
+    return arrived
+
+
+def without(document: Json, names: set[str]) -> Json:
+    return {name: value for name, value in document.items() if name not in names}
+
+
+def test_every_number_and_every_sample_arrives_as_it_was(
+    client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, their_database = elsewhere
+    arrived = brought(there, take(client, campaign["id"]))
+    for name in ("name", "state", "outcome", "stop_reason", "definition", "definition_digest", "created_at", "trials"):
+        assert arrived[name] == campaign[name], name
+    ours = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
+    theirs = get(there, f"/api/campaigns/{arrived['id']}/trials")["items"]
+    assert len(ours) == 3
+    for mine, other in zip(ours, theirs, strict=True):
+        assert without(mine, NAMED_ANEW) == without(other, NAMED_ANEW)
+        path = "/api/trials/{}/trajectory.csv"
+        assert client.get(path.format(mine["id"])).content == there.get(path.format(other["id"])).content
+    assert get(client, f"/api/campaigns/{campaign['id']}/statistics") == get(
+        there, f"/api/campaigns/{arrived['id']}/statistics"
+    )
+    with database.read() as here, their_database.read() as other_session:
+        assert [bytes(row.data) for row in here.query(TrajectoryRow).order_by(TrajectoryRow.checksum)] == [
+            bytes(row.data) for row in other_session.query(TrajectoryRow).order_by(TrajectoryRow.checksum)
+        ]
+        assert [row.data for row in other_session.query(TrialPhotoRow)] == [PNG]
+
+
+def test_the_next_gains_are_computed_again_to_the_last_bit(
+    client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, their_database = elsewhere
+    arrived = brought(there, take(client, campaign["id"]))
+    assert told(their_database, arrived["id"]) == told(database, campaign["id"])
+    ours = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
+    theirs = get(there, f"/api/campaigns/{arrived['id']}/proposal")["proposal"]
+    assert not theirs["stale"]
+    assert without(ours, {"id", "campaign_id"}) == without(theirs, {"id", "campaign_id"})
+
+
+def test_a_warm_start_brings_the_campaign_that_it_came_from(
+    client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, their_database = elsewhere
+    brought(there, take(client, campaign["id"]))  # ids are others there
+    answer = client.post(f"/api/campaigns/{campaign['id']}/clone", json={"warm_start": True})
+    warm = answer.json()
+    run_jobs(database)
+    fly(client, database, warm["id"])
+    arrived = brought(there, take(client, warm["id"]))
+    run_jobs(their_database)
+    donor = arrived["definition"]["start"]["donor"]
+    assert donor["campaign_id"] != warm["definition"]["start"]["donor"]["campaign_id"]
+    assert get(there, f"/api/campaigns/{donor['campaign_id']}")["name"] == campaign["name"]
+    ours = get(client, f"/api/campaigns/{warm['id']}/proposal")["proposal"]
+    theirs = get(there, f"/api/campaigns/{arrived['id']}/proposal")["proposal"]
+    for name in ("kind", "gains", "predicted_error", "interval", "advice", "gate"):
+        assert theirs[name] == ours[name], name
+
+
+def test_a_simulated_campaign_flies_on_where_it_arrives(
+    client: TestClient, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, their_database = elsewhere
+    arrived = brought(there, take(client, campaign["id"]))
+    assert fly(there, their_database, arrived["id"])["number"] == 4
+
+
+def test_what_a_registered_vehicle_flew_is_history_where_it_arrives(
+    client: TestClient, database: Database, settings: Settings, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    """Even where a vehicle of that name is registered: it did not fly there."""
+    with database.write() as session:
+        twin = session.query(VehicleRow).one()
+        real = VehicleRow(kind="mavlink", name="Blue", title="MAVLink", is_real=True, registered=True,
+                          state="ready", safe_gains=twin.safe_gains)  # fmt: skip
+        session.add(real)
+        session.flush()
+        session.get_one(CampaignRow, campaign["id"]).vehicle = real
+        flight = session.query(FlightRow).order_by(FlightRow.id).first()
+        assert flight is not None
+        log = telemetry_log(settings.data_dir, flight.id)
+    log.parent.mkdir(exist_ok=True)
+    log.write_bytes(b"telemetry" * 1000)
+    there, their_database = elsewhere
+    arrived = brought(there, take(client, campaign["id"]))
+    vehicle = arrived["vehicle"]
+    assert (vehicle["name"], vehicle["is_real"], vehicle["can_fly"]) == ("Blue (elsewhere)", True, False)
+    trials = get(there, f"/api/campaigns/{arrived['id']}/trials")["items"]
+    assert there.get(f"/api/trials/{trials[0]['id']}/tlog").content == b"telemetry" * 1000
+    with their_database.read() as session:
+        assert session.query(FlightRow).count() == 0
+    refused = there.post(
+        f"/api/campaigns/{arrived['id']}/trials", json={"gains": trials[0]["gains"], "fly": {"speed": None}}
+    )
+    assert refused.status_code == 409, refused.text
+    again = brought(there, take(there, arrived["id"]))
+    assert again["vehicle"]["id"] == vehicle["id"]
+    shared = there.post("/api/campaigns", json={"name": "Own", "vehicle": {"kind": "import"}}).json()
+    assert shared["vehicle"]["id"] != vehicle["id"]
+    cloned = there.post(f"/api/campaigns/{arrived['id']}/clone", json={"vehicle": {"kind": "twin"}})
+    assert cloned.status_code == 201, cloned.text
+
+
+def test_the_same_campaign_makes_the_same_parts(client: TestClient, campaign: Json) -> None:
+    first, second = (parts_of(take(client, campaign["id"])) for _ in range(2))
+    assert {**first, "manifest.json": b""} == {**second, "manifest.json": b""}
+
+
+def test_a_campaign_in_the_air_stays_with_its_vehicle(client: TestClient, database: Database) -> None:
+    ready = create_ready_campaign(client, database)
+    create_trial(client, ready["id"], fly={"speed": None})
+    lift_off(database)
+    refused = client.get(f"/api/campaigns/{ready['id']}/bundle")
+    assert refused.status_code == 409
+    assert "under way" in refused.json()["detail"]
+
+
+def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestClient, campaign: Json) -> None:
+    bundle = take(client, campaign["id"])
+    sent = [
+        client.post(
+            "/api/bundles",
+            content=bundle,
+            headers={"Content-Type": "application/octet-stream", "Idempotency-Key": "a key"},
+        )
+        for _ in range(2)
+    ]
+    assert sent[0].json()["id"] == sent[1].json()["id"]
+    assert get(client, "/api/campaigns")["total"] == 2
+
+
+def test_nothing_is_left_of_a_bundle_whose_storing_fails(
+    client: TestClient, database: Database, campaign: Json, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = take(client, campaign["id"])
+    monkeypatch.setattr("app.bundles.storing.request_proposal", lambda *_: (_ for _ in ()).throw(OSError("disk")))
+    monkeypatch.setattr("app.bundles.storing.is_stale", lambda *_: True)
+    assert bring(client, bundle).status_code >= 500
+    with database.read() as session:
+        assert session.query(CampaignRow).count() == 1
+        assert session.query(TrialRow).count() == 3
