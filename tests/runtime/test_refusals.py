@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.network import exposure, web_address
+from app.network import addresses_elsewhere, exposure, web_address
 from tests.runtime.processes import PATIENCE_S, Serving, environment, stream
 
 
@@ -122,6 +122,18 @@ def test_what_others_can_do_is_said_before_it_is_possible(host: str) -> None:
     assert warning is not None
     assert host in warning
     assert "no accounts" in warning
+
+
+def test_a_server_that_others_reach_says_where_a_tablet_finds_it(tmp_path: Path) -> None:
+    elsewhere = addresses_elsewhere("0.0.0.0", 8000)
+    if not elsewhere:
+        pytest.skip("this machine is in no network")
+    with Serving(tmp_path / "data", "--no-worker", "--host", "0.0.0.0") as serving:
+        assert any(line.startswith("Warning: listening on 0.0.0.0") for line in serving.said)
+        assert serving.process.stdout is not None
+        line = serving.process.stdout.readline()
+    address = elsewhere[0].url.rpartition(":")[0]
+    assert line.startswith(f"On a tablet: {address}:")
 
 
 def test_the_address_is_one_for_a_browser_on_this_machine() -> None:
