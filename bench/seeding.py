@@ -52,6 +52,7 @@ class Takeoffs:
     """Flights of random gains that get better, on a vehicle that the model's fit would find."""
 
     randomness: np.random.Generator
+    samples: int
 
     def gains(self, number: int) -> dict[str, float]:
         """Whole ones, nearer to good ones with every flight."""
@@ -62,22 +63,24 @@ class Takeoffs:
         return {gain.name: float(round(value)) for gain, value in zip(gains, chosen, strict=True)}
 
     def record(self, gains: Mapping[str, float]) -> Trajectory:
-        """16 700 samples of a takeoff, with what a tracking system adds to it."""
+        """A takeoff with what a tracking system adds to it."""
         flown = Takeoff().simulate(np.array(list(gains.values())), _TRUTH)
-        time_s = np.linspace(0.0, WINDOW_S, SAMPLES)
+        time_s = np.linspace(0.0, WINDOW_S, self.samples)
         channels = {name: np.interp(time_s, flown.time_s, values) for name, values in flown.channels.items()}
-        wander = np.cumsum(self.randomness.normal(0.0, 1e-3, SAMPLES)) * np.exp(-time_s / WINDOW_S)
-        channels["altitude_m"] += wander + self.randomness.normal(0.0, _NOISE_M, SAMPLES)
+        wander = np.cumsum(self.randomness.normal(0.0, 1e-3, self.samples)) * np.exp(-time_s / WINDOW_S)
+        channels["altitude_m"] += wander + self.randomness.normal(0.0, _NOISE_M, self.samples)
         return Trajectory(time_s, channels, "jsbsim", "simulation")
 
 
-def seed_database(data_dir: Path, *, flights: Mapping[str, int], campaigns_of_five: int = 0) -> dict[str, int]:
+def seed_database(
+    data_dir: Path, *, flights: Mapping[str, int], campaigns_of_five: int = 0, samples: int = SAMPLES
+) -> dict[str, int]:
     """A database with a campaign of so many flights under each name, a proposal ready in each; and as many small ones
     as asked for, all alike. Ids of the former, by name."""
     file = Settings(data_dir=data_dir).database_file
     migrate(file)
     database = Database(file)
-    takeoffs = Takeoffs(np.random.default_rng(SEED))
+    takeoffs = Takeoffs(np.random.default_rng(SEED), samples)
     try:
         made = {name: _campaign(database, name, count, takeoffs) for name, count in flights.items()}
         if campaigns_of_five:

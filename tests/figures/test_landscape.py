@@ -24,7 +24,9 @@ def test_a_cliff_does_not_set_the_scale() -> None:
 
 
 def test_points_without_a_finite_error_stay_empty() -> None:
-    assert lowest(cliff(None), CENTRE) == ({"kp": 4.0, "ki": 6.0, "kd": 80.0}, pytest.approx(0.1))
+    gains, error = lowest(cliff(None), CENTRE)
+    assert gains == {"kp": 4.0, "ki": 6.0, "kd": 80.0}
+    assert error == pytest.approx(0.1)
 
 
 def test_flights_of_one_place_share_a_number_and_the_line_ends_at_the_edge() -> None:

@@ -6,6 +6,7 @@ import { gainsInBrackets } from "../lib/gains";
 import { confidenceText, percent, plusMinus } from "../lib/uncertainty";
 import { VERDICTS } from "../lib/verdict";
 import { Help } from "./Help";
+import { useLastRows } from "./MoreRows";
 import { Panel } from "./Panel";
 import classes from "./Statistics.module.css";
 import { Trouble } from "./Trouble";
@@ -151,6 +152,7 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
 /** Flights of the same gains are one line. */
 function Groups({ groups, error_unit: unit }: CampaignStatistics) {
   const names = Object.keys(groups[0]?.gains ?? {});
+  const { more, listed } = useLastRows(groups, 4, "gain sets", (group) => group.is_best || group.is_baseline);
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
     <section className={`${classes["scroll"]} sideways`} aria-label="Gain sets flown" tabIndex={0}>
@@ -166,7 +168,8 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
           </tr>
         </thead>
         <tbody>
-          {groups.map((group) => (
+          {more}
+          {listed.map((group) => (
             <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
               <th scope="row">{gainsInBrackets(group.gains)}</th>
               <td>{group.trial_numbers.join(", ")}</td>

@@ -1,15 +1,14 @@
-import { Button } from "@mantine/core";
 import { IconStarFilled } from "@tabler/icons-react";
-import { useEffect, useRef, useState } from "react";
+import { useEffect, useRef } from "react";
 import type { Campaign, Trial } from "../api/types";
 import { gainText, NOTHING, withUnit } from "../lib/format";
 import { onPointed, pointAt } from "../lib/pointing";
-import { lastRows, MORE_ROWS, ROWS } from "../lib/rows";
 import { trialWords, wasFlown } from "../lib/states";
 import { rangeText } from "../lib/uncertainty";
 import { sentenceOf } from "../lib/verdict";
 import { Help } from "./Help";
 import { Kept, Marks } from "./Marks";
+import { useLastRows } from "./MoreRows";
 import { StateBadge } from "./StateBadge";
 import classes from "./TrialsTable.module.css";
 import { useGainTitles } from "./useUnits";
@@ -31,11 +30,10 @@ function flightOf(target: EventTarget): number | null {
 export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) {
   const names = Object.keys(trials[0]?.gains ?? {});
   const titles = useGainTitles(campaign.definition.experiment ?? "");
-  const [count, setCount] = useState(ROWS);
   const body = useRef<HTMLTableSectionElement>(null);
   const best = campaign.best?.trial_id;
-  const listed = lastRows(trials, count, ({ id, number }) => id === best || number === shown);
-  const hidden = Math.max(0, trials.length - count);
+  const isKept = ({ id, number }: Trial) => id === best || number === shown;
+  const { more, listed } = useLastRows(trials, names.length + 5, "flights", isKept);
   useEffect(
     () =>
       onPointed((flight) => {
@@ -77,15 +75,7 @@ export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) 
           onFocus={({ target }) => pointAt(flightOf(target))}
           onBlur={() => pointAt(null)}
         >
-          {hidden > 0 && (
-            <tr>
-              <td colSpan={names.length + 5} className={classes["text"]}>
-                <Button variant="default" onClick={() => setCount(count + MORE_ROWS)}>
-                  Show {Math.min(MORE_ROWS, hidden)} earlier flights ({hidden} are not listed)
-                </Button>
-              </td>
-            </tr>
-          )}
+          {more}
           {listed.map((trial) => {
             const isBest = trial.id === best;
             return (
