@@ -50,6 +50,7 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
         "vehicle": f"/vehicles/{register(dashboard)}",
         "reproductions": "/reproductions",
         "jobs": "/jobs",
+        "settings": "/settings",
         "missing": "/no/such/page",
     }
     context.close()
