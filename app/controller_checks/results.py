@@ -38,18 +38,20 @@ class _Shown:
 
 _SHOWN: Final[Mapping[str, _Shown]] = MappingProxyType(
     {
-        "z_ref": _Shown("Reference altitude", "m down", REFERENCE_UNITS["z_ref"], 3),
-        "zd_ref": _Shown("Reference speed", "m/s down", REFERENCE_UNITS["zd_ref"], 3),
-        "zdd_ref": _Shown("Reference acceleration", "m/s² down", REFERENCE_UNITS["zdd_ref"], 2),
+        "z_ref": _Shown("Reference altitude", "m", REFERENCE_UNITS["z_ref"], 3),
+        "zd_ref": _Shown("Reference speed", "m/s", REFERENCE_UNITS["zd_ref"], 3),
+        "zdd_ref": _Shown("Reference acceleration", "m/s²", REFERENCE_UNITS["zdd_ref"], 2),
         "z_sum_err": _Shown("Summed error", "m·s", REFERENCE_UNITS["z_ref"] / RATE_HZ, 3),
         "ff_cmd": _Shown("Feed-forward", "of 9600", 1.0, 0),
         "fb_cmd": _Shown("Feedback", "of 9600", 1.0, 0),
-        "thrust": _Shown("Thrust", "of 9600", 1.0, 0),
+        "thrust": _Shown("Commanded thrust", "of 9600", 1.0, 0),
     }
 )
 _TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
 _BEYOND: Final = f"beyond what {1000 * TIME_TOLERANCE_S:g} ms of uncertain time explain"
-_STEP_APART: Final = "or with fields one step of 1/512 s apart"
+_TO_THE_BIT: Final = "compared to the last bit"
+_COUNTED: Final = f"only what {1000 * TIME_TOLERANCE_S:g} ms of uncertain time do not explain counts"
+_DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 m."
 
 FIGURES: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
     {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
@@ -121,9 +123,9 @@ def _result_of_trace(checked: TraceCheck) -> Result:
         gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
         gains_from="of the recording" if is_constant else "not the same throughout",
         better_gains=None,
-        notes=(),
+        notes=(_DOWN,),
         signals=tuple(
-            _signal(name, float(replay.largest_difference[name]), "counts", 0.0, "to the last bit", overlay)
+            _signal(name, float(replay.largest_difference[name]), "counts", 0.0, _TO_THE_BIT, overlay)
             for name in OUTPUTS
         ),
         curves=_curves((overlay,)),
@@ -135,12 +137,12 @@ def _result_of_log(checked: LogCheck) -> Result:
     *simulated, drawn = checked.overlays
     apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
     signals = [
-        _signal(name, difference, "counts", 0.0, f"to the last bit, {_STEP_APART}", drawn)
+        _signal(name, difference, "counts", 0.0, f"{_TO_THE_BIT}, fields one step of 1/512 s apart allowed", drawn)
         for name, difference in apart.items()
     ]
     if simulation is not None:
         signals[:0] = [
-            _signal(name, difference, _TOLERANCE_UNITS[name], TOLERANCES[name], _BEYOND, simulated[0])
+            _signal(name, difference, _TOLERANCE_UNITS[name], TOLERANCES[name], _COUNTED, simulated[0])
             for name, difference in simulation.largest_difference.items()
         ]
     return Result(
@@ -151,7 +153,7 @@ def _result_of_log(checked: LogCheck) -> Result:
         gains=dict(checked.gains),
         gains_from=checked.gains_from,
         better_gains=checked.better_gains,
-        notes=tuple(_notes(checked)),
+        notes=(*_notes(checked), _DOWN),
         signals=tuple(signals),
         curves=_curves(checked.overlays),
     )
@@ -225,10 +227,11 @@ def _notes(checked: LogCheck) -> Iterable[str]:
 
 def _notes_on(commands: CommandCheck) -> Iterable[str]:
     if commands.tilted:
-        yield f"{_grouped(commands.tilted)} commands follow under a tilt of up to {commands.largest_tilt_deg:.1f}°."
+        tilt = f"{commands.largest_tilt_deg:.1f}°"
+        yield f"Commands that follow under a tilt, of up to {tilt}: {_grouped(commands.tilted)}."
     for fields, count in commands.stale.items():
         if count:
-            yield f"{_grouped(count)} commands follow only with the {fields} a step apart."
+            yield f"Commands that follow only with the {fields} a step apart: {_grouped(count)}."
 
 
 def _curves(overlays: Iterable[Overlay]) -> dict[str, Overlaid]:

@@ -5,6 +5,7 @@ import { CampaignPage } from "./pages/CampaignPage";
 import { CampaignsPage } from "./pages/CampaignsPage";
 import { NotFoundPage } from "./pages/NotFoundPage";
 
+const ControllerPage = later("ControllerPage");
 const FlightPage = later("FlightPage");
 const FlyPage = later("FlyPage");
 const JobsPage = later("JobsPage");
@@ -28,6 +29,7 @@ export function App() {
         <Route path="vehicles/new" element={<NewVehiclePage />} />
         <Route path="vehicles/:vehicleId" element={<VehiclePage />} />
         <Route path="reproductions" element={<ReproductionsPage />} />
+        <Route path="controller/:checkId?" element={<ControllerPage />} />
         <Route path="jobs" element={<JobsPage />} />
         <Route path="settings" element={<SettingsPage />} />
         <Route path="*" element={<NotFoundPage />} />

@@ -4,6 +4,7 @@ import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClie
 import { answer } from "./client";
 import {
   cancelJob,
+  getJobLog,
   getReproduction,
   getReproductionFigure,
   type JobState,
@@ -14,18 +15,27 @@ import {
 } from "./generated";
 import type { Theme } from "./queries";
 
-export type { Job, JobState, ReproductionRow, ReproductionSummary } from "./generated";
+export type { Job, JobLogLine, JobState, ReproductionRow, ReproductionSummary } from "./generated";
 
-const PAGE_SIZE = 20;
+export const JOBS_PAGE = 20;
 
-export function useJobs(state: JobState[]) {
+export function useJobs(state: readonly JobState[], limit = JOBS_PAGE) {
   return useInfiniteQuery({
-    queryKey: ["jobs", state],
+    queryKey: ["jobs", ...state, limit],
     queryFn: ({ pageParam }) =>
-      answer(listJobs({ query: { state, limit: PAGE_SIZE, ...(pageParam ? { cursor: pageParam } : {}) } })),
+      answer(listJobs({ query: { state: [...state], limit, ...(pageParam ? { cursor: pageParam } : {}) } })),
     initialPageParam: "",
     getNextPageParam: (page) => page.next_cursor,
     placeholderData: keepPreviousData,
+  });
+}
+
+/** What the worker wrote down about a job; read again whenever jobs are. */
+export function useJobLog(jobId: number, enabled: boolean) {
+  return useQuery({
+    queryKey: ["jobs", "log", jobId],
+    queryFn: () => answer(getJobLog({ path: { job_id: jobId } })),
+    enabled,
   });
 }
 

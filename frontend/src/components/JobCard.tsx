@@ -4,6 +4,7 @@ import { type Job, useCancelJob, useRetryJob } from "../api/work";
 import { count } from "../lib/format";
 import { between, isUnderWay, jobLink, jobTitle, jobWords } from "../lib/work";
 import classes from "./JobCard.module.css";
+import { JobLog } from "./JobLog";
 import { JobProgress } from "./JobProgress";
 import { StateBadge } from "./StateBadge";
 import { Time } from "./Time";
@@ -18,7 +19,7 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
   return (
     <li className={classes["job"]} data-state={job.state}>
       <div className={classes["what"]}>
-        <h2 className={classes["title"]}>
+        <h3 className={classes["title"]}>
           {link === null ? (
             title
           ) : (
@@ -26,7 +27,7 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
               {title}
             </Anchor>
           )}
-        </h2>
+        </h3>
         <p className={`${classes["facts"]} numbers`}>
           <StateBadge words={jobWords(job.state)} />
           <span>Job {job.id}</span>
@@ -47,6 +48,7 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
           </div>
         )}
         <Trouble error={cancel.error ?? retry.error} />
+        <JobLog job={job} />
       </div>
       <div className={classes["actions"]}>
         {job.actions.includes("cancel") && (

@@ -9,6 +9,7 @@ const PAGES = [
   { to: "/", title: "Campaigns", inRow: true },
   { to: "/vehicles", title: "Vehicles", inRow: true },
   { to: "/reproductions", title: "Reproductions", inRow: false },
+  { to: "/controller", title: "Controller check", inRow: false },
   { to: "/jobs", title: "Jobs", inRow: false },
   { to: "/settings", title: "Settings", inRow: false },
 ] as const;

@@ -1,28 +1,32 @@
 import { Button, SegmentedControl, Skeleton } from "@mantine/core";
 import { useState } from "react";
-import { type JobState, useJobs, useReproductions } from "../api/work";
+import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../api/work";
 import { JobCard } from "../components/JobCard";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import classes from "./WorkPages.module.css";
 
-type Filter = "all" | "open" | "failed";
+type Group = "failed" | "open" | "over";
+type Filter = "all" | Group;
 
-const STATES: Record<Filter, JobState[]> = { all: [], open: ["queued", "running"], failed: ["failed"] };
-const NONE: Record<Filter, string> = {
-  all: "Nothing has been computed yet. Proposals and reproductions appear here.",
-  open: "Nothing waits and nothing runs.",
-  failed: "Nothing has failed.",
+const GROUPS: Record<Group, { title: string; states: readonly JobState[]; none: string }> = {
+  failed: { title: "Failed jobs", states: ["failed"], none: "Nothing has failed." },
+  open: { title: "Jobs under way", states: ["queued", "running"], none: "Nothing waits and nothing runs." },
+  over: { title: "Jobs that are over", states: ["done", "cancelled"], none: "Nothing is over yet." },
 };
+const ORDER = ["failed", "open", "over"] as const;
+/** So many failures stand above what is under way; the rest is a tap away. */
+const FAILURES_FIRST = 3;
 
-/** Numeric work: what waits, what runs and how far it is, what failed and why. */
+/** Numeric work: what failed and why, what waits and runs and how far it is, what is over. */
 export function JobsPage() {
   useTitle("Jobs");
   const [filter, setFilter] = useState<Filter>("all");
-  const jobs = useJobs(STATES[filter]);
+  const jobs = { failed: useGroup("failed", filter), open: useGroup("open", filter), over: useGroup("over", filter) };
   const titles = new Map((useReproductions().data?.items ?? []).map(({ name, title }) => [name, title]));
-  const found = jobs.data?.pages.flatMap((page) => page.items) ?? [];
-  const total = jobs.data?.pages[0]?.total ?? 0;
+  const shown = ORDER.filter((group) => filter === "all" || filter === group);
+  const isPending = shown.some((group) => jobs[group].isPending);
+  const isEmpty = !isPending && shown.every((group) => jobs[group].total === 0);
   return (
     <>
       <div className={classes["head"]}>
@@ -34,26 +38,67 @@ export function JobsPage() {
           onChange={(value) => setFilter(value as Filter)}
           data={[
             { value: "all", label: "All" },
-            { value: "open", label: "Under way" },
             { value: "failed", label: "Failed" },
+            { value: "open", label: "Under way" },
+            { value: "over", label: "Over" },
           ]}
         />
       </div>
-      <Trouble error={jobs.error} />
-      {jobs.isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
-      {jobs.data && found.length === 0 && <p className={classes["none"]}>{NONE[filter]}</p>}
-      <ul className={classes["list"]} aria-label="Jobs">
-        {found.map((job) => (
+      <Trouble error={shown.map((group) => jobs[group].error).find((error) => error !== null)} />
+      {isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
+      {isEmpty && (
+        <p className={classes["none"]}>
+          {filter === "all"
+            ? "Nothing has been computed yet. Proposals and reproductions appear here."
+            : GROUPS[filter].none}
+        </p>
+      )}
+      <div className={classes["stack"]}>
+        {shown
+          .filter((group) => jobs[group].total > 0)
+          .map((group) => (
+            <JobGroup key={group} group={group} found={jobs[group]} titles={titles} onAll={() => setFilter(group)} />
+          ))}
+      </div>
+    </>
+  );
+}
+
+function useGroup(group: Group, filter: Filter) {
+  const isBrief = group === "failed" && filter === "all";
+  const query = useJobs(GROUPS[group].states, isBrief ? FAILURES_FIRST : JOBS_PAGE);
+  const items = query.data?.pages.flatMap((page) => page.items) ?? [];
+  return { ...query, isBrief, items, total: query.data?.pages[0]?.total ?? 0 };
+}
+
+interface JobGroupProps {
+  group: Group;
+  found: ReturnType<typeof useGroup>;
+  titles: ReadonlyMap<string, string>;
+  onAll: () => void;
+}
+
+function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, onAll }: JobGroupProps) {
+  const { title } = GROUPS[group];
+  return (
+    <section>
+      <h2 className={classes["section"]}>{title}</h2>
+      <ul className={classes["list"]} aria-label={title}>
+        {items.map((job) => (
           <JobCard key={job.id} job={job} titles={titles} />
         ))}
       </ul>
-      {jobs.hasNextPage && (
+      {query.hasNextPage && (
         <div className={classes["more"]}>
-          <Button variant="default" loading={jobs.isFetchingNextPage} onClick={() => void jobs.fetchNextPage()}>
-            Show more ({found.length} of {total})
+          <Button
+            variant="default"
+            loading={query.isFetchingNextPage}
+            onClick={() => (isBrief ? onAll() : void query.fetchNextPage())}
+          >
+            {isBrief ? `Show all ${total} that failed` : `Show more (${items.length} of ${total})`}
           </Button>
         </div>
       )}
-    </>
+    </section>
   );
 }

@@ -1,0 +1,89 @@
+/** Recorded controllers held against the replica. */
+
+import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import type { RecordFiles } from "../lib/records";
+import { answer } from "./client";
+import {
+  type ControllerCheck,
+  checkController,
+  checkExampleController,
+  deleteControllerCheck,
+  type GetControllerCheckFigureData,
+  getControllerCheck,
+  getControllerCheckFigure,
+  listControllerChecks,
+} from "./generated";
+import type { Theme } from "./queries";
+
+export type { CheckedSignal, ControllerCheck, ControllerCheckSummary } from "./generated";
+export type CheckFigureName = GetControllerCheckFigureData["path"]["name"];
+
+const PAGE_SIZE = 20;
+
+export function useChecks() {
+  return useInfiniteQuery({
+    queryKey: ["checks"],
+    queryFn: ({ pageParam }) =>
+      answer(listControllerChecks({ query: { limit: PAGE_SIZE, ...(pageParam ? { cursor: pageParam } : {}) } })),
+    initialPageParam: "",
+    getNextPageParam: (page) => page.next_cursor,
+    placeholderData: keepPreviousData,
+  });
+}
+
+/** A check stays what it is. */
+export function useCheck(checkId: number) {
+  return useQuery({
+    queryKey: ["check", checkId],
+    queryFn: () => answer(getControllerCheck({ path: { check_id: checkId } })),
+    staleTime: Infinity,
+  });
+}
+
+export function useCheckFigure(checkId: number, name: CheckFigureName, theme: Theme) {
+  return useQuery({
+    queryKey: ["check", checkId, "figure", name, theme],
+    queryFn: () => answer(getControllerCheckFigure({ path: { check_id: checkId, name }, query: { theme } })),
+    staleTime: Infinity,
+  });
+}
+
+function useMade(): (check: ControllerCheck) => Promise<unknown> {
+  const queries = useQueryClient();
+  return (check) => {
+    queries.setQueryData(["check", check.id], check);
+    return queries.invalidateQueries({ queryKey: ["checks"] });
+  };
+}
+
+export interface Recording extends RecordFiles {
+  /** `KP,KI,KD`, where the log does not say which were flown. */
+  gains?: string;
+}
+
+export function useCheckRecording() {
+  return useMutation({
+    mutationFn: ({ file, companion, gains }: Recording) =>
+      answer(
+        checkController({
+          query: gains === undefined ? {} : { gains },
+          body: { file, ...(companion === undefined ? {} : { companion }) },
+        }),
+      ),
+    onSuccess: useMade(),
+  });
+}
+
+export type RecordingCheck = ReturnType<typeof useCheckRecording>;
+
+export function useCheckExample() {
+  return useMutation({ mutationFn: () => answer(checkExampleController()), onSuccess: useMade() });
+}
+
+export function useDeleteCheck() {
+  const queries = useQueryClient();
+  return useMutation({
+    mutationFn: (checkId: number) => answer(deleteControllerCheck({ path: { check_id: checkId } })),
+    onSettled: () => queries.invalidateQueries({ queryKey: ["checks"] }),
+  });
+}
