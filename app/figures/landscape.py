@@ -77,7 +77,13 @@ class LandscapeFigure:
         for index, one in enumerate(slices, start=1):
             traces += self._slice(palette, index, one, scale)
             axes |= self._axes(palette, index, one)
-        layout = theme.layout(palette, uirevision="landscape", margin={"l": 8, "r": 14, "t": 12, "b": 8}, **axes)
+        layout = theme.layout(
+            palette,
+            uirevision="landscape",
+            margin={"l": 8, "r": 14, "t": 12, "b": 64 if self.stacked else 48},
+            annotations=[self._note(palette, scale)],
+            **axes,
+        )
         return Card(
             name=self.name,
             title=self.title,
@@ -203,6 +209,24 @@ class LandscapeFigure:
                 nticks=6,
                 showgrid=False,
             ),
+        }
+
+    def _note(self, palette: Palette, scale: Scale) -> dict[str, object]:
+        """Where the slices lie and what the contours stand for, below them."""
+        held = ", ".join(f"{name} {value:.4g}" for name, value in self.landscape.centre.items())
+        between = "<br>" if self.stacked else " · "
+        return {
+            "text": f"Slices through {held}{between}contours every {scale.step:g} {self.history.error_unit}",
+            "x": 0,
+            "y": 0,
+            "yshift": -44,
+            "xref": "paper",
+            "yref": "paper",
+            "xanchor": "left",
+            "yanchor": "top",
+            "align": "left",
+            "showarrow": False,
+            "font": {"size": 12, "color": palette.dim},
         }
 
     def _summary(self, scale: Scale) -> str:

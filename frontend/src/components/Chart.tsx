@@ -98,7 +98,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
       role="group"
       aria-label={label}
       className={classes["frame"]}
-      style={{ height: height === null ? "100%" : `min(${height}px, 96vw)` }}
+      style={{ height: height === null ? "100%" : `min(${height}px, var(--tallest, 96vw))` }}
     >
       {broken !== null && (
         <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table still works.</p>

@@ -5,6 +5,7 @@ import { useCampaign, useCampaignFigure, useCurveOf, useProposal, useTrials } fr
 import type { Campaign, Trial } from "../api/types";
 import { CampaignHeader } from "../components/CampaignHeader";
 import { FigurePanel } from "../components/FigurePanel";
+import { LandscapePanel } from "../components/LandscapePanel";
 import { Missing } from "../components/Missing";
 import { NextFlightCard } from "../components/NextFlightCard";
 import { Panel } from "../components/Panel";
@@ -151,6 +152,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
         />
         <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={lower} onChoose={choose} />
       </div>
+      <LandscapePanel campaignId={campaign.id} />
       <div className={classes["row"]}>{read !== null && <StatisticsPanel campaignId={campaign.id} />}</div>
       <Panel
         title="All flights"
