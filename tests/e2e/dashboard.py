@@ -134,10 +134,22 @@ class Dashboard:
             self.post(f"/campaigns/{campaign_id}/trials", {"proposal_id": proposal["id"], "fly": {"speed": None}})
             self.until(partial(self._classed, campaign_id, number))
 
-    def rehearse(self, campaign_id: int, flights: int) -> None:
-        """Fly the campaign on its simulation, over the API, until its rehearsal has passed."""
-        self.fly_headless(self.post(f"/campaigns/{campaign_id}/rehearsal")["id"], flights)
-        self.until(lambda: self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "passed")
+    def rehearse(self, campaign_id: int) -> None:
+        """Fly the campaign on its simulation, over the API, until its rehearsal is over: it has passed."""
+        rehearsal = self.post(f"/campaigns/{campaign_id}/rehearsal")["id"]
+        self.until(lambda: self._flown_on(campaign_id, rehearsal), within_s=180.0)
+        assert self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "passed"
+
+    def _flown_on(self, campaign_id: int, rehearsal: int) -> bool:
+        """Whether the rehearsal is over; else its next flight is asked for as soon as that is possible."""
+        if self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] != "under way":
+            return True
+        is_idle = "plan" in self.get(f"/campaigns/{rehearsal}")["actions"]
+        following = self.get(f"/campaigns/{rehearsal}/proposal")
+        if is_idle and following["state"] == "ready":
+            order = {"proposal_id": following["proposal"]["id"], "fly": {"speed": None}}
+            self.post(f"/campaigns/{rehearsal}/trials", order)
+        return False
 
     def _classed(self, campaign_id: int, number: int) -> bool:
         return any(trial["number"] == number and trial["state"] == "valid" for trial in self.trials(campaign_id))

@@ -56,7 +56,7 @@ def trial_id(dashboard: Dashboard, vehicle_id: int) -> Iterator[int]:
         "/campaigns", {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle_id}, "definition": once}
     )
     dashboard.when_ready(made["id"])
-    dashboard.rehearse(made["id"], 1)
+    dashboard.rehearse(made["id"])
     trial: int = dashboard.post(f"/campaigns/{made['id']}/trials", {"gains": TRIED})["id"]
     dashboard.open(f"/fly/{trial}")
     yield trial

@@ -1,0 +1,61 @@
+"""A campaign on a real vehicle: the page asks for its rehearsal, and leads there and back."""
+
+from playwright.sync_api import expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, Dashboard
+
+
+def register(dashboard: Dashboard) -> int:
+    """A real vehicle that nobody has switched on."""
+    made = dashboard.post(
+        "/vehicles",
+        {
+            "name": "Number 1",
+            "kind": "mavlink",
+            "options": {"address": "udp:127.0.0.1:14987@14986"},
+            "safe_gains_confirmed": True,
+            "statement": "Ada has seen it fly on these",
+        },
+    )
+    assert made["is_real"]
+    identity: int = made["id"]
+    return identity
+
+
+def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
+    open_dashboard: Opener, own_server: Server
+) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    dashboard.open(f"/new?vehicle={register(dashboard)}")
+    expect(page.get_by_text("before its first flight the campaign is rehearsed on a simulation")).to_be_visible()
+    dashboard.button("Create campaign").click()
+    asks = dashboard.panel("Rehearse first")
+    expect(asks).to_contain_text("Not rehearsed yet: it was not flown on a simulation.")
+    real = dashboard.when_ready(dashboard.campaign_id)
+    expect(dashboard.button("Stage")).to_have_count(0)
+    trial = dashboard.post(f"/campaigns/{real}/trials", {"gains": {"kp": 300, "ki": 13, "kd": 82}})
+    refused = page.request.post(f"{dashboard.url}/api/trials/{trial['id']}/stage")
+    assert (refused.status, "has not passed its rehearsal" in refused.json()["detail"]) == (409, True)
+
+    dashboard.button("Rehearse on the simulation").click()
+    expect(page.get_by_text("This is a rehearsal")).to_be_visible()
+    rehearsal = dashboard.campaign_id
+    assert rehearsal != real
+    page.get_by_role("link", name="Number 1").last.click()
+    expect(asks).to_contain_text("Under way: 0 of 3 valid flights.")
+    page.get_by_role("link", name="Go on with the rehearsal").click()
+    dashboard.rehearse(real)
+    expect(page.get_by_text("The rehearsal has passed")).to_be_visible()
+    page.get_by_role("link", name="Number 1").last.click()
+    expect(page.get_by_role("link", name="Stage")).to_be_visible()
+    assert dashboard.get(f"/campaigns/{real}")["rehearsal"]["state"] == "passed"
+
+
+def test_what_asks_for_it_fits_on_a_phone(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url, theme="dark", viewport=PHONE)
+    dashboard.open(f"/new?vehicle={register(dashboard)}")
+    dashboard.button("Create campaign").click()
+    expect(dashboard.button("Rehearse on the simulation")).to_be_visible()
+    assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

@@ -1,0 +1,131 @@
+"""What a flight is worth: marked with a chip, undone, flown again; what that changes; its note and photos."""
+
+from typing import Any
+
+import pytest
+from playwright.sync_api import Locator, expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, Dashboard
+from tests.trials.test_photos import png
+
+Json = dict[str, Any]
+
+
+@pytest.fixture
+def campaign_id(dashboard: Dashboard) -> int:
+    """With three valid flights."""
+    made = dashboard.create("twin", stop={"kind": "budget", "max_flights": 12})
+    dashboard.fly_headless(made, 3)
+    return dashboard.when_ready(made)
+
+
+def by_error(dashboard: Dashboard, campaign_id: int) -> list[Json]:
+    """The flights that count, the best first."""
+    valid = [trial for trial in dashboard.trials(campaign_id) if trial["state"] == "valid"]
+    return sorted(valid, key=lambda trial: (trial["error"], trial["number"]))
+
+
+def open_flight(dashboard: Dashboard, trial: Json) -> Locator:
+    dashboard.open(f"/campaigns/{trial['campaign_id']}/flights/{trial['id']}")
+    return dashboard.panel(f"Flight {trial['number']}")
+
+
+def test_marking_the_best_invalid_says_what_it_changes_before_and_after_and_is_undone(
+    dashboard: Dashboard, campaign_id: int
+) -> None:
+    best, second, _ = by_error(dashboard, campaign_id)
+    before = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["history_digest"]
+    verdict = open_flight(dashboard, best)
+    verdict.get_by_role("button", name="Mark invalid").click()
+    expect(verdict).to_contain_text(
+        f"Flight {best['number']} is the best; without it flight {second['number']} is, "
+        "and the next gains are computed anew."
+    )
+    verdict.get_by_text("Wind gust").click()
+    verdict.get_by_role("button", name="Mark invalid").click()
+    expect(verdict).to_contain_text(
+        f"Flight {second['number']} is the best now; the next gains are computed without flight {best['number']}."
+    )
+    expect(verdict).to_contain_text("Wind gust")
+    assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == second["number"]
+    dashboard.when_ready(campaign_id)
+    assert dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["history_digest"] != before
+
+    verdict.get_by_role("button", name="Undo: count it as valid").click()
+    expect(verdict.get_by_text("best so far")).to_be_visible()
+    assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == best["number"]
+
+
+def test_a_flight_that_came_to_nothing_is_flown_again_with_its_gains(dashboard: Dashboard, campaign_id: int) -> None:
+    best = by_error(dashboard, campaign_id)[0]
+    dashboard.post(
+        f"/trials/{best['id']}/classify", {"version": best["version"], "outcome": "invalid", "reason": "Wind gust"}
+    )
+    verdict = open_flight(dashboard, best)
+    verdict.get_by_role("button", name="Retry these gains").click()
+    dashboard.until(lambda: len(dashboard.trials(campaign_id)) == 4)
+    again = dashboard.trials(campaign_id)[-1]
+    assert again["gains"] == best["gains"]
+    dashboard.until(lambda: dashboard.get(f"/trials/{again['id']}")["state"] == "valid")
+
+
+def test_a_note_and_a_photo_stay_with_the_flight(dashboard: Dashboard, campaign_id: int) -> None:
+    trial = dashboard.trials(campaign_id)[0]
+    page, verdict = dashboard.page, open_flight(dashboard, trial)
+    verdict.get_by_text("Note and photos").click()
+    verdict.get_by_label("Note on flight 1").fill("Gust from the north at 4 s")
+    verdict.get_by_role("button", name="Keep the note").click()
+    expect(verdict.get_by_role("button", name="Keep the note")).to_have_count(0)
+    assert dashboard.get(f"/trials/{trial['id']}")["note"] == "Gust from the north at 4 s"
+    assert verdict.locator("input[type=file]").get_attribute("capture") == "environment"
+
+    def choose(name: str, content: bytes) -> None:
+        with page.expect_file_chooser() as chooser:
+            verdict.get_by_role("button", name="Add a photo").click()
+        chooser.value.set_files({"name": name, "mimeType": "image/png", "buffer": content})
+
+    choose("page.png", b"<script>alert(1)</script>")
+    expect(verdict.get_by_role("alert")).to_contain_text("This is not a JPEG, PNG or WebP picture")
+    choose("arena.png", png(64))
+    photo = verdict.get_by_role("img", name="Flight 1, 1")
+    expect(photo).to_be_visible()
+    dashboard.until(lambda: photo.evaluate("image => image.complete && image.naturalWidth === 64"))
+    dashboard.open(f"/campaigns/{campaign_id}/flights/{trial['id']}")
+    expect(verdict.get_by_label("Note on flight 1")).to_have_value("Gust from the north at 4 s")
+    expect(photo).to_be_visible()
+    verdict.get_by_role("button", name="Delete photo 1 of flight 1").click()
+    expect(photo).to_have_count(0)
+    assert dashboard.get(f"/trials/{trial['id']}/photos") == []
+
+
+def test_it_fits_on_a_phone(open_dashboard: Opener, shared_server: Server) -> None:
+    dashboard = open_dashboard(shared_server.url, viewport=PHONE)
+    campaign_id = dashboard.create("twin")
+    dashboard.fly_headless(campaign_id, 1)
+    verdict = open_flight(dashboard, dashboard.trials(campaign_id)[0])
+    verdict.get_by_role("button", name="Mark invalid").click()
+    verdict.get_by_text("Note and photos").click()
+    assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_a_card_clones_a_campaign_onto_another_vehicle_and_archives_a_finished_one(
+    open_dashboard: Opener, own_server: Server
+) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    campaign_id = dashboard.create("twin", name="On the twin", stop={"kind": "budget", "max_flights": 1})
+    dashboard.fly_headless(campaign_id, 1)
+    dashboard.until(lambda: dashboard.get(f"/campaigns/{campaign_id}")["state"] == "finished")
+    dashboard.open("/")
+    card = page.get_by_role("listitem").filter(has=page.get_by_role("heading", name="On the twin", exact=True))
+    card.get_by_text("Clone or archive").click()
+    card.get_by_label("Same settings again, on").select_option("jsbsim")
+    card.get_by_role("button", name="Clone").click()
+    expect(page.get_by_role("heading", name="On the twin (again)")).to_be_visible()
+    assert dashboard.get(f"/campaigns/{dashboard.campaign_id}")["vehicle"]["kind"] == "jsbsim"
+    dashboard.open("/")
+    card.get_by_text("Clone or archive").click()
+    card.get_by_role("button", name="Archive").click()
+    expect(card).to_have_count(0)
+    assert dashboard.get(f"/campaigns/{campaign_id}")["state"] == "archived"
