@@ -11,6 +11,7 @@ import { settingsOf } from "../lib/settings";
 import { campaignWords } from "../lib/states";
 import classes from "./CampaignHeader.module.css";
 import { StateBadge } from "./StateBadge";
+import { TakeAway } from "./TakeAway";
 
 /** Name, state, and the settings that proposals depend on. */
 export function CampaignHeader({ campaign }: { campaign: Campaign }) {
@@ -45,6 +46,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
             ))}
           </dl>
         </details>
+        <TakeAway campaign={campaign} />
       </div>
     </header>
   );
@@ -53,6 +55,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
 function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void }) {
   const [name, setName] = useState(campaign.name);
   const rename = useRename(campaign);
+  const problem = problemOf(rename.error);
   const focused = useCallback((input: HTMLInputElement | null) => input?.select(), []);
   return (
     <form
@@ -68,7 +71,7 @@ function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void
         value={name}
         maxLength={120}
         ref={focused}
-        error={problemOf(rename.error)?.detail ?? problemOf(rename.error)?.title}
+        error={problem && [problem.detail || problem.title, problem.hint].join(" ")}
         onChange={(event) => setName(event.currentTarget.value)}
       />
       <Button type="submit" loading={rename.isPending} disabled={name.trim() === ""}>

@@ -4,6 +4,7 @@ import { Link, useNavigate } from "react-router";
 import { useCreateCampaign } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import { firstPreset } from "../lib/newCampaign";
+import { BringIn } from "./BringIn";
 import classes from "./FirstCampaign.module.css";
 import { Trouble } from "./Trouble";
 
@@ -49,6 +50,7 @@ export function FirstCampaign() {
       <Anchor component={Link} to="/new" className={classes["other"]}>
         Choose vehicle and settings first
       </Anchor>
+      <BringIn />
       <Trouble error={catalogue.error ?? create.error} />
     </section>
   );

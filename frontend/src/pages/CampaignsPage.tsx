@@ -5,6 +5,7 @@ import { useState } from "react";
 import { Link } from "react-router";
 import { useCampaigns, useCatalogue } from "../api/queries";
 import type { Sort } from "../api/types";
+import { BringIn } from "../components/BringIn";
 import { CampaignCard } from "../components/CampaignCard";
 import { Choice } from "../components/Choice";
 import { FirstCampaign } from "../components/FirstCampaign";
@@ -38,6 +39,7 @@ export function CampaignsPage() {
     <>
       <div className={classes["head"]}>
         <h1 className={classes["title"]}>Campaigns</h1>
+        <BringIn />
         <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
           New campaign
         </Button>
