@@ -15,13 +15,14 @@ from app.vehicles.open import VEHICLE_KINDS
 
 
 def settings_of(side: Side, battery: str) -> list[FlightSetting]:
-    """Vehicle, experiment and strategy with their settings, the battery, and what the vehicle said of itself."""
+    """Vehicle, experiment and strategy with their settings, the battery, and what else the vehicle said of itself."""
     row, campaign = side.row, side.campaign
     kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
     strategy = STRATEGIES[campaign.strategy]
+    options = fleet.options_of(campaign)
     found = [
         FlightSetting(title="Vehicle", unit="", value=campaign.vehicle.title),
-        *_options(fleet.options_of(campaign), () if kind is None else kind.options),
+        *_options(options, () if kind is None else kind.options),
         FlightSetting(title="Experiment", unit="", value=side.experiment.title),
         *_options(campaign.definition["experiment_options"], get_experiment(campaign.experiment).options),
         FlightSetting(title="Strategy", unit="", value=strategy.title),
@@ -32,7 +33,8 @@ def settings_of(side: Side, battery: str) -> list[FlightSetting]:
         found.append(FlightSetting(title="Battery", unit="", value=battery))
     if row.landing_battery_v is not None:
         found.append(FlightSetting(title="Battery after landing", unit="V", value=round(row.landing_battery_v, 2)))
-    return found + [FlightSetting(title=name, unit="", value=value) for name, value in row.settings.items()]
+    said = row.settings.items() - options.items()
+    return found + [FlightSetting(title=name, unit="", value=value) for name, value in sorted(said)]
 
 
 def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[FlightDifference]:

@@ -63,7 +63,7 @@ def overall(sides: Sequence[Side]) -> tuple[Word | None, str]:
 def notes_on(sides: Sequence[Side]) -> list[str]:
     """What has to be known before the numbers are believed."""
     first = sides[0]
-    apart = dict.fromkeys(_why_apart(side, first) for side in sides if side.population != first.population)
+    apart = dict.fromkeys(_why_apart(side, first)[1] for side in sides if side.population != first.population)
     campaigns: dict[str, set[int]] = {}
     for side in sides:
         campaigns.setdefault(side.population, set()).add(side.campaign.id)
@@ -106,23 +106,31 @@ def _apart(side: Side, own: Group, against: Side, other: Group) -> FlightPair:
     standard_error = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
     amount = measured(abs(difference), standard_error, side.experiment.error_unit)
     direction = "lower" if difference < 0.0 else "higher"
-    sentence = f"No verdict on the gains: {side.name} is {amount} {direction} than {against.name}. "
-    told = _pair(side, against, "apart", sentence + _why_apart(side, against))
+    how, _ = _why_apart(side, against)
+    sentence = f"No verdict on the gains: {side.name}, {how}, is {amount} {direction} than {against.name}."
+    told = _pair(side, against, "apart", sentence)
     return told.model_copy(update={"difference": difference, "standard_error": standard_error})
 
 
-def _why_apart(side: Side, against: Side) -> str:
-    """What is not the same in the two campaigns beside the gains, and what that means."""
+def _why_apart(side: Side, against: Side) -> tuple[str, str]:
+    """What is not the same in the two campaigns beside the gains: in few words, and with what that means."""
     one, other = side.campaign.vehicle, against.campaign.vehicle
     if side.experiment.name != against.experiment.name:
-        what = f"Different experiments ({side.experiment.title}, {against.experiment.title})"
+        how, what = (
+            "in another experiment",
+            f"Different experiments ({against.experiment.title}, {side.experiment.title})",
+        )
     elif one.id != other.id:
-        what = f"Different vehicles ({one.title}, {other.title})"
+        how, what = "flown by another vehicle", f"Different vehicles ({other.title}, {one.title})"
     elif not fleet.can_fly(one):
+        how = "perhaps flown by another vehicle"
         what = "Flights made elsewhere: nothing says that one vehicle flew both campaigns"
     else:
-        what = "One vehicle, but with other settings"
-    return f"{what}. The errors differ for that as well as for the gains; to compare gains, fly both in one campaign."
+        how, what = "flown with other settings of the vehicle", "One vehicle, but with other settings"
+    return (
+        how,
+        f"{what}. The errors differ for that as well as for the gains; to compare gains, fly both in one campaign.",
+    )
 
 
 def _repeats(side: Side, against: Side, group: Group) -> FlightPair:

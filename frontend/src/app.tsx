@@ -6,6 +6,7 @@ import { CampaignsPage } from "./pages/CampaignsPage";
 import { NotFoundPage } from "./pages/NotFoundPage";
 
 const ControllerPage = later("ControllerPage");
+const ComparePage = later("ComparePage");
 const FlightPage = later("FlightPage");
 const FlyPage = later("FlyPage");
 const JobsPage = later("JobsPage");
@@ -24,6 +25,7 @@ export function App() {
         <Route path="new" element={<NewCampaignPage />} />
         <Route path="campaigns/:campaignId" element={<CampaignPage />} />
         <Route path="campaigns/:campaignId/flights/:trialId" element={<FlightPage />} />
+        <Route path="compare" element={<ComparePage />} />
         <Route path="fly/:trialId" element={<FlyPage />} />
         <Route path="vehicles" element={<VehiclesPage />} />
         <Route path="vehicles/new" element={<NewVehiclePage />} />

@@ -8,6 +8,7 @@ import classes from "./MainNav.module.css";
 const PAGES = [
   { to: "/", title: "Campaigns", inRow: true },
   { to: "/vehicles", title: "Vehicles", inRow: true },
+  { to: "/compare", title: "Compare", inRow: false },
   { to: "/reproductions", title: "Reproductions", inRow: false },
   { to: "/controller", title: "Controller check", inRow: false },
   { to: "/jobs", title: "Jobs", inRow: false },

@@ -145,6 +145,14 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
             Record as CSV
           </Button>
         )}
+        <Anchor
+          component={Link}
+          to={`/compare?add=${trial.id}&campaign=${trial.campaign_id}`}
+          className={classes["link"]}
+          aria-label={`Compare flight ${trial.number}`}
+        >
+          Compare
+        </Anchor>
         {!own && (
           <Anchor
             component={Link}

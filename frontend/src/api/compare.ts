@@ -1,0 +1,33 @@
+/** Flights of any campaigns side by side. Keys stand below `campaigns`: what changes a flight changes both. */
+
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
+import { answer } from "./client";
+import { compareFlights, getComparisonFigure } from "./generated";
+import type { Theme } from "./queries";
+
+export type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "./generated";
+
+export function useComparison(trials: readonly number[]) {
+  return useQuery({
+    queryKey: ["campaigns", "compared", trials],
+    queryFn: () => answer(compareFlights({ query: { trial: [...trials] } })),
+    enabled: trials.length > 1,
+    placeholderData: keepPreviousData,
+  });
+}
+
+export function comparisonFigure(trials: readonly number[], theme: Theme) {
+  return answer(getComparisonFigure({ query: { trial: [...trials], theme } }));
+}
+
+export function useComparisonFigure(trials: readonly number[], theme: Theme) {
+  return useQuery({
+    queryKey: ["campaigns", "compared", trials, "figure", theme],
+    queryFn: () => comparisonFigure(trials, theme),
+    enabled: trials.length > 1,
+    placeholderData: keepPreviousData,
+  });
+}
+
+export const curvesCsv = (trials: readonly number[]): string =>
+  `/api/compare/curves.csv?${trials.map((trial) => `trial=${trial}`).join("&")}`;

@@ -1,0 +1,230 @@
+"""Flights of several campaigns side by side: chosen, drawn, judged, sent to somebody, and taken along as files."""
+
+import csv
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, Dashboard, Json, printed
+
+CURVES = "Curves"
+MANUAL: Json = {"strategy": "manual", "stop": {"kind": "budget", "max_flights": 50}}
+OTHER = {"kp": 400, "ki": 60, "kd": 100}
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Campaigns with flights, and the trials' ids in their order."""
+
+    morning: int
+    early: list[int]
+    late: list[int]
+    pitch: int
+
+
+@pytest.fixture(scope="module")
+def flown(shared_server: Server, browser: Browser) -> Iterator[Flown]:
+    """Two campaigns of the twin, the second with other gains, and one of another experiment."""
+    context = browser.new_context()
+    dashboard = Dashboard(context.new_page(), shared_server.url)
+    morning = dashboard.create("twin", name="Compared in the morning", seed=3, **MANUAL)
+    early = [dashboard.fly_headless_body(morning, {"gains": gains})["id"] for gains in (FIRST, FIRST, OTHER)]
+    evening = dashboard.create("twin", name="Compared in the evening", seed=4, **MANUAL)
+    late = [dashboard.fly_headless_body(evening, {"gains": OTHER})["id"] for _ in range(2)]
+    pitch = dashboard.create("lti", experiment="pitch-tracking", strategy="identified")
+    dashboard.fly_headless(pitch, 1)
+    yield Flown(morning, early, late, dashboard.trials(pitch)[0]["id"])
+    context.close()
+
+
+FIRST = {"kp": 283, "ki": 13, "kd": 82}
+
+
+def address(trials: list[int], path: str = "/compare") -> str:
+    return f"{path}?" + "&".join(f"trial={trial}" for trial in trials)
+
+
+def chosen(page: Page) -> list[int]:
+    return [int(one) for one in parse_qs(urlsplit(page.url).query).get("trial", [])]
+
+
+def row(page: Page, number: int) -> Locator:
+    return page.get_by_role("region", name="Flights compared").locator("tbody tr").nth(number)
+
+
+def compare(dashboard: Dashboard, trials: list[int]) -> Json:
+    """Open the comparison, wait until it is drawn, and return what the API says of it."""
+    dashboard.open(address(trials))
+    expect(dashboard.plot(CURVES)).to_be_visible()
+    found: Json = dashboard.get(address(trials))
+    return found
+
+
+def test_flights_are_picked_from_their_campaigns_and_drawn_as_they_are_stored(
+    dashboard: Dashboard, flown: Flown
+) -> None:
+    page = dashboard.page
+    dashboard.open_campaign(flown.morning)
+    page.get_by_role("link", name="Compare flight 3").click()
+    expect(page.get_by_text("Flight 3 is chosen.")).to_be_visible()
+    page.get_by_role("checkbox", name=re.compile("^Flight 1 ")).check()
+    page.get_by_text(re.compile("^Compared in the evening")).click()
+    page.get_by_role("checkbox", name=re.compile("^Flight 2 .*400 60 100")).last.check()
+    wanted = [flown.early[2], flown.early[0], flown.late[1]]
+    expect(dashboard.plot(CURVES)).to_be_visible()
+    dashboard.until(lambda: dashboard.trace(CURVES, "flight", trial=wanted[2]) is not None)
+    assert chosen(page) == wanted
+    first_s, first_m = dashboard.record(wanted[0])
+    pens = set()
+    for trial in wanted:
+        drawn = dashboard.trace(CURVES, "flight", trial=trial)
+        assert drawn is not None
+        pens.add(drawn["dash"])
+        time_s, altitude_m = dashboard.record(trial)
+        np.testing.assert_allclose(drawn["y"], np.interp(drawn["x"], time_s, altitude_m), atol=2e-3)
+        below = dashboard.trace(CURVES, "difference", trial=trial)
+        if trial == wanted[0]:
+            assert below is None
+            continue
+        assert below is not None
+        x = np.array(below["x"])
+        np.testing.assert_allclose(
+            below["y"], np.interp(x, time_s, altitude_m) - np.interp(x, first_s, first_m), atol=5e-3
+        )
+    assert len(pens) == 3, "not by colour alone"
+
+
+def test_the_verdict_and_what_differs_are_the_apis(dashboard: Dashboard, flown: Flown) -> None:
+    page = dashboard.page
+    trials = [flown.early[0], flown.early[1], flown.late[0]]
+    found = compare(dashboard, trials)
+    verdict = page.get_by_role("region", name="Verdict")
+    expect(verdict).to_contain_text(found["sentence"])
+    for note in found["notes"]:
+        expect(verdict).to_contain_text(note)
+    for index, flight in enumerate(found["flights"]):
+        shown = row(page, index)
+        expect(shown).to_contain_text(f"{flight['label']}Flight {flight['number']}")
+        expect(shown).to_contain_text(printed(flight["group"]["mean"], flight["group"]["standard_error"]))
+    pair = next(one for one in found["pairs"] if (one["against_id"], one["trial_id"]) == (trials[0], trials[2]))
+    assert pair["verdict"] in {"better", "worse"}, pair
+    expect(row(page, 2)).to_contain_text(pair["verdict"].capitalize())
+    expect(row(page, 2)).to_contain_text(printed(abs(pair["difference"]), pair["standard_error"]))
+    expect(row(page, 1)).to_contain_text("Same gains")
+    titles = page.get_by_role("region", name="Flights compared").locator("thead th").all_inner_texts()
+    assert [title.split(" (")[0].strip() for title in titles][3:-1] == [one["title"] for one in found["gains"]]
+    settings = page.get_by_role("region", name="Settings that differ").locator("tbody tr")
+    for index, difference in enumerate(found["settings"]):
+        expect(settings.nth(index)).to_contain_text(difference["title"])
+        expect(settings.nth(index)).to_contain_text(str(difference["values"][2]))
+    assert [one["title"] for one in found["settings"]] == ["Seed of the campaign"]
+    expect(row(page, 2)).to_contain_text("+117")
+    page.get_by_text("Each against A in words").click()
+    expect(page.get_by_text(pair["sentence"]).last).to_be_visible()
+
+
+def test_the_address_can_be_sent_and_another_flight_made_the_first(
+    open_dashboard: Opener, shared_server: Server, flown: Flown
+) -> None:
+    dashboard = open_dashboard(shared_server.url)
+    page = dashboard.page
+    one, other = flown.early[0], flown.late[0]
+    compare(dashboard, [one, other])
+    dashboard.button("Hold the others against flight 1 of Compared in the evening").click()
+    dashboard.until(lambda: chosen(page) == [other, one])
+    dashboard.until(lambda: dashboard.trace(CURVES, "difference", trial=one) is not None)
+    expect(row(page, 0)).to_contain_text("the first")
+    page.get_by_role("link", name="Gainline, all campaigns").click()
+    expect(page.get_by_role("heading", name="Campaigns", exact=True)).to_be_visible()
+    page.goto("/compare")
+    dashboard.until(lambda: chosen(page) == [other, one])
+    dashboard.button("Remove flight 1 of Compared in the morning").click()
+    expect(page.get_by_text("Flight 1 is chosen.")).to_be_visible()
+    dashboard.button("Start over").click()
+    expect(page.get_by_text("Lay flights over each other")).to_be_visible()
+    assert chosen(page) == []
+    elsewhere = open_dashboard(shared_server.url, theme="dark", viewport=PHONE)
+    compare(elsewhere, [other, one])
+    assert elsewhere.trace(CURVES, "flight", trial=one) is not None
+
+
+def test_curves_and_figure_are_taken_along_as_files(dashboard: Dashboard, flown: Flown, tmp_path: Path) -> None:
+    trials = [flown.early[0], flown.late[0]]
+    stem = compare(dashboard, trials)["file_stem"]
+
+    def download(name: str, ending: str) -> Path:
+        with dashboard.page.expect_download() as caught:
+            dashboard.page.get_by_label(name, exact=True).click()
+        assert caught.value.suggested_filename == f"{stem}.{ending}"
+        file = tmp_path / caught.value.suggested_filename
+        caught.value.save_as(file)
+        return file
+
+    rows = list(csv.reader(download("Curves as CSV", "csv").read_text().splitlines()))
+    assert rows[0][:2] == ["time_s", "set_point_m"]
+    values = np.array([[float(cell) if cell else np.nan for cell in line] for line in rows[1:]])
+    for column, trial in enumerate(trials, start=2):
+        time_s, altitude_m = dashboard.record(trial)
+        inside = ~np.isnan(values[:, column])
+        expected = np.interp(values[inside, 0], time_s, altitude_m)
+        np.testing.assert_allclose(values[inside, column], expected, atol=1e-4)
+        assert inside.sum() > 1500
+    png = download("Figure as PNG", "png").read_bytes()
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    assert struct.unpack(">II", png[16:24]) == (2560, 1600)
+    drawn = ElementTree.parse(download("Figure as SVG", "svg")).getroot()
+    assert drawn.tag == "{http://www.w3.org/2000/svg}svg"
+    words = " ".join(text for text in drawn.itertext() if text.strip())
+    assert "A · flight 1 of Compared in th" in words
+    assert "Altitude (m)" in words
+
+
+def test_what_cannot_be_compared_is_said_and_can_be_left_out(dashboard: Dashboard, flown: Flown) -> None:
+    page = dashboard.page
+    one, other = flown.early[0], flown.early[2]
+    dashboard.open(address([one, flown.pitch, other]))
+    expect(page.get_by_role("alert")).to_contain_text("is in rad·s, that of flight 1")
+    dashboard.button("Leave it out").click()
+    expect(dashboard.plot(CURVES)).to_be_visible()
+    assert chosen(page) == [one, other]
+
+
+def test_a_flight_whose_campaign_was_deleted_is_said_to_be_gone(dashboard: Dashboard, flown: Flown) -> None:
+    page = dashboard.page
+    one, other = flown.early[0], flown.early[2]
+    doomed = dashboard.create("import", name="Deleted soon")
+    proposal = dashboard.get(f"/campaigns/{doomed}/proposal")["proposal"]
+    gone = dashboard.post(f"/campaigns/{doomed}/trials", {"proposal_id": proposal["id"]})["id"]
+    dashboard.open(address([one, gone]))
+    expect(page.get_by_role("alert")).to_contain_text("has not flown: it is planned")
+    version = dashboard.get(f"/campaigns/{doomed}")["version"]
+    assert page.request.delete(f"{dashboard.url}/api/campaigns/{doomed}?version={version}").ok
+    dashboard.open(address([one, gone, other]))
+    expect(page.get_by_role("alert")).to_contain_text(f"there is no trial {gone}")
+    dashboard.button("Leave it out").click()
+    expect(dashboard.plot(CURVES)).to_be_visible()
+    dashboard.open(address([gone]))
+    expect(page.get_by_role("alert")).to_contain_text(f"There is no trial {gone}.")
+
+
+def test_an_empty_page_teaches_and_finds_campaigns_by_name(dashboard: Dashboard, flown: Flown) -> None:
+    page = dashboard.page
+    dashboard.open("/")
+    dashboard.button("More pages").click()
+    page.get_by_role("link", name="Compare", exact=True).click()
+    expect(page.get_by_text("The first one is what the others are held against.")).to_be_visible()
+    page.get_by_role("textbox", name="Search campaigns by name").fill("evening")
+    expect(page.get_by_text(re.compile("^Compared in the morning"))).to_have_count(0)
+    page.get_by_text(re.compile("^Compared in the evening")).click()
+    expect(page.get_by_role("checkbox")).to_have_count(len(flown.late))
+    page.get_by_role("textbox", name="Search campaigns by name").fill("no such campaign")
+    expect(page.get_by_text("No campaign with a flight fits this search.")).to_be_visible()
