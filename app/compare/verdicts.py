@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
 from app.compare.sides import Side
-from app.compare.words import capitalised, flights, measured, named, percent
+from app.compare.words import capitalised, measured, named, percent
 from app.core.statistics import Comparison, Group, Word, compare, drift_of
 from app.core.strategies.history import describe
 from app.fleet import service as fleet
@@ -190,4 +190,5 @@ def _deciding(side: Side, against: Side, said: Comparison) -> str:
         for count, name in ((said.further.first, side.name), (said.further.second, against.name))
         if count
     ]
-    return f"If the difference stays, {flights(said.further.total)} more would decide it: {' and '.join(parts)}."
+    flights = "flight" if said.further.total == 1 else "flights"
+    return f"If the difference stays, {said.further.total} more {flights} would decide it: {' and '.join(parts)}."

@@ -159,7 +159,7 @@ function Against({ pair, first, unit }: { pair: FlightPair | null; first: string
       )}
       {further && (
         <small className={classes["small"]}>
-          decided by {further.trial} more of it, {further.against} of {first}
+          {further.trial} more of its gains and {further.against} of {first} would decide
         </small>
       )}
     </>
