@@ -238,7 +238,7 @@ def _requeue(row: JobRow) -> int:
         _fail(
             row,
             f"The worker went away {row.attempts} times while it did this.",
-            "Look into its log on the page of jobs, then retry it.",
+            "Its log on the page of jobs may say why; then retry it.",
             [],
         )
     else:

@@ -93,7 +93,8 @@ class Desk:
         """The whole job, from the stored order to the stored result. Raises nothing."""
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
             began_s = monotonic()
-            _log.info("job begun", worker=self._worker, order=job.order or None)
+            ordered = ", ".join(f"{name}: {value}" for name, value in job.order.items())
+            _log.info("job begun", worker=self._worker, order=ordered or None)
             try:
                 self._perform(job)
                 _log.info("the worker is done with the job", seconds=round(monotonic() - began_s, 3))
