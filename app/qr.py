@@ -1,8 +1,12 @@
 """QR codes of addresses: for a page as SVG, for a terminal as text."""
 
 import io
+from typing import Final
 
 import segno
+
+_WHITE_ON_BLACK: Final = "\x1b[97;40m"
+_RESET: Final = "\x1b[0m"
 
 
 def qr_svg(text: str) -> bytes:
@@ -13,7 +17,7 @@ def qr_svg(text: str) -> bytes:
 
 
 def qr_text(text: str) -> str:
-    """The code in half blocks, for a terminal with light or dark ground alike."""
+    """The code in half blocks, white on black whatever the terminal's own colours are."""
     drawn = io.StringIO()
     segno.make_qr(text).terminal(drawn, border=2, compact=True)
-    return drawn.getvalue().rstrip("\n")
+    return "\n".join(f"{_WHITE_ON_BLACK}{line}{_RESET}" for line in drawn.getvalue().splitlines())

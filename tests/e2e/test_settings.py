@@ -1,5 +1,6 @@
 """Settings, the help for keys, explanations, and what is said aloud."""
 
+import os
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -7,8 +8,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport
+from tests.runtime.processes import Serving
 
 VOICE = """
 window.said = [];
@@ -54,18 +56,17 @@ def test_on_loopback_the_page_says_how_a_tablet_gets_in_and_what_that_opens(dash
     expect(panel.get_by_role("img")).to_have_count(0)
 
 
-def test_a_server_that_others_reach_shows_its_address_to_a_camera(
-    open_dashboard: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GAINLINE_HOST", "0.0.0.0")
-    with served(tmp_path / "data") as server:
-        dashboard = open_dashboard(server.url)
-        dashboard.open("/settings")
-        addresses = [each["url"] for each in dashboard.get("/system")["addresses"]]
+def test_a_server_that_others_reach_shows_its_address_to_a_camera(open_dashboard: Opener, tmp_path: Path) -> None:
+    ui = {name: value for name, value in os.environ.items() if name == "GAINLINE_UI_DIR"}
+    with Serving(tmp_path / "data", "--no-worker", "--host", "0.0.0.0", **ui) as server:
+        addresses = [each["url"] for each in server.get("/system")["addresses"]]
         if not addresses:
             pytest.skip("this machine is in no network")
+        dashboard = open_dashboard(server.url)
+        dashboard.page.goto("/settings")
         panel = dashboard.panel("Open on the tablet")
         code = panel.get_by_role("img", name=f"QR code of {addresses[0]}")
+        expect(code).to_be_visible()
         dashboard.until(lambda: bool(code.evaluate("image => image.naturalWidth > 0")))
         expect(panel.get_by_role("link", name=addresses[0])).to_be_visible()
         expect(panel).to_contain_text("anybody who can reach this machine")
