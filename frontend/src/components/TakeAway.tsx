@@ -18,8 +18,8 @@ export function TakeAway({ campaign }: { campaign: Campaign }) {
           PDF
         </Button>
         {campaign.flying === null && (
-          <Button {...link} href={pathOf(campaign.id, "bundle")} download>
-            Download bundle
+          <Button {...link} href={pathOf(campaign.id, "bundle")} download aria-label="Download bundle">
+            Bundle
           </Button>
         )}
       </div>

@@ -39,10 +39,10 @@ export function CampaignsPage() {
     <>
       <div className={classes["head"]}>
         <h1 className={classes["title"]}>Campaigns</h1>
-        <BringIn />
         <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
           New campaign
         </Button>
+        <BringIn />
       </div>
       <search className={classes["filters"]}>
         <TextInput
