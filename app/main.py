@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
-from app.api import catalogue, errors, events, figures, landscapes, system
+from app.api import catalogue, errors, events, figures, landscapes, system, vehicle_figures
 from app.api.headers import HeadersMiddleware
 from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
@@ -74,6 +74,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         reports,
         bundles,
         landscapes.router,
+        vehicle_figures.router,
         figures.router,
         events.router,
     )

@@ -129,3 +129,10 @@ def latest_proposal(session: Session, campaign_id: int) -> ProposalRow | None:
     return session.scalar(
         select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id.desc()).limit(1)
     )
+
+
+def of_vehicle(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
+    """The vehicle's campaigns, the oldest first."""
+    return session.scalars(
+        select(CampaignRow).where(CampaignRow.vehicle_id == vehicle_id).order_by(CampaignRow.id)
+    ).all()

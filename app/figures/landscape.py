@@ -20,6 +20,9 @@ SHOWN_SHARE: Final = 0.8
 """Share of all points that the scale covers; what lies beyond is shaded as off the scale."""
 MOST_NUMBERED: Final = 12
 """Of more flights only the first, the best and the latest bear their number."""
+_TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
+"""The lower the error, the fuller the colour: shares of it from the bottom to the top of the scale."""
+_EDGE: Final = 0.03
 _GAP: Final = 0.09
 _STACK_GAP: Final = 0.085
 
@@ -80,7 +83,7 @@ class LandscapeFigure:
         layout = theme.layout(
             palette,
             uirevision="landscape",
-            margin={"l": 8, "r": 14, "t": 12, "b": 64 if self.stacked else 48},
+            margin={"l": 8, "r": 14, "t": 12, "b": 92 if self.stacked else 76},
             annotations=[self._note(palette, scale)],
             **axes,
         )
@@ -196,7 +199,7 @@ class LandscapeFigure:
                 _title(named[one.x]),
                 domain=across,
                 anchor=f"y{suffix}",
-                range=[one.x_values[0], one.x_values[-1]],
+                range=_padded(one.x_values),
                 nticks=5,
                 showgrid=False,
             ),
@@ -205,7 +208,7 @@ class LandscapeFigure:
                 _title(named[one.y]),
                 domain=up,
                 anchor=f"x{suffix}",
-                range=[one.y_values[0], one.y_values[-1]],
+                range=_padded(one.y_values),
                 nticks=6,
                 showgrid=False,
             ),
@@ -219,7 +222,7 @@ class LandscapeFigure:
             "text": f"Slices through {held}{between}contours every {scale.step:g} {self.history.error_unit}",
             "x": 0,
             "y": 0,
-            "yshift": -44,
+            "yshift": -52,
             "xref": "paper",
             "yref": "paper",
             "xanchor": "left",
@@ -308,15 +311,11 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
             "size": scale.step,
             "coloring": "fill",
             "showlabels": True,
-            "labelfont": {"size": 11, "color": palette.dim},
+            "labelfont": {"size": 11, "color": palette.ink},
         },
         "zmin": scale.low,
         "zmax": scale.high,
-        "colorscale": [
-            [0, theme.faint(palette.best, 0.55)],
-            [0.35, theme.faint(palette.best, 0.2)],
-            [1, theme.faint(palette.best, 0.0)],
-        ],
+        "colorscale": [[place, theme.mixed(palette.best, palette.surface, share)] for place, share in _TINTS],
         "meta": {"role": "model", "slice": index},
         "hovertemplate": f"{one.x} %{{x:.4~g}}, {one.y} %{{y:.4~g}}<br>"
         f"<b>%{{z:.4f}} {unit}</b> predicted<extra></extra>",
@@ -326,7 +325,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
         "showlegend": index == 1,
         "legendgroup": "beyond",
         "contours": {"type": "constraint", "operation": ">", "value": scale.high},
-        "fillcolor": theme.faint(palette.earlier, 0.28),
+        "fillcolor": theme.mixed(palette.earlier, palette.surface, 0.4),
         "line": {"width": 0.9, "color": palette.earlier, "smoothing": 1},
         "hoverinfo": "skip",
         "meta": {"role": "beyond", "slice": index},
@@ -391,6 +390,12 @@ def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[
     if stacked:
         return [0.0, 1.0], [max(0.0, 1.0 - first - size), 1.0 - first]
     return [first, min(1.0, first + size)], [0.0, 1.0]
+
+
+def _padded(values: Sequence[float]) -> list[float]:
+    """A slice's range, with room for marks that stand on its edge."""
+    room = _EDGE * (values[-1] - values[0])
+    return [values[0] - room, values[-1] + room]
 
 
 def _nice(width: float) -> float:

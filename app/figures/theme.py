@@ -108,6 +108,12 @@ def faint(colour: str, opacity: float) -> str:
     return f"rgba({red},{green},{blue},{opacity:g})"
 
 
+def mixed(colour: str, ground: str, share: float) -> str:
+    """What a see-through `colour` of that share looks like on `ground`, as a hex colour of its own."""
+    pairs = [(int(colour[at : at + 2], 16), int(ground[at : at + 2], 16)) for at in (1, 3, 5)]
+    return "#" + "".join(f"{round(share * one + (1.0 - share) * other):02x}" for one, other in pairs)
+
+
 def solid(colour: str | list[str], **more: object) -> dict[str, object]:
     """A filled mark in full colour; Plotly makes marks of several sizes pale and rimmed unless told otherwise."""
     return {"color": colour, "opacity": 1, "line": {"width": 0}, **more}

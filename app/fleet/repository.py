@@ -10,7 +10,7 @@ from app.db.models import FlightRow, VehicleActRow, VehicleRow
 from app.db.paging import Position, instant
 from app.db.types import UtcDateTime
 from app.errors import NotFoundError
-from app.fleet.states import ACT_UNDER_WAY, GIVES_GAINS, ActState, VehicleState
+from app.fleet.states import ACT_UNDER_WAY, GIVES_GAINS, ActKind, ActState, VehicleState
 from app.trials.states import UNDER_WAY
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
@@ -126,3 +126,14 @@ def flights_by_id(session: Session, ids: Sequence[int]) -> dict[int, FlightRow]:
 
 def acts_by_id(session: Session, ids: Sequence[int]) -> dict[int, VehicleActRow]:
     return {row.id: row for row in session.scalars(select(VehicleActRow).where(VehicleActRow.id.in_(ids)))}
+
+
+def flights_of(session: Session, vehicle_id: int) -> Sequence[FlightRow]:
+    """Those that left the ground or may have, the oldest first."""
+    wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.finished_at.is_not(None))
+    return session.scalars(wanted.where(FlightRow.claimed_at.is_not(None)).order_by(FlightRow.id)).all()
+
+
+def safe_gains_acts(session: Session, vehicle_id: int) -> Sequence[VehicleActRow]:
+    wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
+    return session.scalars(wanted.where(VehicleActRow.kind == ActKind.SAFE_GAINS).order_by(VehicleActRow.id)).all()

@@ -4,6 +4,8 @@ Registering is in `registering`, what a vehicle is asked beside its flights in `
 """
 
 from collections.abc import Mapping
+from datetime import datetime
+from typing import TypedDict
 
 from sqlalchemy.orm import Session
 
@@ -22,6 +24,7 @@ from app.schemas import Page
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 __all__ = [
+    "battery_flights",
     "campaign_vehicle",
     "can_fly",
     "chosen_vehicle",
@@ -34,6 +37,7 @@ __all__ = [
     "options_of",
     "require_idle",
     "require_ready",
+    "safe_gains_changes",
     "settle_vehicle",
     "simulation_for",
 ]
@@ -166,3 +170,25 @@ def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[V
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:
     """Raises NotFoundError."""
     return vehicle_view(repository.get_one(session, vehicle_id))
+
+
+class BatteryReading(TypedDict):
+    """A flight's battery: its number in the vehicle's ledger, the label, and the voltages, V."""
+
+    flight: int
+    battery: str
+    before_v: float | None
+    after_v: float | None
+
+
+def battery_flights(session: Session, vehicle_id: int) -> list[BatteryReading]:
+    """What was read of the battery before and after each flight, the oldest first."""
+    return [
+        BatteryReading(flight=place, battery=row.battery, before_v=row.battery_v_before, after_v=row.battery_v_after)
+        for place, row in enumerate(repository.flights_of(session, vehicle_id), start=1)
+    ]
+
+
+def safe_gains_changes(session: Session, vehicle_id: int) -> list[datetime]:
+    """When the safe gains were set, the oldest first."""
+    return [row.requested_at for row in repository.safe_gains_acts(session, vehicle_id)]

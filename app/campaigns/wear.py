@@ -1,0 +1,170 @@
+"""What a vehicle's campaigns tell of the vehicle itself: its calibrations over its flights, and its batteries."""
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from typing import Final
+
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+
+from app.campaigns import repository
+from app.core.drift import WATCHED, Drift, Fitted, drift
+from app.db.models import CampaignRow, ProposalRow
+from app.figures.base import Card, card_of
+from app.figures.batteries import BatteriesFigure, BatteryFlight
+from app.figures.drift import CalibrationFigure, Point
+from app.figures.theme import ThemeName
+from app.fleet import service as fleet
+from app.trials import history
+
+_STRATEGY: Final = "calibrated"
+
+
+class FittedNumber(BaseModel):
+    """A parameter of the model with its standard error."""
+
+    name: str
+    title: str
+    unit: str
+    value: float
+    standard_error: float
+
+
+class Estimate(BaseModel):
+    """One calibration: after which of the vehicle's flights, counted over all its campaigns."""
+
+    flight: int
+    campaign_id: int
+    trial_number: int
+    proposal_id: int
+    at: datetime
+    fitted: list[FittedNumber]
+
+
+class Retune(BaseModel):
+    """Whether the vehicle is to be tuned again: `since` is the flight after which it was tuned last."""
+
+    due: bool
+    since: int | None
+    drifted: list[str]
+    sentence: str
+
+
+class VehicleCalibration(BaseModel):
+    """What the flights say about the vehicle, the oldest calibration first, and whether it still is as it was tuned."""
+
+    estimates: list[Estimate]
+    retune: Retune
+
+
+def calibration_of(session: Session, vehicle_id: int) -> VehicleCalibration:
+    """Raises NotFoundError. Of a shared simulation only the campaigns count that flew with its latest settings: with
+    others it is another vehicle."""
+    estimates, ends = _estimates(session, vehicle_id)
+    return VehicleCalibration(estimates=estimates, retune=_retune(estimates, ends))
+
+
+def vehicle_figure(session: Session, vehicle_id: int, name: str, theme: ThemeName) -> Card:
+    """`calibration` or `batteries`. Raises NotFoundError."""
+    if name == "batteries":
+        fleet.get_vehicle(session, vehicle_id)
+        flights = [BatteryFlight(**each) for each in fleet.battery_flights(session, vehicle_id)]
+        return card_of(BatteriesFigure(tuple(flights), theme))
+    found = calibration_of(session, vehicle_id)
+    points = tuple(
+        Point(
+            flight=one.flight,
+            campaign_id=one.campaign_id,
+            trial_number=one.trial_number,
+            fitted={
+                each.name: Fitted(
+                    title=each.title, unit=each.unit, value=each.value, standard_error=each.standard_error
+                )
+                for each in one.fitted
+            },
+        )
+        for one in found.estimates
+    )
+    return card_of(CalibrationFigure(points, found.retune.since, found.retune.sentence, theme))
+
+
+def _estimates(session: Session, vehicle_id: int) -> tuple[list[Estimate], list[int]]:
+    """The calibrations in the order of the flights, and the flights after which the vehicle counts as tuned."""
+    vehicle = fleet.get_vehicle(session, vehicle_id)
+    campaigns = repository.of_vehicle(session, vehicle_id)
+    if not vehicle.registered and campaigns:
+        calibrated = [row for row in campaigns if row.strategy == _STRATEGY]
+        latest = (calibrated or campaigns)[-1].vehicle_options
+        campaigns = [row for row in campaigns if row.vehicle_options == latest]
+    trials = history.trials_of(session, *(row.id for row in campaigns))
+    flown = sorted((row for row in trials if row.flown_at is not None), key=lambda row: (str(row.flown_at), row.id))
+    counts = {(row.campaign_id, row.number): place for place, row in enumerate(flown, start=1)}
+    found = list(_fits(session, campaigns, counts))
+    found.sort(key=lambda one: (one.flight, one.proposal_id))
+    over = {row.id for row in campaigns if row.outcome is not None}
+    ends = [one.flight for one in found if one.campaign_id in over and _is_last(one, found)]
+    ends += [
+        max(before)
+        for at in fleet.safe_gains_changes(session, vehicle_id)
+        if (before := [one.flight for one in found if one.at <= at])
+    ]
+    return found, ends
+
+
+def _is_last(one: Estimate, found: Sequence[Estimate]) -> bool:
+    return all(other.flight <= one.flight for other in found if other.campaign_id == one.campaign_id)
+
+
+def _fits(session: Session, campaigns: Sequence[CampaignRow], counts: dict[tuple[int, int], int]) -> Iterator[Estimate]:
+    """The newest calibration after each flight."""
+    for campaign in campaigns:
+        if campaign.strategy != _STRATEGY:
+            continue
+        newest: dict[int, tuple[ProposalRow, int]] = {}
+        for row in repository.proposals(session, campaign.id):
+            numbers = (row.spread or {}).get("flights") or []
+            known = [counts[campaign.id, number] for number in numbers if (campaign.id, number) in counts]
+            if known and row.explanation.get("fitted"):
+                newest[max(known)] = row, max(numbers)
+        for flight, (row, number) in newest.items():
+            yield _estimate(row, flight, number)
+
+
+def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
+    fitted = {each["name"]: each for each in row.explanation["fitted"]}
+    names = ("name", "title", "unit", "value", "standard_error")
+    return Estimate(
+        flight=flight,
+        campaign_id=row.campaign_id,
+        trial_number=number,
+        proposal_id=row.id,
+        at=row.computed_at,
+        fitted=[
+            FittedNumber.model_validate({field: fitted[name][field] for field in names})
+            for name in WATCHED
+            if name in fitted
+        ],
+    )
+
+
+def _retune(estimates: Sequence[Estimate], ends: Sequence[int]) -> Retune:
+    if not estimates:
+        said = "Nothing is known yet: no campaign with the calibrated model has flown on this vehicle."
+        return Retune(due=False, since=None, drifted=[], sentence=said)
+    if not ends:
+        said = "Not judged yet: no campaign with the calibrated model is finished on this vehicle."
+        return Retune(due=False, since=None, drifted=[], sentence=said)
+    since = max(ends)
+    tuned = next(one for one in reversed(estimates) if one.flight == since)
+    if tuned is estimates[-1]:
+        said = f"Tuned with flight {since}; no campaign with the calibrated model has flown since."
+        return Retune(due=False, since=since, drifted=[], sentence=said)
+    found: Drift = drift(_by_name(tuned), _by_name(estimates[-1]))
+    return Retune(due=found.due, since=since, drifted=list(found.drifted), sentence=found.sentence)
+
+
+def _by_name(one: Estimate) -> dict[str, Fitted]:
+    return {
+        each.name: Fitted(title=each.title, unit=each.unit, value=each.value, standard_error=each.standard_error)
+        for each in one.fitted
+    }

@@ -1,0 +1,172 @@
+"""A vehicle's fitted parameters over its flights, one small panel each, with their 95 % intervals: wear shows here."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from app.core.drift import WATCHED, Fitted
+from app.figures import theme
+from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.theme import PALETTES, Palette, ThemeName
+
+REACH: Final = 1.96
+"""Half of a 95 % interval, in standard errors."""
+_GAP: Final = 0.09
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """One calibration: after which flight of the vehicle, and the parameters by their names."""
+
+    flight: int
+    campaign_id: int
+    trial_number: int
+    fitted: Mapping[str, Fitted]
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationFigure:
+    """Table columns: `flight`, `campaign`, `trial`, then each parameter with its standard error. `since` is the flight
+    after which the vehicle was tuned last: a line in every panel."""
+
+    points: tuple[Point, ...]
+    since: int | None
+    verdict: str
+    theme: ThemeName = "light"
+    name: ClassVar[str] = "calibration"
+    title: ClassVar[str] = "Calibration over the flights"
+
+    def not_ready(self) -> str | None:
+        if self.points:
+            return None
+        return "The model's fitted parameters appear here once a campaign with the calibrated model has flown."
+
+    def compute(self) -> Card:
+        palette, names = PALETTES[self.theme], self._names()
+        axes: dict[str, object] = {}
+        for index in range(1, len(names) + 1):
+            axes |= self._axes(palette, index, len(names))
+        layout = theme.layout(
+            palette,
+            showlegend=False,
+            uirevision="calibration",
+            margin={"l": 8, "r": 14, "t": 24, "b": 8},
+            annotations=[self._title(palette, index, name, len(names)) for index, name in enumerate(names, start=1)],
+            shapes=self._tuned(palette, len(names)),
+            **axes,
+        )
+        return Card(
+            name=self.name,
+            title=self.title,
+            state="ready",
+            summary=f"Bars are 95 % intervals. {self.verdict}",
+            figure=plotly_json(
+                [self._panel(palette, index, name) for index, name in enumerate(names, start=1)], layout
+            ),
+            table=self._table(names),
+        )
+
+    def _names(self) -> list[str]:
+        return [name for name in WATCHED if any(name in point.fitted for point in self.points)]
+
+    def _panel(self, palette: Palette, index: int, name: str) -> dict[str, object]:
+        shown = [point for point in self.points if name in point.fitted]
+        unit, suffix = shown[0].fitted[name].unit, _suffix(index)
+        return {
+            "type": "scatter",
+            "mode": "markers",
+            "name": shown[0].fitted[name].title,
+            "xaxis": f"x{suffix}",
+            "yaxis": f"y{suffix}",
+            "x": [point.flight for point in shown],
+            "y": [point.fitted[name].value for point in shown],
+            "error_y": {
+                "type": "data",
+                "array": [REACH * point.fitted[name].standard_error for point in shown],
+                "color": palette.dim,
+                "thickness": 1.5,
+                "width": 4,
+            },
+            "marker": theme.solid(palette.best, size=8),
+            "text": [f"campaign {point.campaign_id}, flight {point.trial_number}" for point in shown],
+            "meta": {"role": "fitted", "parameter": name},
+            "hovertemplate": f"<b>Flight %{{x}} of the vehicle</b> (%{{text}})<br>%{{y:.4g}} ± %{{error_y.array:.2g}} "
+            f"{unit}<extra></extra>",
+        }
+
+    def _axes(self, palette: Palette, index: int, count: int) -> dict[str, object]:
+        bottom, height = _place(index, count)
+        suffix, last = _suffix(index), max(point.flight for point in self.points)
+        x = {
+            "range": [0.5, last + 0.6],
+            "dtick": max(1, -(-last // 12)),
+            "showgrid": False,
+            "showticklabels": index == count,
+            "anchor": f"y{suffix}",
+            "matches": None if index == 1 else "x",
+        }
+        told = "Flight of this vehicle"
+        return {
+            f"xaxis{suffix}": theme.titled(palette, told, **x) if index == count else theme.axis(palette, **x),
+            f"yaxis{suffix}": theme.axis(
+                palette, domain=[bottom, bottom + height], anchor=f"x{suffix}", nticks=4, rangemode="normal"
+            ),
+        }
+
+    def _title(self, palette: Palette, index: int, name: str, count: int) -> dict[str, object]:
+        fitted = next(point.fitted[name] for point in self.points if name in point.fitted)
+        return {
+            "text": f"<b>{fitted.title}</b> ({fitted.unit})",
+            "x": 0,
+            "y": sum(_place(index, count)),
+            "xref": "paper",
+            "yref": "paper",
+            "xanchor": "left",
+            "yanchor": "bottom",
+            "showarrow": False,
+            "font": {"size": 12, "color": palette.dim},
+        }
+
+    def _tuned(self, palette: Palette, count: int) -> list[dict[str, object]]:
+        if self.since is None:
+            return []
+        return [
+            {
+                "type": "line",
+                "xref": f"x{_suffix(index)}",
+                "yref": f"y{_suffix(index)} domain",
+                "x0": self.since,
+                "x1": self.since,
+                "y0": 0,
+                "y1": 1,
+                "layer": "below",
+                "line": {"color": palette.prediction, "width": 1.5, "dash": "dot"},
+            }
+            for index in range(1, count + 1)
+        ]
+
+    def _table(self, names: list[str]) -> Table:
+        first = {name: next(point.fitted[name] for point in self.points if name in point.fitted) for name in names}
+        columns = [Column("flight", "Flight of the vehicle", digits=0), Column("campaign", "Campaign", digits=0)]
+        columns.append(Column("trial", "Its flight", digits=0))
+        for name in names:
+            columns.append(Column(name, first[name].title, first[name].unit))
+            columns.append(Column(f"{name}_se", "Standard error", first[name].unit))
+        rows: list[tuple[Cell, ...]] = []
+        for point in self.points:
+            cells: list[Cell] = [point.flight, point.campaign_id, point.trial_number]
+            for name in names:
+                fitted = point.fitted.get(name)
+                cells += [None, None] if fitted is None else [fitted.value, fitted.standard_error]
+            rows.append(tuple(cells))
+        return Table(tuple(columns), tuple(rows))
+
+
+def _place(index: int, count: int) -> tuple[float, float]:
+    """Foot and height of a panel, the first one on top, as shares of the whole."""
+    height = (1 - _GAP * (count - 1)) / count
+    return max(0.0, 1 - index * height - (index - 1) * _GAP), height
+
+
+def _suffix(index: int) -> str:
+    return "" if index == 1 else str(index)
