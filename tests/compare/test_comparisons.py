@@ -86,8 +86,12 @@ def test_a_flight_is_better_than_the_first_with_the_confidence_of_a_t_test(
     assert (found["verdict"], pair["verdict"], pair["further"]) == ("better", "better", None)
     assert found["sentence"].startswith("Flight 4 (kp 300, ki 60, kd 82; 3 flights) is better than flight 1")
     assert [flight["label"] for flight in found["flights"]] == ["A", "B"]
-    group = get(client, f"/api/trials/{other[1]}")["group"]
-    assert found["flights"][1]["group"] == group
+    trial = get(client, f"/api/trials/{other[1]}")
+    assert found["flights"][1]["group"] == trial["group"]
+    (told,) = trial["comparisons"]
+    assert {key: pair[key] for key in ("verdict", "confidence", "difference", "standard_error")} == {
+        key: told[key] for key in ("verdict", "confidence", "difference", "standard_error")
+    }, "the same as on the campaign's page"
 
 
 def test_what_is_unresolved_says_which_further_flights_would_decide(client: TestClient, database: Database) -> None:

@@ -49,6 +49,7 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
         "new-vehicle": "/vehicles/new",
         "vehicle": f"/vehicles/{register(dashboard)}",
         "reproductions": "/reproductions",
+        "compare": f"/compare?trial={dashboard.trials(under_way)[1]['id']}&trial={dashboard.trials(finished)[0]['id']}",
         "jobs": "/jobs",
         "settings": "/settings",
         "missing": "/no/such/page",
