@@ -12,6 +12,7 @@ import { LinkPanel } from "../components/fleet/LinkPanel";
 import { ParameterPanel } from "../components/fleet/ParameterPanel";
 import { QuarantinePanel } from "../components/fleet/QuarantinePanel";
 import { SafeGains } from "../components/fleet/SafeGains";
+import { Wear } from "../components/fleet/Wear";
 import { Control } from "../components/fly/Control";
 import { Panel } from "../components/Panel";
 import { StateBadge } from "../components/StateBadge";
@@ -25,11 +26,34 @@ import classes from "./VehiclePage.module.css";
 export function VehiclePage() {
   const vehicleId = Number(useParams()["vehicleId"]);
   const vehicles = useVehicles();
-  const vehicle = vehicles.data?.find(({ id, registered }) => id === vehicleId && registered);
+  const vehicle = vehicles.data?.find(({ id }) => id === vehicleId);
   useTitle(vehicle?.name ?? "Vehicle");
+  if (vehicle?.registered === false) return <SharedView vehicle={vehicle} />;
   if (vehicle !== undefined) return <VehicleView key={vehicle.id} vehicle={vehicle} />;
   if (vehicles.error) return <Trouble error={vehicles.error} />;
   return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;
+}
+
+/** A simulation that campaigns share: it has no link of its own, and what its flights tell of it all the same. */
+function SharedView({ vehicle }: { vehicle: Vehicle }) {
+  return (
+    <>
+      <div className={classes["head"]}>
+        <Anchor component={Link} to="/vehicles" className={classes["back"]}>
+          <IconChevronLeft size={20} aria-hidden />
+          Vehicles
+        </Anchor>
+        <h1 className={classes["title"]}>{vehicle.name}</h1>
+        <VehicleBadge isReal={vehicle.is_real} />
+        <StateBadge words={vehicleWords(vehicle)} />
+      </div>
+      {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
+      <div className={classes["grid"]}>
+        <Wear vehicleId={vehicle.id} />
+        <LedgerTable vehicleId={vehicle.id} />
+      </div>
+    </>
+  );
 }
 
 /** One registered vehicle: its link, what it holds, what it was given and asked, and who is in control. */
@@ -102,6 +126,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
         >
           <CheckList vehicle={vehicle} />
         </Panel>
+        <Wear vehicleId={vehicle.id} />
         <LedgerTable vehicleId={vehicle.id} />
         <ActList vehicleId={vehicle.id} />
         <ParameterPanel

@@ -966,6 +966,38 @@ export type Drift = {
 };
 
 /**
+ * Estimate
+ *
+ * One calibration: after which of the vehicle's flights, counted over all its campaigns.
+ */
+export type Estimate = {
+    /**
+     * Flight
+     */
+    flight: number;
+    /**
+     * Campaign Id
+     */
+    campaign_id: number;
+    /**
+     * Trial Number
+     */
+    trial_number: number;
+    /**
+     * Proposal Id
+     */
+    proposal_id: number;
+    /**
+     * At
+     */
+    at: string;
+    /**
+     * Fitted
+     */
+    fitted: Array<FittedNumber>;
+};
+
+/**
  * ExperimentInfo
  *
  * `output` is the channel that is scored. Without a model nothing is foretold, and gains are chosen by hand.
@@ -1151,6 +1183,34 @@ export type Finish = {
      * Reason
      */
     reason?: string;
+};
+
+/**
+ * FittedNumber
+ *
+ * A parameter of the model with its standard error.
+ */
+export type FittedNumber = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Value
+     */
+    value: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
 };
 
 /**
@@ -2584,6 +2644,30 @@ export type ReproductionSummary = {
 };
 
 /**
+ * Retune
+ *
+ * Whether the vehicle is to be tuned again: `since` is the flight after which it was tuned last.
+ */
+export type Retune = {
+    /**
+     * Due
+     */
+    due: boolean;
+    /**
+     * Since
+     */
+    since: number | null;
+    /**
+     * Drifted
+     */
+    drifted: Array<string>;
+    /**
+     * Sentence
+     */
+    sentence: string;
+};
+
+/**
  * Run
  *
  * How to run a reproduction.
@@ -3396,6 +3480,19 @@ export type VehicleAct = {
      * Finished At
      */
     finished_at: string | null;
+};
+
+/**
+ * VehicleCalibration
+ *
+ * What the flights say about the vehicle, the oldest calibration first, and whether it still is as it was tuned.
+ */
+export type VehicleCalibration = {
+    /**
+     * Estimates
+     */
+    estimates: Array<Estimate>;
+    retune: Retune;
 };
 
 /**
@@ -6374,6 +6471,120 @@ export type BringInBundleResponses = {
 };
 
 export type BringInBundleResponse = BringInBundleResponses[keyof BringInBundleResponses];
+
+export type GetLandscapeData = {
+    body?: never;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+        /**
+         * Stacked
+         *
+         * slices one below the other, for a narrow page
+         */
+        stacked?: boolean;
+    };
+    url: '/api/campaigns/{campaign_id}/figures/landscape';
+};
+
+export type GetLandscapeErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetLandscapeError = GetLandscapeErrors[keyof GetLandscapeErrors];
+
+export type GetLandscapeResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetLandscapeResponse = GetLandscapeResponses[keyof GetLandscapeResponses];
+
+export type GetCalibrationData = {
+    body?: never;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query?: never;
+    url: '/api/vehicles/{vehicle_id}/calibration';
+};
+
+export type GetCalibrationErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetCalibrationError = GetCalibrationErrors[keyof GetCalibrationErrors];
+
+export type GetCalibrationResponses = {
+    /**
+     * Successful Response
+     */
+    200: VehicleCalibration;
+};
+
+export type GetCalibrationResponse = GetCalibrationResponses[keyof GetCalibrationResponses];
+
+export type GetVehicleFigureData = {
+    body?: never;
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+        /**
+         * Name
+         */
+        name: 'calibration' | 'batteries';
+    };
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+    };
+    url: '/api/vehicles/{vehicle_id}/figures/{name}';
+};
+
+export type GetVehicleFigureErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetVehicleFigureError = GetVehicleFigureErrors[keyof GetVehicleFigureErrors];
+
+export type GetVehicleFigureResponses = {
+    /**
+     * Successful Response
+     */
+    200: FigureCard;
+};
+
+export type GetVehicleFigureResponse = GetVehicleFigureResponses[keyof GetVehicleFigureResponses];
 
 export type GetCampaignFigureData = {
     body?: never;

@@ -24,13 +24,9 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
       <div className={classes["what"]}>
         <h3 className={classes["name"]}>
           <VehicleBadge isReal={vehicle.is_real} />
-          {vehicle.registered ? (
-            <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
-              {vehicle.name}
-            </Anchor>
-          ) : (
-            vehicle.name
-          )}
+          <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
+            {vehicle.name}
+          </Anchor>
           <StateBadge words={vehicleWords(vehicle)} />
         </h3>
         <dl className={`${classes["facts"]} numbers`}>
