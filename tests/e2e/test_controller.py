@@ -1,0 +1,133 @@
+"""The page of controller checks: the example, a log of one's own, gains asked for, a file that cannot be read."""
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import FilePayload, expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, Dashboard, Json
+from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
+
+TRACES = Path(__file__).parents[1] / "data" / "vertical_loop"
+DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
+
+
+@pytest.fixture
+def page_of_checks(open_dashboard: Opener, own_server: Server) -> Dashboard:
+    dashboard = open_dashboard(own_server.url)
+    dashboard.open("/controller")
+    return dashboard
+
+
+def choose(dashboard: Dashboard, *files: FilePayload | Path) -> None:
+    with dashboard.page.expect_file_chooser() as chooser:
+        dashboard.button("Choose a recording").click()
+    chooser.value.set_files(list(files))  # type: ignore[arg-type]
+
+
+def file_of(name: str, content: str) -> FilePayload:
+    return FilePayload(name=name, mimeType="application/octet-stream", buffer=content.encode())
+
+
+def newest(dashboard: Dashboard) -> Json:
+    check_id = dashboard.get("/controller-checks")["items"][0]["id"]
+    found: Json = dashboard.get(f"/controller-checks/{check_id}")
+    return found
+
+
+def assert_drawn_as_told(dashboard: Dashboard, check: Json) -> None:
+    for figure in check["figures"]:
+        told = dashboard.get(f"/controller-checks/{check['id']}/figures/{figure['name']}")["figure"]["data"]
+        expect(dashboard.plot(figure["title"])).to_be_visible()
+        drawn = dashboard.traces(figure["title"])
+        assert [(one["meta"], one["x"], one["y"]) for one in drawn] == [
+            (one["meta"], one["x"], one["y"]) for one in told
+        ]
+
+
+def test_one_click_shows_what_a_check_is(page_of_checks: Dashboard) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    expect(page.get_by_text("The method works only if it is.")).to_be_visible()
+    dashboard.button("Check the example").click()
+    expect(page.get_by_text("The replica agrees: all 8\N{NARROW NO-BREAK SPACE}192 steps are exact")).to_be_visible()
+    check = newest(dashboard)
+    assert page.url.endswith(f"/controller/{check['id']}")
+    shown = page.get_by_role("region", name="Difference of every signal").locator("tbody tr").all_inner_texts()
+    assert [row.split(",")[0] for row in shown] == [signal["name"] for signal in check["signals"]]
+    assert all("0 counts" in row and "exact" in row for row in shown)
+    assert_drawn_as_told(dashboard, check)
+    page.reload()
+    expect(page.get_by_text(check["sentence"])).to_be_visible()
+
+
+def test_a_log_that_was_flown_with_other_gains_is_marked_where_it_differs_and_checked_again(
+    page_of_checks: Dashboard,
+) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    other = COMPANION.replace('"HOVER_KP" value="283"', '"HOVER_KP" value="300"')
+    choose(dashboard, file_of("flight.data", data_of(Flight(DEFAULT))), file_of("flight.log", other))
+    expect(page.get_by_text("The replica differs: ")).to_be_visible()
+    check = newest(dashboard)
+    assert (check["passed"], check["gains"]["kp"]) == (False, 300)
+    assert_drawn_as_told(dashboard, check)
+    marks = dashboard.trace("Commands", "differs", line="Differs")
+    assert marks is not None
+    assert len(marks["x"]) == 200
+    dashboard.button("Check again with kp 283, ki 13, kd 82").click()
+    expect(page.get_by_text("The replica agrees: 669 of 669 commands follow to the last bit.")).to_be_visible()
+    checked = page.get_by_role("list", name="Checked so far").get_by_role("listitem")
+    expect(checked).to_have_count(2)
+    expect(checked.first).to_contain_text("Agrees")
+    expect(checked.last).to_contain_text("Differs")
+    checked.last.get_by_role("link", name="flight.data").click()
+    expect(page.get_by_text(check["sentence"])).to_be_visible()
+    page.get_by_role("button", name="Remove the check of flight.data").last.click()
+    expect(checked).to_have_count(1)
+    assert page.url.endswith("/controller")
+
+
+def test_a_calm_log_asks_for_its_gains(page_of_checks: Dashboard) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    lines = data_of(Flight(DEFAULT)).splitlines()
+    choose(dashboard, file_of("calm.data", "\n".join(line for line in lines if float(line.split()[0]) > 40.0)))
+    expect(page.get_by_role("alert")).to_contain_text("calm.data does not say which gains were flown")
+    page.get_by_label("Gains flown: kp, ki, kd").fill("283, 13, 82")
+    dashboard.button("Check calm.data with these").click()
+    expect(page.get_by_text("The replica agrees: ")).to_be_visible()
+    assert newest(dashboard)["gains_from"] == "given"
+
+
+def test_what_is_no_recording_is_refused_in_words(page_of_checks: Dashboard) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    choose(dashboard, file_of("alive.data", "1.0 31 ALIVE 1\n"))
+    expect(page.get_by_role("alert")).to_contain_text("holds no VERT_LOOP")
+    choose(dashboard, FilePayload(name="cut.csv.gz", mimeType="application/gzip",
+                                  buffer=(TRACES / "climb_rates.csv.gz").read_bytes()[:4000]))  # fmt: skip
+    expect(page.get_by_role("alert")).to_contain_text("cut.csv.gz is damaged or not a text file")
+    assert dashboard.get("/controller-checks")["total"] == 0
+
+
+def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    dropped = page.evaluate_handle(
+        """text => {
+          const data = new DataTransfer();
+          data.items.add(new File([text], "dropped.data"));
+          return data;
+        }""",
+        data_of(Flight(DEFAULT, fly_s=12.0)),
+    )
+    page.get_by_role("heading", name="Controller check").dispatch_event("drop", {"dataTransfer": dropped})
+    expect(page.get_by_role("article", name="Check of dropped.data")).to_be_visible()
+    assert newest(dashboard)["gains_from"] == "worked out from the commands"
+
+
+def test_on_a_phone_nothing_is_cut_off(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url, viewport=PHONE)
+    dashboard.open("/controller")
+    dashboard.button("Check the example").click()
+    expect(dashboard.page.get_by_text(re.compile("^The replica agrees"))).to_be_visible()
+    expect(dashboard.plot("Commands")).to_be_visible()
+    assert dashboard.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

@@ -1,0 +1,97 @@
+"""The page of jobs: what failed stands first, with why, what to do, and its log; it is retried."""
+
+import json
+import os
+import re
+import signal
+from pathlib import Path
+
+from playwright.sync_api import expect
+
+from app.studies.process import NICENESS
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import Dashboard
+
+
+def children_of(pid: int) -> list[int]:
+    """Every process below that one."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            after_name = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(after_name[1]) == pid:
+            child = int(stat.parent.name)
+            found += [child, *children_of(child)]
+    return found
+
+
+def computing(server: Server) -> int | None:
+    """The process that computes a reproduction: the only one that yields to all others."""
+    worker = json.loads((server.data_dir / "worker.lock").read_text())["pid"]
+    for pid in children_of(worker):
+        try:
+            if os.getpriority(os.PRIO_PROCESS, pid) - os.getpriority(os.PRIO_PROCESS, 0) == NICENESS:
+                return pid
+        except ProcessLookupError:
+            continue
+    return None
+
+
+def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int) -> None:
+    def killed() -> bool:
+        if (pid := computing(server)) is not None:
+            os.kill(pid, signal.SIGKILL)
+        return bool(dashboard.get(f"/jobs/{job_id}")["state"] == "failed")
+
+    dashboard.until(killed, within_s=120.0)
+
+
+def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is_retried(
+    open_dashboard: Opener, own_server: Server
+) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    dashboard.open("/jobs")
+    job_id = dashboard.post("/reproductions/variability/run")["id"]
+    kill_until_given_up(dashboard, own_server, job_id)
+    dashboard.reproduce("controller")
+    groups = page.get_by_role("main").get_by_role("list", name=re.compile("jobs", re.IGNORECASE))
+    expect(groups.nth(1)).to_be_visible()
+    first = groups.first.get_by_role("listitem").first
+    expect(first).to_contain_text(f"Job {job_id}")
+    expect(first.get_by_text("Failed", exact=True)).to_be_visible()
+    job = dashboard.get(f"/jobs/{job_id}")
+    assert (job["attempts"], job["problem"]["title"]) == (3, "The worker went away 3 times while it did this.")
+    expect(first).to_contain_text(job["problem"]["title"])
+    expect(first).to_contain_text(job["problem"]["hint"])
+    first.get_by_text(f"Log of job {job_id}").click()
+    lines = first.get_by_role("listitem")
+    expect(lines.first).to_contain_text("job begun")
+    expect(lines.filter(has_text="the process that computed died")).to_have_count(3)
+    told = dashboard.get(f"/jobs/{job_id}/log")
+    expect(lines).to_have_count(told["total"])
+    assert {line["details"]["exit_code"] for line in told["lines"] if "exit_code" in line["details"]} == {"-9"}
+    first.get_by_role("button", name=f"Retry job {job_id}").click()
+    card = page.get_by_role("list", name="Jobs under way").get_by_role("listitem").first
+    expect(card).to_contain_text(f"Job {job_id}")
+    expect(card.get_by_role("progressbar")).to_be_visible()
+    card.get_by_role("button", name=f"Cancel job {job_id}").click()
+    over = page.get_by_role("list", name="Jobs that are over")
+    expect(over.get_by_text("Cancelled", exact=True)).to_be_visible()
+
+
+def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    page = dashboard.page
+    dashboard.reproduce("controller")
+    dashboard.open("/jobs")
+    filters = page.get_by_role("radiogroup", name="Jobs shown")
+    expect(page.get_by_role("list", name="Jobs that are over").get_by_role("listitem").first).to_be_visible()
+    filters.get_by_text("Failed", exact=True).click()
+    expect(page.get_by_text("Nothing has failed.")).to_be_visible()
+    filters.get_by_text("Over", exact=True).click()
+    log = page.get_by_text("Log of job 1")
+    log.click()
+    expect(page.get_by_text("reproduction stored")).to_be_visible()
