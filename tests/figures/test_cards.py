@@ -1,4 +1,5 @@
 import logging
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -6,8 +7,9 @@ import pytest
 
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
-from app.figures.theme import PALETTES, Palette
-from tests.figures.builders import flight, history
+from app.figures.history import Noise, Range, Repeats
+from app.figures.theme import PALETTES, Palette, ThemeName
+from tests.figures.builders import flight, history, proposal
 
 
 @dataclass(frozen=True)
@@ -57,3 +59,41 @@ def test_lines_keep_three_to_one_and_text_four_and_a_half_to_one_against_the_sur
     lines = (palette.best, palette.earlier, palette.prediction, palette.bad, *palette.gains)
     assert min(contrast(colour, palette.surface) for colour in lines) >= 3.0
     assert min(contrast(colour, palette.surface) for colour in (palette.ink, palette.dim)) >= 4.5
+
+
+def drawn_colours(part: object, place: str = "") -> Iterator[tuple[str, str]]:
+    """Where each opaque colour stands in a figure, and the colour; bands are see-through and lie under their edges."""
+    if isinstance(part, Mapping):
+        for name, value in part.items():
+            yield from drawn_colours(value, f"{place}.{name}")
+    elif isinstance(part, list | tuple):
+        for value in part:
+            yield from drawn_colours(value, place)
+    elif isinstance(part, str) and part.startswith("#") and place.endswith(".color"):
+        yield place, part
+
+
+@pytest.mark.parametrize("theme", PALETTES)
+@pytest.mark.parametrize("name", CAMPAIGN_FIGURES)
+@pytest.mark.parametrize("flights", [5, 200])
+def test_every_colour_that_a_figure_draws_with_can_be_seen_and_every_text_read(
+    name: str, theme: ThemeName, flights: int
+) -> None:
+    noise = Noise(0.01, (Repeats((1, 2), 0.3, 0.01),), Range(0.2, 0.3))
+    past = history(
+        *(
+            flight(number, 0.3 - 0.001 * number, predicted_error=0.2, interval=Range(0.1, 0.3))
+            for number in range(1, flights)
+        ),
+        flight(flights, 9.0, overshoot_m=9.0),
+        flight(flights + 1, None, outcome="aborted", glitches=(Range(2.0, 3.0),)),
+        proposal=proposal(flights + 2, interval=Range(0.1, 0.2), band_m=0.1),
+        noise=noise,
+    )
+    card = card_of(CAMPAIGN_FIGURES[name](past, theme))
+    surface = PALETTES[theme].surface
+    found = list(drawn_colours(card.figure))
+    assert found
+    for place, colour in found:
+        least = 4.5 if "font" in place else 3.0
+        assert contrast(colour, surface) >= least, (place, colour)

@@ -1,0 +1,279 @@
+"""How soon the dashboard is there and how soon it answers, in a Chromium, with a thousand flights too.
+
+    ./dev exec python -m bench.dashboard [--rounds 3] [--flights 1000]
+
+A real server on a database of a campaign with 50 flights, one with a thousand (16 700 samples each) and 2000 small ones
+(`bench.seeding`); a Chromium that has never seen it, for every figure anew. Interactive: the list's search takes a
+letter. Drawn: all three charts of the campaign have been painted. Interactions: a scripted session on the campaign of a
+thousand flights (pointing along its curves, marks and rows, choosing rows and marks, switching the span, zooming and
+coming back, opening tables), of which the browser tells how long each event took to the next paint (Event Timing, from
+16 ms on; quicker ones are not told, so that the 95th percentile is one of the slower). Weight: what the page fetched of
+scripts and styles, compressed, without the chart library.
+
+Of several rounds the quickest counts where the machine has other things to do. Prints the figures; exits 1 above a
+limit.
+"""
+
+import argparse
+import contextlib
+import gzip
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeVar
+
+import numpy as np
+from playwright.sync_api import Browser, Page, Request, sync_playwright
+
+from bench.seeding import seed_database
+
+T = TypeVar("T")
+
+FIRST_PAGE_S: Final = 1.5
+FIFTY_S: Final = 2.0
+THOUSAND_S: Final = 3.0
+INTERACTION_MS: Final = 200.0
+WEIGHT_KB: Final = 250.0
+LIST_MS: Final = 200.0
+CAMPAIGNS: Final = 2000
+PATIENCE_MS: Final = 60_000
+NAMES: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS: Final = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
+CHARTS: Final = ("Takeoff curves", "Error per flight", "Gains per flight")
+
+OBSERVE: Final = """
+window.told = [];
+window.seen = {};
+const looks = {charts: () => document.querySelectorAll('[data-drawn]').length > 2,
+               rows: () => document.querySelector('tbody tr[data-flight]') !== null};
+(function look() {
+  for (const [name, holds] of Object.entries(looks)) {
+    if (!(name in seen) && holds()) {
+      seen[name] = 0;
+      requestAnimationFrame(() => setTimeout(() => { seen[name] = performance.now(); }, 0));
+    }
+  }
+  requestAnimationFrame(look);
+})();
+new PerformanceObserver(list => {
+  for (const entry of list.getEntries()) {
+    told.push([entry.name, entry.duration, entry.interactionId, entry.startTime]);
+  }
+}).observe({type: 'event', durationThreshold: 16, buffered: true});
+"""
+PAINTED: Final = "() => new Promise(done => requestAnimationFrame(() => setTimeout(() => done(performance.now()), 0)))"
+
+
+@contextlib.contextmanager
+def server(data_dir: Path) -> Iterator[str]:
+    """`gainline serve` in a process of its own; its address."""
+    gainline = Path(sys.executable).with_name("gainline")
+    command = [str(gainline), "serve", "--port", "0", "--data-dir", str(data_dir)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout is not None
+        address = next(
+            (found.group() for line in process.stdout if (found := re.search(r"http://\S+:\d+", line)) is not None),
+            None,
+        )
+        assert address is not None, "the server did not start"
+        try:
+            yield address
+        finally:
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=30)
+
+
+@contextlib.contextmanager
+def tab(browser: Browser, address: str) -> Iterator[Page]:
+    """In a browser profile of its own: nothing is cached."""
+    context = browser.new_context(base_url=address, viewport={"width": 1440, "height": 900})
+    context.add_init_script(OBSERVE)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    yield page
+    context.close()
+
+
+def first_page_s(page: Page) -> float:
+    """Until a letter typed into the search has been painted."""
+    page.goto("/", wait_until="commit")
+    search = page.get_by_label("Search campaigns by name")
+    search.press("a")
+    return float(page.evaluate(PAINTED)) / 1e3
+
+
+def drawn_s(page: Page, campaign_id: int) -> tuple[float, float]:
+    """Until the three charts were painted, and until the rows of the table were there too."""
+    page.goto(f"/campaigns/{campaign_id}", wait_until="commit")
+    page.locator("[data-drawn]").nth(2).wait_for()
+    page.locator("tbody tr[data-flight]").first.wait_for()
+    page.evaluate(PAINTED)
+    seen: Mapping[str, float] = page.evaluate("seen")
+    return seen["charts"] / 1e3, seen["rows"] / 1e3
+
+
+def durations_ms(page: Page, campaign_id: int) -> list[float]:
+    """Of every event of the session that took 16 ms or more to its paint; several events of one act count as one."""
+    drawn_s(page, campaign_id)
+    page.wait_for_timeout(2000)
+    page.evaluate("told.length = 0")
+    use(page)
+    page.wait_for_timeout(500)
+    longest: dict[tuple[str, float], float] = {}
+    for name, duration, interaction, began in page.evaluate("told"):
+        act = ("act", float(interaction)) if interaction else (str(name), round(float(began)))
+        longest[act] = max(longest.get(act, 0.0), float(duration))
+    return list(longest.values())
+
+
+def use(page: Page) -> None:
+    """The session."""
+    boxes = [page.get_by_role("group", name=re.compile(f"^{title}")) for title in CHARTS]
+    for chart in boxes:
+        chart.scroll_into_view_if_needed()
+        box = chart.bounding_box()
+        assert box is not None
+        for share in np.linspace(0.1, 0.9, 25):
+            page.mouse.move(box["x"] + share * box["width"], box["y"] + (0.3 + 0.3 * share) * box["height"])
+            page.wait_for_timeout(30)
+        page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait_for_timeout(300)
+    _rows(page)
+    boxes[0].scroll_into_view_if_needed()
+    _zoom(page)
+    for span in ("First 8 s", "Whole flight"):
+        page.get_by_role("radiogroup", name="Time shown").get_by_text(span, exact=True).click()
+        page.wait_for_timeout(600)
+    for title in CHARTS:
+        for act in ("show the numbers as a table", "show the chart"):
+            page.get_by_role("button", name=f"{title}: {act}").click()
+            page.wait_for_timeout(400)
+
+
+def _rows(page: Page) -> None:
+    rows = page.locator("tbody tr[data-flight]")
+    for index in range(0, 40, 4):
+        rows.nth(index).hover()
+        page.wait_for_timeout(200)
+        if index % 8 == 0:
+            rows.nth(index).get_by_role("button").click()
+            page.wait_for_timeout(400)
+
+
+def _zoom(page: Page) -> None:
+    """Brush from 2 to 8 s or so, point along it, and come back."""
+    box = page.get_by_role("group", name=re.compile(f"^{CHARTS[0]}")).locator(".nsewdrag").first.bounding_box()
+    assert box is not None
+    for first, last in ((0.1, 0.3), (0.4, 0.6)):
+        middle = box["y"] + 0.4 * box["height"]
+        page.mouse.move(box["x"] + first * box["width"], middle)
+        page.mouse.down()
+        page.mouse.move(box["x"] + last * box["width"], middle, steps=8)
+        page.mouse.up()
+        page.wait_for_timeout(1000)
+    page.mouse.dblclick(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.wait_for_timeout(1000)
+
+
+def weight_kb(page: Page, path: str, ready: str) -> float:
+    """Scripts and styles that the page fetches, as gzip sends them, without the chart library."""
+    bodies: list[bytes] = []
+    page.on("requestfinished", lambda request: _keep(request, bodies))
+    page.goto(path)
+    page.locator(ready).first.wait_for()
+    page.wait_for_timeout(500)
+    return sum(len(gzip.compress(body, 6)) for body in bodies) / 1e3
+
+
+def _keep(request: Request, bodies: list[bytes]) -> None:
+    answer = request.response()
+    if answer is not None and request.resource_type in {"script", "stylesheet"} and "plotly" not in request.url:
+        bodies.append(answer.body())
+
+
+LISTED: Final = """async order => {
+  const began = performance.now();
+  await (await fetch(`/api/campaigns?limit=24&sort=${order}`)).json();
+  return performance.now() - began;
+}"""
+
+
+def listing_ms(page: Page, order: str) -> float:
+    """A page of the list of campaigns over HTTP, the quickest of five."""
+    return min(float(page.evaluate(LISTED, order)) for _ in range(5))
+
+
+def opening(browser: Browser, address: str, campaigns: Mapping[str, int], rounds: int) -> Iterator[bool]:
+    """How soon the pages are there, each round in a new profile; the quickest round counts."""
+    with_each = [_in_new_tab(browser, address, first_page_s) for _ in range(rounds)]
+    yield said("first page interactive", min(with_each), FIRST_PAGE_S, "s")
+    for (name, campaign_id), limit_s in zip(campaigns.items(), (FIFTY_S, THOUSAND_S), strict=True):
+        found = [_in_new_tab(browser, address, partial(drawn_s, campaign_id=campaign_id)) for _ in range(rounds)]
+        charts_s, rows_s = (min(each) for each in zip(*found, strict=True))
+        yield said(f"campaign of {name} drawn", charts_s, limit_s, "s")
+        print(f"  with the rows of its table {rows_s:.2f} s")
+
+
+def using(browser: Browser, address: str, campaign_id: int) -> Iterator[bool]:
+    """How soon the page of a campaign and the list of campaigns answer."""
+    acts_ms = _in_new_tab(browser, address, partial(durations_ms, campaign_id=campaign_id))
+    yield said("interaction to next paint, p95", float(np.quantile(acts_ms, 0.95)), INTERACTION_MS, "ms")
+    print(f"  {len(acts_ms)} took 16 ms or more: {np.median(acts_ms):.0f} ms in the middle, {max(acts_ms):.0f} at most")
+    with tab(browser, address) as page:
+        page.goto("/")
+        for order in ("-updated", "name", "error"):
+            yield said(f"list of {CAMPAIGNS} campaigns, by {order}", listing_ms(page, order), LIST_MS, "ms")
+
+
+def weighing(browser: Browser, address: str, campaign_id: int) -> Iterator[bool]:
+    """What a page loads of scripts and styles."""
+    for path, ready in (("/", "ul[aria-label=Campaigns]"), (f"/campaigns/{campaign_id}", "[data-drawn]")):
+        weight = _in_new_tab(browser, address, partial(weight_kb, path=path, ready=ready))
+        yield said(f"scripts and styles of {path}, compressed", weight, WEIGHT_KB, "kB")
+
+
+def _in_new_tab(browser: Browser, address: str, take: Callable[[Page], T]) -> T:
+    with tab(browser, address) as page:
+        return take(page)
+
+
+def said(what: str, figure: float, limit: float, unit: str) -> bool:
+    """Print a figure beside its limit; whether it lies below."""
+    print(f"{what}: {figure:.{2 if unit == 's' else 0}f} {unit} (limit {limit:g})", flush=True)
+    return figure <= limit
+
+
+def main() -> int:
+    asked = argparse.ArgumentParser(prog="bench.dashboard")
+    asked.add_argument("--rounds", type=int, default=3, help="of which the quickest counts")
+    asked.add_argument("--flights", type=int, default=1000, help="of the large campaign")
+    options = asked.parse_args()
+    chromium = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if chromium is None:
+        print("no Chromium found; install one, or name it in CHROMIUM")
+        return 1
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        flights = {"50 flights": 50, f"{options.flights} flights": options.flights}
+        campaigns = seed_database(folder, flights=flights, campaigns_of_five=CAMPAIGNS)
+        address = stack.enter_context(server(folder))
+        browser = stack.enter_context(sync_playwright()).chromium.launch(executable_path=chromium, args=list(FLAGS))
+        many = campaigns[f"{options.flights} flights"]
+        kept = [
+            *opening(browser, address, campaigns, options.rounds),
+            *using(browser, address, many),
+            *weighing(browser, address, many),
+        ]
+        browser.close()
+    return int(not all(kept))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

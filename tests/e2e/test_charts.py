@@ -1,0 +1,156 @@
+"""The charts of a campaign with a thousand flights: one flight seen everywhere, a zoom that shows more, small pages."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Locator, expect
+
+from bench.seeding import seed_database
+from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.dashboard import Dashboard, Json
+
+FLIGHTS = 1000
+SAMPLES = 4000
+
+
+@pytest.fixture(scope="module")
+def crowded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, int]]:
+    """A server on a database with one campaign of a thousand flights."""
+    folder: Path = tmp_path_factory.mktemp("crowded")
+    campaigns = seed_database(folder, flights={"Crowd": FLIGHTS}, samples=SAMPLES)
+    with served(folder) as server:
+        yield server, campaigns["Crowd"]
+
+
+@pytest.fixture
+def page_of_many(open_dashboard: Opener, crowded: tuple[Server, int]) -> Dashboard:
+    server, campaign_id = crowded
+    dashboard = open_dashboard(server.url)
+    dashboard.open_campaign(campaign_id)
+    for chart in ("errors", "gains"):
+        expect(dashboard.plot(chart)).to_be_visible()
+    return dashboard
+
+
+def row(dashboard: Dashboard, flight: int) -> Locator:
+    return dashboard.page.locator(f"tbody tr[data-flight='{flight}']")
+
+
+def curve(dashboard: Dashboard, flight: int) -> Locator:
+    return dashboard.plot("takeoffs").locator(f".traceflight-{flight}")
+
+
+def best_of(dashboard: Dashboard) -> Json:
+    best: Json = dashboard.get(f"/campaigns/{dashboard.campaign_id}")["best"]
+    return best
+
+
+def test_a_thousand_flights_are_drawn_as_an_envelope_with_those_that_matter(page_of_many: Dashboard) -> None:
+    best = best_of(page_of_many)
+    drawn = page_of_many.traces("takeoffs")
+    roles = [trace["meta"]["role"] for trace in drawn]
+    assert roles.count("envelope") == 3
+    assert 5 < roles.count("flight") < 15
+    mine = page_of_many.trace("takeoffs", "flight", trial=best["trial_number"], standing="best")
+    assert mine is not None
+    time_s, altitude_m = page_of_many.record(best["trial_id"])
+    np.testing.assert_allclose(mine["y"], np.interp(mine["x"], time_s, altitude_m), atol=5e-3)
+    measured = page_of_many.trace("errors", "measured")
+    assert measured is not None
+    first_page = {trial["number"]: trial["error"] for trial in page_of_many.trials(page_of_many.campaign_id)}
+    shown = dict(zip(measured["x"], measured["y"], strict=True))
+    assert all(shown[number] == pytest.approx(error, abs=1e-6) for number, error in first_page.items() if error)
+    rows = page_of_many.page.locator("tbody tr[data-flight]")
+    expect(row(page_of_many, FLIGHTS)).to_be_visible()
+    assert 50 <= rows.count() <= 52
+    page_of_many.button(f"Show 200 earlier flights ({FLIGHTS - 50} are not listed)").click()
+    expect(row(page_of_many, FLIGHTS - 249)).to_be_attached()
+
+
+def test_a_flight_that_is_pointed_at_stands_out_as_curve_mark_and_row(page_of_many: Dashboard) -> None:
+    number = best_of(page_of_many)["trial_number"]
+    row(page_of_many, number).hover()
+    expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
+    label = page_of_many.plot("errors").locator(".hoverlayer .hovertext")
+    expect(label).to_contain_text(f"Flight {number}")
+    row(page_of_many, number).get_by_role("button").focus()
+    expect(row(page_of_many, number)).to_have_attribute("data-pointed", "")
+    plain = FLIGHTS - 20
+    row(page_of_many, plain).hover()
+    page_of_many.until(lambda: len((page_of_many.trace("takeoffs", "pointed") or {"x": []})["x"]) > 100)
+    lent = page_of_many.trace("takeoffs", "pointed")
+    trial = next(
+        one
+        for one in page_of_many.get(f"/campaigns/{page_of_many.campaign_id}/figures/gains")["table"]["rows"]
+        if one[0] == str(plain)
+    )
+    assert lent is not None
+    assert lent["name"] == f"Flight {trial[0]}"
+    time_s, altitude_m = page_of_many.record(plain)
+    np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)
+
+
+def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None:
+    number = best_of(page_of_many)["trial_number"]
+    chart = page_of_many.plot("errors")
+    chart.scroll_into_view_if_needed()
+    place = chart.evaluate(
+        """(chart, number) => {
+          const {xaxis, yaxis} = chart._fullLayout, box = chart.getBoundingClientRect();
+          const marks = chart.data.find(trace => trace.meta.role === 'measured');
+          const at = marks.x.indexOf(number);
+          return [box.x + xaxis._offset + xaxis.l2p(number), box.y + yaxis._offset + yaxis.l2p(marks.y[at])];
+        }""",
+        number,
+    )
+    page_of_many.page.mouse.move(place[0] - 3, place[1])
+    page_of_many.page.mouse.move(*place)
+    expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
+    expect(row(page_of_many, number)).to_have_attribute("data-pointed", "")
+    page_of_many.page.mouse.move(5, 5)
+    expect(row(page_of_many, number)).not_to_have_attribute("data-pointed", "")
+    page_of_many.page.mouse.move(*place)
+    page_of_many.page.mouse.click(*place)
+    expect(row(page_of_many, number)).to_have_attribute("data-shown", "true")
+
+
+def test_choosing_a_flight_of_the_crowd_gives_it_a_curve_of_its_own(page_of_many: Dashboard) -> None:
+    plain = FLIGHTS - 20
+    assert page_of_many.trace("takeoffs", "flight", trial=plain) is None
+    row(page_of_many, plain).get_by_role("button").click()
+    page_of_many.wait_for_flight(plain)
+    others = [trace["width"] for trace in page_of_many.traces("takeoffs") if trace["meta"].get("standing") == "earlier"]
+    chosen = page_of_many.trace("takeoffs", "flight", trial=plain)
+    assert chosen is not None
+    assert chosen["width"] == max(others)
+
+
+def test_a_zoom_shows_more_of_each_record_and_a_double_click_all_again(page_of_many: Dashboard) -> None:
+    best = best_of(page_of_many)
+
+    def drawn() -> Json:
+        found = page_of_many.trace("takeoffs", "flight", trial=best["trial_number"])
+        assert found is not None
+        return found
+
+    before = len(drawn()["x"])
+    box = page_of_many.plot("takeoffs").locator(".nsewdrag").first.bounding_box()
+    assert box is not None
+    middle = box["y"] + 0.5 * box["height"]
+    page_of_many.page.mouse.move(box["x"] + 0.3 * box["width"], middle)
+    page_of_many.page.mouse.down()
+    page_of_many.page.mouse.move(box["x"] + 0.4 * box["width"], middle, steps=5)
+    page_of_many.page.mouse.up()
+    page_of_many.until(lambda: len(drawn()["x"]) > before + 200)
+    seconds = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
+    assert 8.0 < seconds[0] < seconds[1] < 15.0
+    time_s, altitude_m = page_of_many.record(best["trial_id"])
+    x, y = (np.array(drawn()[axis]) for axis in ("x", "y"))
+    inside = (x >= seconds[0]) & (x <= seconds[1])
+    recorded = (time_s >= seconds[0]) & (time_s <= seconds[1])
+    assert inside.sum() == pytest.approx(min(500, recorded.sum()), abs=3)
+    np.testing.assert_allclose(y[inside], np.interp(x[inside], time_s, altitude_m), atol=2e-3)
+    page_of_many.page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
+    page_of_many.until(lambda: len(drawn()["x"]) == before)
