@@ -30,8 +30,9 @@ async def events(
     `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
     entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
     server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
-    flight, `vehicle` five times a second from a connected vehicle, and `worker` tells when the worker comes or goes;
-    these carry no id and may be dropped for a slow client.
+    flight, `vehicle` five times a second from a connected vehicle, and `worker` tells whether the worker is there: when
+    it comes or goes, and every three seconds, so that silence means a dead line. These carry no id and may be dropped
+    for a slow client.
     """
     with live.hub.subscribe() as stream:
         sent, known = await asyncio.to_thread(_start, database, last_event_id)

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from app.db.session import Database
 from app.live.address import live_address
@@ -22,6 +22,8 @@ from app.live.messages import (
 from app.live.tail import OutboxTail
 
 T = TypeVar("T")
+BEAT_S: Final = 3.0
+"""How often every stream says something, though nothing happens: whoever hears less knows that the line is dead."""
 
 
 class Live:
@@ -45,6 +47,12 @@ class Live:
         """Land or motors off, the same way. Raises LinkDownError when the worker cannot be told."""
         return await self.client.order(vehicle_id, order, reason)
 
+    async def beat(self) -> None:
+        """Say whether the worker is there, again and again, until cancelled."""
+        while True:
+            await asyncio.sleep(BEAT_S)
+            self.hub.publish(LinkState(worker=self.worker_running))
+
     def close(self) -> None:
         """End every stream."""
         self.hub.close()
@@ -60,14 +68,15 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
     live = Live(data_dir)
     tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
     await asyncio.to_thread(tail.start)
-    listening = asyncio.create_task(live.client.run())
+    running = [asyncio.create_task(live.client.run()), asyncio.create_task(live.beat())]
     try:
         yield live
     finally:
         live.close()
-        listening.cancel()
-        with suppress(asyncio.CancelledError):
-            await listening
+        for task in running:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
         await asyncio.to_thread(tail.stop)
 
 

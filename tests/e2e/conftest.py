@@ -1,5 +1,6 @@
 """A real server, a real Chromium, and the dashboard between them."""
 
+import json
 import os
 import re
 import shutil
@@ -7,9 +8,11 @@ import signal
 import socket
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Thread
 from urllib.parse import urlsplit
 
 import pytest
@@ -79,13 +82,25 @@ class Server:
             if (found := re.search(r"http://\S+:\d+", line)) is not None:
                 self.url = found.group()
                 self._port = urlsplit(self.url).port or 0
+                # A pipe that nobody reads is full one day, and then the server waits for ever to say something.
+                Thread(target=deque, args=(self._process.stdout, 0), daemon=True).start()
                 return
         pytest.fail("the server did not start:\n" + "".join(said))
+
+    @property
+    def pid(self) -> int:
+        assert self._process is not None, "the server is not running"
+        return self._process.pid
+
+    def worker_pid(self) -> int:
+        """The worker's process, as its own lock tells."""
+        pid: int = json.loads((self.data_dir / "worker.lock").read_text())["pid"]
+        return pid
 
     def stop(self) -> None:
         if self._process is not None:
             self._process.send_signal(signal.SIGTERM)
-            self._process.communicate(timeout=30)
+            self._process.wait(timeout=60)
             self._process = None
 
 

@@ -3,17 +3,21 @@
 import type { QueryClient } from "@tanstack/react-query";
 import { type Change, changeFrom, doubtfulOnce } from "../lib/events";
 import { telemetryFrom } from "../lib/live";
-import { statusFrom } from "../lib/vehicle";
-import { setConnection, takePhase, takeStatus, takeTelemetry } from "../live/store";
+import { secondsBetween, statusFrom } from "../lib/vehicle";
+import { momentNow, setConnection, setNotLive, takePhase, takeStatus, takeTelemetry } from "../live/store";
 
 const GATHER_MS = 40;
 const AGAIN_MS = 1000;
 const HIDDEN_MS = 20_000;
+/** The server says something every three seconds; a line that is silent for longer is dead, though it looks open. */
+const SILENT_S = 8;
+const WATCH_MS = 1000;
 
 /**
  * Follow the stream until the returned function is called. The browser itself comes back with `Last-Event-ID`; a
  * stream that had to be opened anew has missed changes, so everything is then read again. A hidden tab lets go of its
- * stream after a while, unless something flies.
+ * stream after a while, unless something flies. A stream that fell silent, in a sleep or with the Wi-Fi, is given up and
+ * opened anew.
  */
 export function followEvents(queries: QueryClient, somethingFlies: () => boolean): () => void {
   let source: EventSource | null = null;
@@ -22,6 +26,10 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
   let gathering: ReturnType<typeof setTimeout> | undefined;
   let gathered: Change[] = [];
   let fresh = true;
+  let heard = momentNow();
+  let opened = heard;
+
+  const heardAt = (): string => new Date(heard.wallMs).toISOString();
 
   function refetch(): void {
     const changes = gathered;
@@ -47,8 +55,12 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     if (source !== null) return;
     const stream = new EventSource("/api/events");
     source = stream;
+    opened = momentNow();
     const on = (name: string, listener: (data: string) => void): void =>
-      stream.addEventListener(name, (event: MessageEvent<string>) => listener(event.data));
+      stream.addEventListener(name, (event: MessageEvent<string>) => {
+        heard = momentNow();
+        listener(event.data);
+      });
     on("hello", hello);
     on("reset", () => void queries.invalidateQueries());
     on("change", (data) => take(changeFrom(data)));
@@ -70,7 +82,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
       takePhase(campaign_id, trial_id, phase);
     });
     stream.onerror = () => {
-      setConnection({ state: "away" });
+      setNotLive("away", heardAt());
       if (stream.readyState !== EventSource.CLOSED) return;
       close();
       again = setTimeout(open, AGAIN_MS);
@@ -85,19 +97,41 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
 
   function letGo(): void {
     if (somethingFlies()) hiding = setTimeout(letGo, HIDDEN_MS);
-    else close();
+    else {
+      close();
+      setNotLive("connecting", heardAt());
+    }
+  }
+
+  /** Give up a stream that should have said something by now. */
+  function watch(): void {
+    const now = momentNow();
+    if (source === null || secondsBetween(heard, now) < SILENT_S) return;
+    setNotLive("away", heardAt());
+    if (secondsBetween(opened, now) < SILENT_S) return;
+    close();
+    open();
   }
 
   function onVisibility(): void {
     clearTimeout(hiding);
     if (document.visibilityState === "hidden") hiding = setTimeout(letGo, HIDDEN_MS);
-    else open();
+    else {
+      watch();
+      open();
+    }
   }
 
+  const watching = setInterval(watch, WATCH_MS);
+  document.addEventListener("resume", watch);
+  window.addEventListener("online", watch);
   document.addEventListener("visibilitychange", onVisibility);
   open();
   return () => {
     document.removeEventListener("visibilitychange", onVisibility);
+    document.removeEventListener("resume", watch);
+    window.removeEventListener("online", watch);
+    clearInterval(watching);
     clearTimeout(hiding);
     clearTimeout(gathering);
     close();

@@ -52,7 +52,11 @@ async function send(vehicleId: number, order: Order): Promise<OrderSaid> {
     return { order, accepted, sentence };
   } catch (error) {
     const problem = problemOf(error);
-    return { order, accepted: false, sentence: problem === null ? "" : `${problem.title} ${problem.detail}` };
+    return {
+      order,
+      accepted: false,
+      sentence: problem === null ? "" : `${problem.title}: ${problem.detail} ${problem.hint}`,
+    };
   }
 }
 

@@ -2,6 +2,7 @@
 
 import { useQuery } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef, useState } from "react";
+import { problemOf } from "../lib/problems";
 import { liveFlightsNow } from "../live/store";
 import { answer } from "./client";
 import { abortTrial, getCampaign, listCampaigns } from "./generated";
@@ -44,7 +45,8 @@ async function askToAbort(trialId: number): Promise<string | null> {
     const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
     return accepted ? null : sentence;
   } catch (error) {
-    return error instanceof Error ? error.message : String(error);
+    const problem = problemOf(error);
+    return [problem?.detail, problem?.hint].join(" ");
   }
 }
 

@@ -7,7 +7,7 @@ import { useAbort, useFlying } from "../api/flying";
 import { useCampaign } from "../api/queries";
 import { useVehicle } from "../api/vehicles";
 import { abortTargets, type Flying } from "../lib/abort";
-import { liveFlightsNow } from "../live/store";
+import { liveFlightsNow, useConnection } from "../live/store";
 import { Announcer } from "./Announcer";
 import { ConnectionNotice, ConnectionState } from "./ConnectionState";
 import { FlyingBar } from "./FlyingBar";
@@ -74,6 +74,7 @@ export function AppFrame() {
   useEventStream(flying.length > 0);
   useRenewedControl();
   useEffect(fetchEveryPage, []);
+  const { state } = useConnection();
   useSpaceAborts(flying, campaignId, abort.press);
   return (
     <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
@@ -109,7 +110,7 @@ export function AppFrame() {
         <ConnectionNotice />
       </header>
       <Announcer />
-      <main id="main" className={classes["main"]} tabIndex={-1}>
+      <main id="main" className={classes["main"]} tabIndex={-1} data-stale={state === "away" || undefined}>
         <PageGuard path={pathname}>
           <Suspense fallback={<div aria-busy="true" />}>
             <Outlet context={abort} />

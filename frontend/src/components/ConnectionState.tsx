@@ -1,6 +1,7 @@
 import { IconPlugConnected, IconPlugConnectedX, IconRefresh } from "@tabler/icons-react";
 import { type Connection, useConnection } from "../live/store";
 import classes from "./Frame.module.css";
+import { Time } from "./Time";
 
 function said({ state, worker }: Connection) {
   if (state === "away") return { text: "Server away", Icon: IconPlugConnectedX, bad: true };
@@ -21,11 +22,12 @@ export function ConnectionState() {
 
 /** What a lost connection means, across the page, until it is back. */
 export function ConnectionNotice() {
-  const { state, worker } = useConnection();
+  const { state, worker, heardAt } = useConnection();
   if (state === "away") {
     return (
       <p className={classes["notice"]} role="status">
-        <strong>The server does not answer.</strong> What you see may be out of date. This page catches up by itself as
+        <strong>The server does not answer.</strong> What you see was so
+        {heardAt === null ? " earlier" : [" at ", <Time key="at" at={heardAt} />]}. This page catches up by itself as
         soon as the server is back.
       </p>
     );

@@ -3,12 +3,13 @@ import { Link } from "react-router";
 import type { FlyingCampaign, useAbort } from "../api/flying";
 import { withUnit } from "../lib/format";
 import { readingOf } from "../lib/live";
-import { useLiveFlight } from "../live/store";
+import { useIsCurrent, useLiveFlight } from "../live/store";
 import classes from "./Frame.module.css";
 
 /** Readings of one flight under way, and the button that ends it: one tap, no question. */
 export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: ReturnType<typeof useAbort> }) {
   const live = useLiveFlight(flying.trialId);
+  const isCurrent = useIsCurrent(live);
   const asked = abort.asked.has(flying.trialId);
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");
@@ -17,14 +18,20 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
       <span className={classes["flightName"]} title={flying.name}>
         {flying.name} · flight {flying.trialNumber}
       </span>
-      <span className={classes["pulse"]} aria-hidden />
-      <Link to={`/fly/${flying.trialId}`} className={`${classes["readings"]} numbers`} title="Open the fly screen">
+      {isCurrent && <span className={classes["pulse"]} aria-hidden />}
+      <Link
+        to={`/fly/${flying.trialId}`}
+        className={`${classes["readings"]} numbers`}
+        data-stale={!isCurrent || undefined}
+        title="Open the fly screen"
+      >
         {time === undefined ? (
           <span>{live?.phase === "staging" ? "setting gains" : "flying"}</span>
         ) : (
           <>
             <span className={classes["big"]}>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</span>
             <span>{withUnit(time, "s", 1)}</span>
+            {!isCurrent && <span>as last heard</span>}
           </>
         )}
       </Link>

@@ -21,7 +21,7 @@ export function Refusal({ problem, offers, onUse }: RefusalProps) {
   return (
     <div className={`${classes["failed"]} ${classes["stack"]}`} role="alert">
       <div>
-        <strong>{problem.title}</strong>
+        <strong>{problem.detail || problem.title}</strong>
         <p>{first}</p>
       </div>
       {offers.length > 0 && (
@@ -52,6 +52,7 @@ export function Refusal({ problem, offers, onUse }: RefusalProps) {
           </ul>
         </details>
       )}
+      {problem.hint && <p className={classes["offerNote"]}>{problem.hint}</p>}
     </div>
   );
 }

@@ -1,5 +1,7 @@
 /** Telemetry of flights under way, as it came over the stream. */
 
+import type { Moment } from "./vehicle";
+
 export interface LiveFlight {
   campaignId: number;
   trialId: number;
@@ -11,6 +13,8 @@ export interface LiveFlight {
   batteryV: number | null;
   errorSoFar: number | null;
   phase: string;
+  /** When the stream last spoke of it; null before. */
+  heardAt: Moment | null;
 }
 
 export interface Telemetry {
@@ -34,6 +38,7 @@ export function begun(campaignId: number, trialId: number): LiveFlight {
     batteryV: null,
     errorSoFar: null,
     phase: "flying",
+    heardAt: null,
   };
 }
 

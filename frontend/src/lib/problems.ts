@@ -28,8 +28,8 @@ export class ApiError extends Error {
 const UNREACHABLE: Problem = {
   status: 0,
   title: "The server cannot be reached.",
-  detail: "Nothing was changed.",
-  hint: "Check that Gainline is running; this page catches up by itself.",
+  detail: "It is not known whether what was asked has arrived there.",
+  hint: "Check that Gainline runs and that the Wi-Fi is up. This page catches up by itself: look at it before asking again.",
   problems: [],
 };
 

@@ -3,11 +3,21 @@
 import { useEffect, useMemo, useState, useSyncExternalStore } from "react";
 import { begun, extended, type LiveFlight, type Telemetry, underWay, withFlight } from "../lib/live";
 import type { News } from "../lib/speech";
-import { type Aged, aged, type Heard, type Moment, type VehicleStatus } from "../lib/vehicle";
+import {
+  type Aged,
+  aged,
+  CURRENT_S,
+  type Heard,
+  type Moment,
+  secondsBetween,
+  type VehicleStatus,
+} from "../lib/vehicle";
 
 export interface Connection {
   state: "connecting" | "live" | "away";
   worker: boolean;
+  /** When the server was last heard, as it stood on this machine's clock; null before the first time. */
+  heardAt: string | null;
 }
 
 type Listener = () => void;
@@ -33,7 +43,7 @@ export class Store<Value> {
   };
 }
 
-const connection = new Store<Connection>({ state: "connecting", worker: true });
+const connection = new Store<Connection>({ state: "connecting", worker: true, heardAt: null });
 const flights = new Store<ReadonlyMap<number, LiveFlight>>(new Map());
 const vehicles = new Store<ReadonlyMap<number, Heard>>(new Map());
 
@@ -42,14 +52,19 @@ export function setConnection(change: Partial<Connection>): void {
   if (next.state !== connection.get().state || next.worker !== connection.get().worker) connection.set(next);
 }
 
+/** The stream is lost, or let go: nothing on the page may pass for what is so now. */
+export function setNotLive(state: "connecting" | "away", heardAt: string | null): void {
+  if (connection.get().state !== state) connection.set({ ...connection.get(), state, heardAt });
+}
+
 export function takeTelemetry(news: Telemetry): void {
   const known = flights.get().get(news.trial_id) ?? begun(news.campaign_id, news.trial_id);
-  flights.set(withFlight(flights.get(), extended(known, news)));
+  flights.set(withFlight(flights.get(), { ...extended(known, news), heardAt: momentNow() }));
 }
 
 export function takePhase(campaignId: number, trialId: number, phase: string): void {
   const known = flights.get().get(trialId) ?? begun(campaignId, trialId);
-  flights.set(withFlight(flights.get(), { ...known, phase }));
+  flights.set(withFlight(flights.get(), { ...known, phase, heardAt: momentNow() }));
 }
 
 export function takeStatus(status: VehicleStatus): void {
@@ -116,4 +131,12 @@ export function onNews(tell: (news: News) => void): () => void {
   return () => {
     for (const end of ends) end();
   };
+}
+
+/** Whether the readings of a flight under way may be shown as what is so now. */
+export function useIsCurrent(live: LiveFlight | null): boolean {
+  const { state, worker } = useConnection();
+  const now = useMoment();
+  if (live === null || live.heardAt === null) return true;
+  return state === "live" && worker && secondsBetween(live.heardAt, now) <= CURRENT_S;
 }

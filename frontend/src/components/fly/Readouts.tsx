@@ -5,6 +5,7 @@ import { withUnit } from "../../lib/format";
 import { type LiveFlight, readingOf } from "../../lib/live";
 import { percent } from "../../lib/uncertainty";
 import { type Aged, ageText, linkText } from "../../lib/vehicle";
+import { useIsCurrent } from "../../live/store";
 import { Help } from "../Help";
 import classes from "./Fly.module.css";
 
@@ -53,7 +54,8 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const reading = readingOf(live?.channel ?? "altitude_m");
   const measured = isFlying ? live?.measured.at(-1) : undefined;
   const linked = status?.status;
-  const stale = hasLink && !(status?.isCurrent ?? false);
+  const isCurrent = useIsCurrent(live);
+  const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
   const error = isFlying ? live?.errorSoFar : trial.error;
   const errorTitle = isFlying ? "Error so far" : "Error";
@@ -72,6 +74,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
           topic={isFlying ? "errorSoFar" : "error"}
           value={withUnit(error, unit)}
           size="large"
+          stale={isFlying && stale}
         />
       </div>
       <div className={classes["row"]}>
@@ -80,6 +83,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
             title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"}
             topic="thrust"
             value={percent(live.thrust)}
+            stale={stale}
           />
         )}
         <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />

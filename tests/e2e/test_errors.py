@@ -1,0 +1,363 @@
+"""Every error that the API can return, provoked for real, and read on the screen: what happened and what to do."""
+
+import json
+import os
+import re
+import signal
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.sync_api import FilePayload, Response, Route, expect
+
+import app.errors
+from app.api import errors as over_http
+from app.errors import (
+    BusyError,
+    ConflictError,
+    GainlineError,
+    GainsError,
+    InputError,
+    KeyReusedError,
+    MediaTypeError,
+    NotAllowedError,
+    NotFoundError,
+    StorageError,
+    TooLargeError,
+    TrajectoryError,
+    UnavailableError,
+    UnconfirmedError,
+)
+from app.live.client import LinkDownError
+from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.dashboard import Dashboard, Json
+from tests.logs.recorded import recorded
+
+AT_START: Final = {app.errors.SchemaError, app.errors.AlreadyRunningError, app.errors.AddressError}
+"""These end the program before it answers anybody."""
+FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unforeseen")
+"""What is refused before our own code, or by nobody on purpose."""
+RETRIED_MS: Final = 40_000
+"""A read that failed at the server is tried three times more before the page says so."""
+
+Provoke = Callable[[Dashboard, Server], None]
+PROVOKED: Final[dict[type[GainlineError] | str, Provoke]] = {}
+
+
+def provokes(kind: type[GainlineError] | str) -> Callable[[Provoke], Provoke]:
+    def keep(provoke: Provoke) -> Provoke:
+        PROVOKED[kind] = provoke
+        return provoke
+
+    return keep
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One that finds no browser, so that it cannot print."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PATH", "/nowhere")
+        with served(tmp_path_factory.mktemp("errors") / "data") as one:
+            yield one
+
+
+@pytest.fixture
+def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
+    return open_dashboard(server.url)
+
+
+def instead(
+    dashboard: Dashboard,
+    act: str,
+    *,
+    path: str | None = None,
+    method: str | None = None,
+    body: str | bytes | None = None,
+    headers: dict[str, str] | None = None,
+) -> None:
+    """Have that act of the page sent otherwise than the page would; the server's own answer comes back to it."""
+
+    def send(route: Route) -> None:
+        request = route.request
+        if request.method == "GET":
+            route.fallback()
+            return
+        route.fulfill(
+            response=route.fetch(
+                url=None if path is None else f"{dashboard.url}/api{path}",
+                method=method,
+                post_data=body,
+                headers={**request.headers, **(headers or {})},
+            )
+        )
+
+    dashboard.page.route(f"**/api{act}", send)
+
+
+def create_instead(
+    dashboard: Dashboard,
+    *,
+    path: str | None = None,
+    method: str | None = None,
+    body: str | bytes | None = None,
+    headers: dict[str, str] | None = None,
+) -> None:
+    """Press "Create campaign" on its page, with another request behind it."""
+    instead(dashboard, "/campaigns", path=path, method=method, body=body, headers=headers)
+    dashboard.open("/new")
+    dashboard.button("Create campaign").click()
+
+
+@contextmanager
+def stopped_worker(server: Server) -> Iterator[None]:
+    worker = server.worker_pid()
+    os.kill(worker, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(worker, signal.SIGCONT)
+
+
+def hand_in(dashboard: Dashboard, name: str, content: bytes | Path) -> None:
+    campaign_id = dashboard.create("import")
+    dashboard.open_campaign(campaign_id)
+    with dashboard.page.expect_file_chooser() as chooser:
+        dashboard.button("Upload flight record").click()
+    if isinstance(content, Path):
+        chooser.value.set_files(content)
+    else:
+        chooser.value.set_files(FilePayload(name=name, mimeType="application/octet-stream", buffer=content))
+
+
+# ---- one of each kind
+
+
+@provokes(NotAllowedError)
+def _a_real_vehicle_ordered_off_at_once(dashboard: Dashboard, _server: Server) -> None:
+    vehicle = dashboard.post(
+        "/vehicles",
+        {
+            "name": "Number 1",
+            "kind": "mavlink",
+            "options": {"address": "udp:127.0.0.1:14995@14994"},
+            "safe_gains_confirmed": True,
+            "statement": "Ada has seen it fly on these",
+        },
+    )
+    body = {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle["id"]}, "definition": {}}
+    campaign = dashboard.when_ready(dashboard.post("/campaigns", body)["id"])
+    order = {"gains": {"kp": 283, "ki": 13, "kd": 82}, "fly": {"speed": 1}}
+    create_instead(dashboard, path=f"/campaigns/{campaign}/trials", body=json.dumps(order))
+
+
+@provokes(NotFoundError)
+def _a_campaign_that_never_was(dashboard: Dashboard, _server: Server) -> None:
+    dashboard.open("/campaigns/999999")
+
+
+@provokes(BusyError)
+def _a_vehicle_asked_while_it_is_still_being_asked(dashboard: Dashboard, server: Server) -> None:
+    options = {"address": "udp:127.0.0.1:14993@14992", "simulated": True}
+    dashboard.open("/")
+    vehicle = dashboard.post("/vehicles", {"name": "Bee", "kind": "mavlink", "options": options})
+    with stopped_worker(server):
+        dashboard.post(f"/vehicles/{vehicle['id']}/connect")
+        create_instead(dashboard, path=f"/vehicles/{vehicle['id']}/connect", body="{}")
+        expect(dashboard.page.get_by_role("alert")).to_be_visible()
+
+
+@provokes(ConflictError)
+def _a_campaign_finished_before_its_first_flight(dashboard: Dashboard, _server: Server) -> None:
+    made = dashboard.post("/campaigns", {"name": "New", "vehicle": {"kind": "twin"}, "definition": {}})
+    create_instead(dashboard, path=f"/campaigns/{made['id']}/finish", body="{}")
+
+
+@provokes(TooLargeError)
+def _a_log_of_a_whole_summer(dashboard: Dashboard, server: Server) -> None:
+    log = server.data_dir.parent / "summer.tlog"
+    log.write_bytes(bytes(49 * 2**20))
+    hand_in(dashboard, log.name, log)
+
+
+@provokes(MediaTypeError)
+def _a_form_in_place_of_json(dashboard: Dashboard, _server: Server) -> None:
+    create_instead(dashboard, headers={"content-type": "application/x-www-form-urlencoded"})
+
+
+@provokes(KeyReusedError)
+def _the_key_of_another_act(dashboard: Dashboard, _server: Server) -> None:
+    key = {"Idempotency-Key": "written-once"}
+    body = {"name": "First", "vehicle": {"kind": "twin"}, "definition": {}}
+    assert dashboard.page.request.post(f"{dashboard.url}/api/campaigns", data=body, headers=key).ok
+    create_instead(dashboard, headers={"idempotency-key": "written-once"})
+
+
+@provokes(GainsError)
+def _gains_under_which_the_integrator_wraps(dashboard: Dashboard, _server: Server) -> None:
+    dashboard.open_campaign(dashboard.create("twin"))
+    dashboard.button("Edit gains").click()
+    for name, value in {"kp": 283, "ki": 1356, "kd": 82}.items():
+        dashboard.page.get_by_label(re.compile(f"^{name}")).fill(str(value))
+    dashboard.button("Fly these gains").click()
+
+
+@provokes(TrajectoryError)
+def _a_record_of_one_sample(dashboard: Dashboard, _server: Server) -> None:
+    hand_in(dashboard, "short.csv", b"time_s,altitude_m\n0,0\n")
+
+
+@provokes(UnconfirmedError)
+def _a_log_flown_with_other_gains(dashboard: Dashboard, _server: Server) -> None:
+    hand_in(dashboard, "tuned.tlog", recorded("paparazzi_1624_1356_195.tlog"))
+
+
+@provokes(InputError)
+def _bounds_the_wrong_way_round(dashboard: Dashboard, _server: Server) -> None:
+    dashboard.open("/new")
+    dashboard.page.get_by_role("button", name=re.compile("^Advanced")).click()
+    dashboard.page.get_by_label("kp at least").fill("3000")
+    dashboard.page.get_by_label("kp at most").fill("2000")
+    dashboard.button("Create campaign").click()
+
+
+@provokes(UnavailableError)
+def _a_pdf_without_a_browser_to_print_it(dashboard: Dashboard, _server: Server) -> None:
+    campaign_id = dashboard.create("twin")
+    create_instead(dashboard, path=f"/campaigns/{campaign_id}/report.pdf", method="GET")
+
+
+@provokes(StorageError)
+def _a_database_that_somebody_else_holds(dashboard: Dashboard, server: Server) -> None:
+    dashboard.open("/new")
+    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        dashboard.button("Create campaign").click()
+        expect(dashboard.page.get_by_role("alert")).to_be_visible()
+        other.execute("ROLLBACK")
+
+
+@provokes(LinkDownError)
+def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server) -> None:
+    campaign_id = dashboard.create("twin")
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    abort = dashboard.page.get_by_role("button", name=re.compile("^ABORT")).first
+    expect(abort).to_be_visible()
+    with stopped_worker(server):
+        abort.click()
+        expect(dashboard.page.get_by_role("alert")).to_contain_text("remote control")
+
+
+@provokes(GainlineError)
+def _one_without_a_kind_of_its_own(dashboard: Dashboard, _server: Server) -> None:
+    """None reaches the API at present, so the program's own answer to one is made here."""
+    made = over_http.own_error(GainlineError("The order cannot be read.", hint="Run the reproduction anew."))
+    dashboard.page.route(
+        "**/api/campaigns",
+        lambda route: (
+            route.fallback()
+            if route.request.method == "GET"
+            else route.fulfill(status=made.status_code, content_type=over_http.MEDIA_TYPE, body=bytes(made.body))
+        ),
+    )
+    dashboard.open("/new")
+    dashboard.button("Create campaign").click()
+
+
+@provokes("400")
+def _a_body_that_is_no_text(dashboard: Dashboard, _server: Server) -> None:
+    create_instead(dashboard, body=b"\xff\xfe{")
+
+
+@provokes("404")
+def _a_path_that_is_not_there(dashboard: Dashboard, _server: Server) -> None:
+    create_instead(dashboard, path="/campaign")
+
+
+@provokes("405")
+def _a_method_that_is_not_known(dashboard: Dashboard, _server: Server) -> None:
+    create_instead(dashboard, method="DELETE")
+
+
+@provokes("invalid")
+def _a_budget_below_nothing(dashboard: Dashboard, _server: Server) -> None:
+    dashboard.open("/new")
+    dashboard.page.get_by_role("button", name=re.compile("^Advanced")).click()
+    dashboard.page.get_by_label("Flights at most").fill("-3")
+    dashboard.button("Create campaign").click()
+
+
+@provokes("foreign")
+def _a_page_of_another_site(dashboard: Dashboard, _server: Server) -> None:
+    create_instead(dashboard, headers={"origin": "http://elsewhere.example"})
+
+
+@provokes("unforeseen")
+def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: Server) -> None:
+    campaign_id = dashboard.create("import")
+    trial = dashboard.post(f"/campaigns/{campaign_id}/trials", {"gains": {"kp": 283, "ki": 13, "kd": 82}})
+    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3")) as file:
+        file.execute("UPDATE trial SET gains = '[1]' WHERE id = ?", (trial["id"],))
+        file.commit()
+    dashboard.open(f"/campaigns/{campaign_id}/flights/{trial['id']}")
+
+
+# ---- what must be on the screen
+
+TITLES: Final = {
+    "400": "Bad Request", "404": "Not Found", "405": "Method Not Allowed", "invalid": "Unusable input",
+    "foreign": "Foreign request", "unforeseen": "Internal Server Error",
+}  # fmt: skip
+
+
+def answered_kinds() -> set[type[GainlineError] | str]:
+    """What the API can answer, as the program itself says: a class of errors that is new needs a story here."""
+    declared = {getattr(app.errors, name) for name in app.errors.__all__}
+    classes = {one for one in declared if isinstance(one, type) and issubclass(one, GainlineError)}
+    return (classes - AT_START) | set(over_http._KINDS) | set(map(str, over_http._HTTP)) | set(FRAMEWORK)
+
+
+def _name(kind: object) -> str:
+    return kind.__name__ if isinstance(kind, type) else str(kind)
+
+
+def test_every_kind_of_error_has_a_story_that_provokes_it() -> None:
+    assert set(map(_name, PROVOKED)) == set(map(_name, answered_kinds()))
+
+
+@pytest.mark.parametrize("kind", sorted(PROVOKED, key=_name), ids=_name)
+def test_an_error_says_what_happened_and_what_to_do(
+    dashboard: Dashboard, server: Server, kind: type[GainlineError] | str
+) -> None:
+    told: list[Json] = []
+
+    def note(answer: Response) -> None:
+        if answer.headers.get("content-type", "").startswith(over_http.MEDIA_TYPE):
+            told.append(answer.json())
+
+    dashboard.page.on("response", note)
+    PROVOKED[kind](dashboard, server)
+    title = TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1]
+    expect(dashboard.page.get_by_role("alert").first).to_be_visible(timeout=RETRIED_MS)
+    dashboard.until(lambda: any(problem["title"] == title for problem in told))
+    dashboard.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    problem = [one for one in told if one["title"] == title][-1]
+    assert problem["hint"]
+    for text in (problem["detail"], problem["hint"], *(one["reason"] for one in problem["problems"])):
+        expect(dashboard.page.locator("body")).to_contain_text(text, use_inner_text=True, ignore_case=True)
+
+
+def test_a_server_that_cannot_be_reached_is_told_with_what_became_of_the_act(dashboard: Dashboard) -> None:
+    dashboard.open("/new")
+    dashboard.page.context.set_offline(True)
+    dashboard.button("Create campaign").click()
+    alert = dashboard.page.get_by_role("alert")
+    expect(alert).to_contain_text("The server cannot be reached.")
+    expect(alert).to_contain_text("not known whether")
+    expect(alert).to_contain_text("catches up by itself")
+    dashboard.page.context.set_offline(False)
+    expect(dashboard.page.get_by_text("Live", exact=True)).to_be_visible()

@@ -1,0 +1,179 @@
+"""What is lost and comes back: the page says so, shows nothing old as current, and catches up without a click."""
+
+import os
+import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from playwright.sync_api import Locator, expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import Dashboard
+
+LOST_MS = 40_000
+"""A line that looks open counts as dead after eight seconds of silence."""
+
+
+@contextmanager
+def stopped(pid: int) -> Iterator[None]:
+    """The process neither works nor answers, and its connections stay open, like those of a lost Wi-Fi."""
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def is_live(dashboard: Dashboard) -> None:
+    expect(dashboard.page.get_by_text("Live", exact=True)).to_be_visible(timeout=LOST_MS)
+    expect(dashboard.page.locator("main[data-stale]")).to_have_count(0)
+
+
+def is_away(dashboard: Dashboard) -> None:
+    """Said in words, with the time up to which the page is right, and the page without its colours."""
+    expect(dashboard.page.get_by_text("Server away", exact=True)).to_be_visible(timeout=LOST_MS)
+    notice = dashboard.page.get_by_role("status").filter(has_text="The server does not answer.")
+    expect(notice.locator("time")).to_be_visible()
+    expect(dashboard.page.locator("main[data-stale]")).to_be_visible()
+
+
+def new_campaign(dashboard: Dashboard, name: str) -> int:
+    made: int = dashboard.post("/campaigns", {"name": name, "vehicle": {"kind": "twin"}, "definition": {}})["id"]
+    return made
+
+
+def rename(dashboard: Dashboard, campaign_id: int, name: str) -> None:
+    version = dashboard.get(f"/campaigns/{campaign_id}")["version"]
+    answer = dashboard.page.request.patch(
+        f"{dashboard.url}/api/campaigns/{campaign_id}", data={"name": name, "version": version}
+    )
+    assert answer.ok, answer.text()
+
+
+def heading(dashboard: Dashboard, name: str) -> Locator:
+    return dashboard.page.get_by_role("heading", name=name, exact=True)
+
+
+def test_two_tabs_show_the_same_truth_over_one_stream_each(open_dashboard: Opener, shared_server: Server) -> None:
+    one, other = open_dashboard(shared_server.url), open_dashboard(shared_server.url)
+    streams: list[str] = []
+    one.page.on("request", lambda request: streams.append(request.url) if "/api/events" in request.url else None)
+    campaign_id = new_campaign(one, "Seen twice")
+    one.open(f"/campaigns/{campaign_id}")
+    other.open(f"/campaigns/{campaign_id}")
+    one.button("Rename the campaign").click()
+    one.page.get_by_label("Name of the campaign").fill("Seen by both")
+    one.button("Rename").click()
+    expect(heading(other, "Seen by both")).to_be_visible()
+    one.page.get_by_role("navigation").get_by_role("link", name="Vehicles").click()
+    expect(heading(one, "Vehicles")).to_be_visible()
+    one.page.go_back()
+    expect(heading(one, "Seen by both")).to_be_visible()
+    assert len(streams) == 1
+    other.page.reload()
+    expect(heading(other, "Seen by both")).to_be_visible()
+
+
+def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard, other = open_dashboard(own_server.url), open_dashboard(own_server.url)
+    campaign_id = new_campaign(dashboard, "Before")
+    dashboard.open(f"/campaigns/{campaign_id}")
+    other.open("/")
+    dashboard.page.wait_for_timeout(3000)
+    own_server.stop()
+    is_away(dashboard)
+    expect(heading(dashboard, "Before")).to_be_visible()
+    other.page.get_by_role("navigation").get_by_role("link", name="Vehicles").click()
+    expect(other.page.get_by_role("alert")).to_contain_text("The server cannot be reached.", timeout=LOST_MS)
+    own_server.start()
+    is_live(dashboard)
+    rename(dashboard, campaign_id, "After")
+    expect(heading(dashboard, "After")).to_be_visible()
+    is_live(other)
+    expect(other.page.get_by_role("alert")).to_have_count(0)
+
+
+def test_a_killed_worker_is_told_until_it_is_back(dashboard: Dashboard, shared_server: Server) -> None:
+    dashboard.open("/")
+    os.kill(shared_server.worker_pid(), signal.SIGKILL)
+    expect(dashboard.page.get_by_text("No worker is running.")).to_be_visible(timeout=LOST_MS)
+    is_live(dashboard)
+    expect(dashboard.page.get_by_text("No worker is running.")).to_have_count(0)
+
+
+def test_after_a_lost_wifi_the_page_catches_up(dashboard: Dashboard, open_dashboard: Opener) -> None:
+    ashore = open_dashboard(dashboard.url)
+    campaign_id = new_campaign(dashboard, "At the field")
+    dashboard.open(f"/campaigns/{campaign_id}")
+    dashboard.page.context.set_offline(True)
+    is_away(dashboard)
+    rename(ashore, campaign_id, "Renamed ashore")
+    dashboard.page.context.set_offline(False)
+    is_live(dashboard)
+    expect(heading(dashboard, "Renamed ashore")).to_be_visible()
+
+
+def test_a_page_that_slept_wakes_up_to_date(dashboard: Dashboard) -> None:
+    campaign_id = new_campaign(dashboard, "In the evening")
+    dashboard.open(f"/campaigns/{campaign_id}")
+    session = dashboard.page.context.new_cdp_session(dashboard.page)
+    session.send("Page.setWebLifecycleState", {"state": "frozen"})
+    rename(dashboard, campaign_id, "In the morning")
+    session.send("Page.setWebLifecycleState", {"state": "active"})
+    expect(heading(dashboard, "In the morning")).to_be_visible()
+    is_live(dashboard)
+
+
+def test_a_line_that_only_looks_open_is_given_up_and_a_flight_on_it_is_not_shown_as_current(
+    open_dashboard: Opener, own_server: Server
+) -> None:
+    dashboard = open_dashboard(own_server.url)
+    campaign_id = dashboard.create("twin")
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    bar = dashboard.page.get_by_role("region", name=re.compile("^Flying: "))
+    expect(bar).to_contain_text(re.compile(r"\d\.\d\d m"))
+    expect(bar).not_to_contain_text("as last heard")
+    with stopped(own_server.pid):
+        expect(bar).to_contain_text("as last heard", timeout=LOST_MS)
+        is_away(dashboard)
+    is_live(dashboard)
+    expect(bar.get_by_text("as last heard")).to_have_count(0)
+
+
+def test_space_aborts_also_from_a_text_field_and_leaves_the_text_alone(dashboard: Dashboard) -> None:
+    campaign_id = dashboard.create("twin", name="Abort me")
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    expect(dashboard.page.get_by_role("button", name=re.compile("^ABORT")).first).to_be_visible()
+    dashboard.button("Rename the campaign").click()
+    name = dashboard.page.get_by_label("Name of the campaign")
+    name.fill("Abort")
+    name.press("Space")
+    dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "aborted")
+    assert dashboard.trials(campaign_id)[0]["read_back"] is not None
+    expect(name).to_have_value("Abort")
+
+
+def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(dashboard: Dashboard) -> None:
+    dashboard.page.route("**/assets/later-*.js", lambda route: route.abort())
+    dashboard.open("/vehicles")
+    expect(dashboard.page.get_by_role("alert")).to_contain_text("This page could not be fetched.")
+    expect(dashboard.page.get_by_role("alert")).to_contain_text("Try again")
+    dashboard.page.unroute("**/assets/later-*.js")
+    dashboard.button("Try again").click()
+    expect(heading(dashboard, "Vehicles")).to_be_visible()
+
+
+def test_pages_open_though_the_server_was_lost_before_they_were(open_dashboard: Opener, own_server: Server) -> None:
+    dashboard = open_dashboard(own_server.url)
+    with dashboard.page.expect_response(re.compile(r"/assets/later-.*\.js")):
+        dashboard.open("/")
+    dashboard.page.wait_for_function("performance.getEntriesByType('resource').some(r => r.name.includes('plotly'))")
+    own_server.stop()
+    dashboard.page.get_by_role("button", name="More pages").click()
+    dashboard.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
+    expect(heading(dashboard, "Jobs")).to_be_visible()
