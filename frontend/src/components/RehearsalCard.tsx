@@ -1,5 +1,4 @@
 import { Anchor, Button } from "@mantine/core";
-import { IconPlaneDeparture } from "@tabler/icons-react";
 import { Link, useNavigate } from "react-router";
 import { useRehearse } from "../api/mutations";
 import { useCampaign } from "../api/queries";
@@ -25,20 +24,12 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
           <strong>{STANDING[state]}</strong> {reason}.
         </p>
         {state === "under way" && campaign_id !== null ? (
-          <Button
-            component={Link}
-            to={`/campaigns/${campaign_id}`}
-            size="lg"
-            fullWidth
-            leftSection={<IconPlaneDeparture size={22} aria-hidden />}
-          >
+          <Button component={Link} to={`/campaigns/${campaign_id}`} fullWidth>
             Go on with the rehearsal
           </Button>
         ) : (
           <Button
-            size="lg"
             fullWidth
-            leftSection={<IconPlaneDeparture size={22} aria-hidden />}
             loading={rehearse.isPending}
             onClick={() => rehearse.mutate(undefined, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })}
           >
