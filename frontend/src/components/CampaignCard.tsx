@@ -29,7 +29,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
       </h2>
-      <p className={classes["vehicle"]}>{vehicle.title}</p>
+      <p className={classes["vehicle"]}>{vehicle.registered ? vehicle.name : vehicle.title}</p>
       <Sparkline curves={spark} />
       <dl className={`${classes["figures"]} numbers`}>
         <div>
