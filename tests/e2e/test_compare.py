@@ -73,7 +73,7 @@ def test_flights_are_picked_from_their_campaigns_and_drawn_as_they_are_stored(
     dashboard: Dashboard, flown: Flown
 ) -> None:
     page = dashboard.page
-    dashboard.open_campaign(flown.morning)
+    dashboard.open(f"/campaigns/{flown.morning}")
     page.get_by_role("link", name="Compare flight 3").click()
     expect(page.get_by_text("Flight 3 is chosen.")).to_be_visible()
     page.get_by_role("checkbox", name=re.compile("^Flight 1 ")).check()
