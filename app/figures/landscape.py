@@ -22,6 +22,7 @@ MOST_NUMBERED: Final = 12
 """Of more flights only the first, the best and the latest bear their number."""
 _TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
 """The lower the error, the fuller the colour: shares of it from the bottom to the top of the scale."""
+_GROUND: Final = "ground"
 _EDGE: Final = 0.03
 _GAP: Final = 0.09
 _STACK_GAP: Final = 0.085
@@ -78,7 +79,9 @@ class LandscapeFigure:
         traces: list[dict[str, object]] = []
         axes: dict[str, object] = {}
         for index, one in enumerate(slices, start=1):
-            traces += self._slice(palette, index, one, scale)
+            named = {_GROUND, *(trace["legendgroup"] for trace in traces)}
+            own = self._slice(palette, index, one, scale)
+            traces += [trace | {"showlegend": trace["legendgroup"] not in named} for trace in own]
             axes |= self._axes(palette, index, one)
         layout = theme.layout(
             palette,
@@ -304,7 +307,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
     }
     ground = common | {
         "name": "Predicted error",
-        "showlegend": False,
+        "legendgroup": _GROUND,
         "contours": {
             "start": scale.low,
             "end": scale.high,
@@ -322,9 +325,8 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
     }
     beyond = common | {
         "name": f"Above {scale.high:g} {unit}",
-        "showlegend": index == 1,
         "legendgroup": "beyond",
-        "contours": {"type": "constraint", "operation": ">", "value": scale.high},
+        "contours": {"type": "constraint", "operation": "<", "value": scale.high},  # Plotly shades what is refused
         "fillcolor": theme.mixed(palette.earlier, palette.surface, 0.4),
         "line": {"width": 0.9, "color": palette.earlier, "smoothing": 1},
         "hoverinfo": "skip",
@@ -343,7 +345,6 @@ def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str) -> dict[st
         "x": [each[one.x] for each in gains],
         "y": [each[one.y] for each in gains],
         "legendgroup": role,
-        "showlegend": index == 1,
         "cliponaxis": True,
         "meta": {"role": role, "slice": index},
         "hovertemplate": f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>",
