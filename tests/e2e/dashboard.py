@@ -14,6 +14,7 @@ Theme = Literal["light", "dark"]
 Viewport = ViewportSize
 Json = dict[str, Any]
 
+DESK: Final = Viewport(width=1440, height=900)
 TABLET: Final = Viewport(width=1024, height=768)
 PHONE: Final = Viewport(width=390, height=844)
 CHARTS: Final = {"takeoffs": "Takeoff curves", "errors": "Error per flight", "gains": "Gains per flight",

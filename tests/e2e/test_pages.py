@@ -1,4 +1,4 @@
-"""Every page in both themes and two sizes: readable by everybody, complete without a network, and looked at."""
+"""Every page in both themes and three sizes: readable by everybody, complete without a network, and looked at."""
 
 import gzip
 import os
@@ -10,12 +10,12 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, FloatRect, expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Theme, Viewport
+from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Theme, Viewport
 
 ROOT = Path(__file__).parents[2]
 SCREENSHOTS = ROOT / "var" / "screenshots"
 README_IMAGE = ROOT / "docs" / "images" / "campaign.png"
-SIZES = {"tablet": TABLET, "phone": PHONE}
+SIZES = {"desk": DESK, "tablet": TABLET, "phone": PHONE}
 THEMES: tuple[Theme, ...] = ("light", "dark")
 UI_BYTES_GZIPPED = 250_000
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
@@ -48,6 +48,10 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
         "vehicles": "/vehicles",
         "new-vehicle": "/vehicles/new",
         "vehicle": f"/vehicles/{register(dashboard)}",
+        "shared-vehicle": f"/vehicles/{dashboard.get(f'/campaigns/{under_way}')['vehicle']['id']}",
+        "fly": f"/fly/{plan_flight(dashboard)}",
+        "controller": "/controller",
+        "controller-check": f"/controller/{dashboard.post('/controller-checks/example')['id']}",
         "reproductions": "/reproductions",
         "compare": f"/compare?trial={dashboard.trials(under_way)[1]['id']}&trial={dashboard.trials(finished)[0]['id']}",
         "jobs": "/jobs",
@@ -56,6 +60,14 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
     }
     context.close()
     return paths
+
+
+def plan_flight(dashboard: Dashboard) -> int:
+    """A flight that nobody has begun."""
+    campaign_id = dashboard.create("twin", seed=5)
+    gains = {"kp": 300, "ki": 13, "kd": 82}
+    planned: int = dashboard.post(f"/campaigns/{campaign_id}/trials", {"gains": gains})["id"]
+    return planned
 
 
 def register(dashboard: Dashboard) -> int:
@@ -83,7 +95,10 @@ def create_pitch(dashboard: Dashboard) -> int:
 
 
 def when_drawn(dashboard: Dashboard) -> None:
-    """Wait until nothing on the page is still being fetched or drawn."""
+    """Wait until nothing on the page is still being fetched or drawn, what is drawn once it is seen included."""
+    dashboard.page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
+    dashboard.page.wait_for_timeout(200)
+    dashboard.page.evaluate("scrollTo(0, 0)")
     expect(dashboard.page.locator("[aria-busy=true]")).to_have_count(0)
     for plot in dashboard.page.locator("[role=group] > div:last-child").all():
         expect(plot).to_have_attribute("data-drawn", "true")

@@ -16,6 +16,8 @@ interface Props {
   title: string;
   card: FigureCard | undefined;
   error: unknown;
+  /** Whether it is being asked for already. */
+  wanted?: boolean;
   height: number;
   /** What the page adds to the figure as it came. */
   dressed?: (figure: PlotlyFigure) => PlotlyFigure;
@@ -34,6 +36,7 @@ export function FigurePanel({
   title,
   card,
   error,
+  wanted = true,
   height,
   dressed,
   liveTrial,
@@ -78,7 +81,7 @@ export function FigurePanel({
           {card.reason}
         </div>
       )}
-      {card === undefined && error === null && <div style={{ height }} aria-busy="true" />}
+      {card === undefined && error === null && <div style={{ height }} aria-busy={wanted} />}
       {figure !== null && asTable && card?.table && (
         <DataTable table={card.table} label={`${title}, numbers`} height={height} />
       )}

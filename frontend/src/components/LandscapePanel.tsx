@@ -36,6 +36,7 @@ export function LandscapePanel({ campaignId }: { campaignId: number }) {
         title="Error landscape of the model"
         card={landscape.data}
         error={landscape.error}
+        wanted={seen}
         height={heightOf(landscape.data, stacked)}
       />
     </div>
