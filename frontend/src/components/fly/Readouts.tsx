@@ -61,8 +61,8 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const errorTitle = isFlying ? "Error so far" : "Error";
   const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
-    <dl className={`${classes["readouts"]} numbers`}>
-      <div className={classes["row"]}>
+    <div className={`${classes["readouts"]} numbers`}>
+      <dl className={classes["row"]}>
         <Reading
           title={stale ? `${reading.title}, as last heard` : reading.title}
           value={withUnit(output, reading.unit, reading.digits)}
@@ -76,8 +76,8 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
           size="large"
           stale={isFlying && stale}
         />
-      </div>
-      <div className={classes["row"]}>
+      </dl>
+      <dl className={classes["row"]}>
         {live !== null && live.thrust !== null && (
           <Reading
             title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"}
@@ -93,7 +93,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
         ) : (
           <Reading title="Record lasts" value={withUnit(endS, "s", 0)} />
         )}
-      </div>
-    </dl>
+      </dl>
+    </div>
   );
 }
