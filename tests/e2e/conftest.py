@@ -8,11 +8,10 @@ import signal
 import socket
 import subprocess
 import sys
-from collections import deque
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Thread
 from urllib.parse import urlsplit
 
 import pytest
@@ -66,26 +65,23 @@ class Server:
     def __init__(self, data_dir: Path, port: int = 0) -> None:
         self.data_dir = data_dir
         self._port = port
-        self._process: subprocess.Popen[str] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self.url = ""
 
     def start(self) -> None:
         assert BUILT.is_file(), "the UI is not built; run ./dev ui"
         gainline = Path(sys.executable).with_name("gainline")
-        self._process = subprocess.Popen(
-            [gainline, "serve", "--port", str(self._port), "--data-dir", self.data_dir],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
-        assert self._process.stdout is not None
-        said = []
-        for line in self._process.stdout:
-            said.append(line)
-            if (found := re.search(r"http://\S+:\d+", line)) is not None:
-                self.url = found.group()
-                self._port = urlsplit(self.url).port or 0
-                # A pipe that nobody reads is full one day, and then the server waits for ever to say something.
-                Thread(target=deque, args=(self._process.stdout, 0), daemon=True).start()
-                return
-        pytest.fail("the server did not start:\n" + "".join(said))
+        # Not a pipe: one that nobody reads is full one day, and then the server waits for ever to say something.
+        said = self.data_dir.with_suffix(".log")
+        with said.open("wb") as log:
+            self._process = subprocess.Popen(
+                [gainline, "serve", "--port", str(self._port), "--data-dir", self.data_dir],
+                stdout=log, stderr=subprocess.STDOUT)  # fmt: skip
+        while (found := re.search(r"http://\S+:\d+", said.read_text())) is None:
+            assert self._process.poll() is None, f"the server did not start:\n{said.read_text()}"
+            time.sleep(0.05)
+        self.url = found.group()
+        self._port = urlsplit(self.url).port or 0
 
     @property
     def pid(self) -> int:

@@ -10,6 +10,7 @@ from playwright.sync_api import Locator, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.wifi import Wifi
 
 LOST_MS = 40_000
 """A line that looks open counts as dead after eight seconds of silence."""
@@ -84,7 +85,8 @@ def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboa
     own_server.stop()
     is_away(dashboard)
     expect(heading(dashboard, "Before")).to_be_visible()
-    other.page.get_by_role("navigation").get_by_role("link", name="Vehicles").click()
+    other.button("More pages").click()
+    other.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
     expect(other.page.get_by_role("alert")).to_contain_text("The server cannot be reached.", timeout=LOST_MS)
     own_server.start()
     is_live(dashboard)
@@ -102,16 +104,17 @@ def test_a_killed_worker_is_told_until_it_is_back(dashboard: Dashboard, shared_s
     expect(dashboard.page.get_by_text("No worker is running.")).to_have_count(0)
 
 
-def test_after_a_lost_wifi_the_page_catches_up(dashboard: Dashboard, open_dashboard: Opener) -> None:
-    ashore = open_dashboard(dashboard.url)
-    campaign_id = new_campaign(dashboard, "At the field")
-    dashboard.open(f"/campaigns/{campaign_id}")
-    dashboard.page.context.set_offline(True)
-    is_away(dashboard)
-    rename(ashore, campaign_id, "Renamed ashore")
-    dashboard.page.context.set_offline(False)
-    is_live(dashboard)
-    expect(heading(dashboard, "Renamed ashore")).to_be_visible()
+def test_after_a_lost_wifi_the_page_catches_up(open_dashboard: Opener, shared_server: Server) -> None:
+    ashore = open_dashboard(shared_server.url)
+    with Wifi(shared_server.url) as wifi:
+        dashboard = open_dashboard(wifi.url)
+        campaign_id = new_campaign(ashore, "At the field")
+        dashboard.open(f"/campaigns/{campaign_id}")
+        with wifi.lost():
+            is_away(dashboard)
+            rename(ashore, campaign_id, "Renamed ashore")
+        is_live(dashboard)
+        expect(heading(dashboard, "Renamed ashore")).to_be_visible()
 
 
 def test_a_page_that_slept_wakes_up_to_date(dashboard: Dashboard) -> None:

@@ -91,7 +91,11 @@ def main(chromium: str) -> None:
     bring_loopback_up()
     seen: list[Json] = []
     expect.set_options(timeout=PATIENCE_MS)
-    with tempfile.TemporaryDirectory() as folder, served(Path(folder)) as server, sync_playwright() as playwright:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        served(Path(folder) / "data") as server,
+        sync_playwright() as playwright,
+    ):
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         context = browser.new_context(base_url=server.url, viewport=TABLET)
         dashboard = Dashboard(context.new_page(), server.url)
