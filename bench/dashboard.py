@@ -76,7 +76,7 @@ def server(data_dir: Path) -> Iterator[str]:
     """`gainline serve` in a process of its own; its address."""
     gainline = Path(sys.executable).with_name("gainline")
     command = [str(gainline), "serve", "--port", "0", "--data-dir", str(data_dir)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None
         address = next(
             (found.group() for line in process.stdout if (found := re.search(r"http://\S+:\d+", line)) is not None),
