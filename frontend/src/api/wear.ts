@@ -5,14 +5,14 @@ import type { Theme } from "./queries";
 
 export function useCalibration(vehicleId: number) {
   return useQuery({
-    queryKey: ["vehicle", vehicleId, "calibration"],
+    queryKey: ["wear", vehicleId, "calibration"],
     queryFn: () => answer(getCalibration({ path: { vehicle_id: vehicleId } })),
   });
 }
 
 export function useVehicleFigure(vehicleId: number, name: "calibration" | "batteries", theme: Theme) {
   return useQuery({
-    queryKey: ["vehicle", vehicleId, "figure", name, theme],
+    queryKey: ["wear", vehicleId, name, theme],
     queryFn: () => answer(getVehicleFigure({ path: { vehicle_id: vehicleId, name }, query: { theme } })),
     placeholderData: keepPreviousData,
   });

@@ -6,6 +6,7 @@ test("a changed trial makes its campaign, the lists and what flies doubtful", ()
     ["flying"],
     ["campaigns"],
     ["trial", 9],
+    ["wear"],
     ["campaign", 4],
   ]);
 });
@@ -17,7 +18,13 @@ test("a changed job makes the jobs doubtful, and one without a campaign the repr
 
 test("a changed vehicle makes itself and the list of vehicles doubtful", () => {
   const keys = doubtful({ topic: "vehicle", entity_id: 2, campaign_id: null });
-  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2]]);
+  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2], ["wear"]]);
+});
+
+test("new gains and a flight make doubtful what is known of the vehicles' wear", () => {
+  expect(doubtful({ topic: "proposal", entity_id: 7, campaign_id: 4 })).toContainEqual(["wear"]);
+  expect(doubtful({ topic: "flight", entity_id: 7, campaign_id: 4 })).toContainEqual(["wear"]);
+  expect(doubtful({ topic: "job", entity_id: 7, campaign_id: 4 })).not.toContainEqual(["wear"]);
 });
 
 test("many changes together ask for each answer once", () => {
@@ -26,7 +33,7 @@ test("many changes together ask for each answer once", () => {
     { topic: "campaign", entity_id: 4, campaign_id: 4 },
     { topic: "campaign", entity_id: 4, campaign_id: 4 },
   ];
-  expect(doubtfulOnce(changes)).toEqual([["flying"], ["campaign", 4], ["campaigns"]]);
+  expect(doubtfulOnce(changes)).toEqual([["flying"], ["wear"], ["campaign", 4], ["campaigns"]]);
 });
 
 test("a line that is no change is left alone", () => {

@@ -8,12 +8,16 @@ export interface Change {
 
 export type QueryKey = readonly (string | number)[];
 
+/** What tells of wear. Most of it does not name its vehicle, so that what is known of any vehicle is doubtful. */
+const TELLING = new Set(["campaign", "trial", "flight", "proposal", "vehicle"]);
+
 export function doubtful(change: Change): QueryKey[] {
   if (change.topic === "check") return [["checks"]];
   const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
   if (change.topic === "trial") keys.push(["trial", change.entity_id]);
   if (change.topic === "vehicle") keys.push(["vehicles"], ["vehicle", change.entity_id]);
+  if (TELLING.has(change.topic)) keys.push(["wear"]);
   if (change.topic === "job" && change.campaign_id === null) keys.push(["reproductions"]);
   if (change.campaign_id !== null) keys.push(["campaign", change.campaign_id]);
   return keys;
