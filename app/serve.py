@@ -25,6 +25,8 @@ from app.supervisor import Supervisor
 from app.worker import run_supervised_worker
 
 STREAMS_END_WITHIN_S: Final = 3
+SWITCH_EVERY_S: Final = 0.001
+"""How long a thread that draws may keep the one that answers waiting for the interpreter."""
 
 _log = structlog.get_logger(__name__)
 
@@ -49,6 +51,7 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
             sign = stack.enter_context(exclusive(settings.data_dir / "server.lock"))
         except LockedError as error:
             raise _already_served(settings, error) from error
+        sys.setswitchinterval(SWITCH_EVERY_S)
         listener = stack.enter_context(listen(settings.host, settings.port))
         sign(web_address(settings.host, listener.getsockname()[1]))
         configure_logs(settings.data_dir, "web", settings.log_level)

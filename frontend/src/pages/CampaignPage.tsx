@@ -9,6 +9,7 @@ import { LandscapePanel } from "../components/LandscapePanel";
 import { Missing } from "../components/Missing";
 import { NextFlightCard } from "../components/NextFlightCard";
 import { Panel } from "../components/Panel";
+import { loadPlotly } from "../components/plotly";
 import { StatisticsPanel } from "../components/StatisticsPanel";
 import { TrialsTable } from "../components/TrialsTable";
 import { Trouble } from "../components/Trouble";
@@ -34,6 +35,19 @@ function CampaignById({ campaignId }: { campaignId: number }) {
     return <CampaignView campaign={campaign.data} trials={trials.data ?? null} trouble={trials.error} />;
   }
   if (campaign.error) return <Missing error={campaign.error} />;
+  return <Coming campaignId={campaignId} />;
+}
+
+/** What the page will want is asked for at once, not only when there is a place for it. */
+function Coming({ campaignId }: { campaignId: number }) {
+  const theme = useComputedColorScheme("light");
+  useProposal(campaignId);
+  useCampaignFigure(campaignId, "takeoffs", theme);
+  useCampaignFigure(campaignId, "errors", theme);
+  useCampaignFigure(campaignId, "gains", theme);
+  useEffect(() => {
+    loadPlotly().catch(() => undefined); // the chart asks again, and says what is wrong
+  }, []);
   return (
     <div aria-busy="true" className={classes["columns"]}>
       <Skeleton height={480} radius="md" />
