@@ -10,7 +10,7 @@ from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import Rehearsal, RehearsalState
 from app.campaigns.states import Outcome
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import CampaignRow
 from app.db.types import utc_now
 from app.errors import ConflictError
 from app.fleet import service as fleet
@@ -61,7 +61,7 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     flown = (row for row in held if not row.vehicle.is_real and definition_of(row).digest() == wanted)
     row = next(flown, None)
     if row is not None:
-        state, reason = judge([_rehearsed(trial) for trial in history.trials_of(session, row.id)], row.outcome)
+        state, reason = judge([Rehearsed(*trial) for trial in history.gated(session, row.id)], row.outcome)
         return Rehearsal(state=state, campaign_id=row.id, reason=reason)
     if campaign.definition_digest is not None:
         return Rehearsal(state="not needed", campaign_id=None, reason="it flew before rehearsals were asked for")
@@ -95,7 +95,3 @@ def tell_rehearsed(session: Session, rehearsal: CampaignRow) -> None:
     """What changes in a rehearsal changes the campaign that it is for, and who looks at that one hears of it."""
     if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
         repository.get_one(session, campaign_id).updated_at = utc_now()
-
-
-def _rehearsed(trial: TrialRow) -> Rehearsed:
-    return Rehearsed(trial.number, trial.state, bool(trial.gate["passed"]))

@@ -264,6 +264,8 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     definition, options, row.vehicle = _checked(session, asked, edit.vehicle or _choice_of(row))
     row.experiment, row.strategy = definition.experiment, definition.strategy
     row.definition, row.vehicle_options = stored(definition), options
+    if row.vehicle.is_real:  # it ends with safe gains of its own, whatever a rehearsal had those of
+        row.safe_gains = None
     cancel_unflown(history.trials_of(session, row.id), None, "the campaign's definition was changed")
     request_proposal(session, row)
 

@@ -34,6 +34,11 @@ def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
     return repository.of_campaigns(session, campaign_ids)
 
 
+def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
+    """Of each trial its number, its state, and whether the gate passed its gains; by number."""
+    return repository.gated(session, campaign_id)
+
+
 def curves_of(session: Session, trials: Sequence[TrialRow]) -> Mapping[int, list[list[float]]]:
     """The coarse curves of those of the trials that have one, as [time_s, value] pairs by trial."""
     return repository.curves(session, [row.id for row in trials])

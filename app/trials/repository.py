@@ -40,6 +40,13 @@ def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[Tr
     ).all()
 
 
+def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
+    """Of each trial its number, its state, and whether the gate passed its gains; by number."""
+    wanted = select(TrialRow.number, TrialRow.state, TrialRow.gate["passed"].as_boolean())
+    found = session.execute(wanted.where(TrialRow.campaign_id == campaign_id).order_by(TrialRow.number))
+    return [(number, state, bool(passed)) for number, state, passed in found]
+
+
 def curves(session: Session, trial_ids: Collection[int]) -> Mapping[int, list[list[float]]]:
     """The coarse curves of those trials that have one, by trial."""
     wanted = select(TrialRow.id, TrialRow.curve).where(TrialRow.id.in_(trial_ids), TrialRow.curve.is_not(None))

@@ -2,9 +2,13 @@
 
 import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import event
 
-from app.campaigns.rehearsals import Rehearsed, judge
+from app.campaigns.definitions import definition_of
+from app.campaigns.rehearsals import Rehearsed, judge, rehearsal_of
+from app.campaigns.service import get_row
 from app.campaigns.states import Outcome
+from app.db import outbox
 from app.db.session import Database
 from app.trials.states import TrialState
 from tests.builders import (
@@ -18,7 +22,7 @@ from tests.builders import (
     lift_off,
     run_jobs,
 )
-from tests.fleet.vehicles import create_campaign_on, create_connected, register
+from tests.fleet.vehicles import create_campaign_on, create_connected, put_rehearsal, register
 
 VALID, ABORTED, INVALID, LOST = TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST
 
@@ -160,3 +164,40 @@ def test_simulations_need_none(client: TestClient, database: Database) -> None:
     for one in (shared, own):
         assert one["rehearsal"] == {"state": "not needed", "campaign_id": None, "reason": ""}
         assert client.post(f"/api/campaigns/{one['id']}/rehearsal").status_code == 409
+
+
+def test_a_rehearsal_that_begins_is_news_of_the_campaign_that_it_is_for(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    with database.read() as session:
+        before = outbox.latest_event_id(session)
+    rehearse(client, campaign)
+    with database.read() as session:
+        told = {(change.topic, change.entity_id) for change in outbox.events_after(session, before, limit=100)}
+    assert ("campaign", campaign["id"]) in told
+
+
+def test_a_rehearsal_that_is_given_to_a_real_vehicle_has_the_safe_gains_of_that_one(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    rehearsal = rehearse(client, campaign)
+    other = register(client, "Other", real=True)
+    softer = {"version": 1, "safe_gains": {"kp": 250, "ki": 13, "kd": 82}, "statement": "Ada: softer"}
+    assert client.patch(f"/api/vehicles/{other['id']}", json=softer).status_code == 200
+    moved = {"version": 1, "vehicle": {"kind": "mavlink", "id": other["id"]}}
+    assert client.patch(f"/api/campaigns/{rehearsal['id']}", json=moved).status_code == 200
+    with database.read() as session:
+        assert definition_of(get_row(session, rehearsal["id"])).safe_gains == softer["safe_gains"]
+
+
+def test_the_gates_word_on_a_rehearsal_is_read_at_once_however_many_flights_it_has(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    put_rehearsal(client, database, campaign)
+    with database.read() as session:
+        row = get_row(session, campaign["id"])
+        rehearsal_of(session, row)
+        asked: list[str] = []
+        event.listen(database.engine, "before_cursor_execute", lambda *said: asked.append(said[2]))
+        assert rehearsal_of(session, row).state == "passed"
+    assert len([statement for statement in asked if "FROM trial" in statement]) == 1
