@@ -1,4 +1,5 @@
 import { useEffect, useRef, useState } from "react";
+import { painted } from "../lib/pace";
 import { narrowed, type PlotlyFigure, type Seconds, traceWithRole, withLive } from "../lib/traces";
 import { liveNow } from "../live/store";
 import classes from "./Chart.module.css";
@@ -44,6 +45,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
     queue.current = queue.current.then(async () => {
       try {
         const plotly = await loadPlotly();
+        await painted();
         if (!wanted) return;
         await plotly.react(
           target,

@@ -42,3 +42,9 @@ export function paced(work: () => Promise<unknown>, shortestMs: number): Paced {
     },
   };
 }
+
+/** Once what has changed so far is on the screen: heavy work that waits for it does not keep an answer back. */
+export async function painted(): Promise<void> {
+  if (document.visibilityState === "hidden") return; // where nothing is painted
+  await new Promise<void>((done) => requestAnimationFrame(() => setTimeout(done)));
+}
