@@ -1,6 +1,7 @@
 """How much may be sent at once: refused by the stated length where there is one, else as soon as it is passed."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from starlette.datastructures import Headers
@@ -17,17 +18,30 @@ BUNDLE_BYTES: Final = 2**30
 """Largest campaign in one file; `gainline unbundle` has no such limit."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Limit:
+    """Of the request's `field`; `otherwise` is what to do with more."""
+
+    field: str
+    size_bytes: int
+    otherwise: str
+
+
+_JSON: Final = _Limit("body", JSON_BYTES, "no act of the API needs more")
+
+
 class BodyLimitMiddleware:
     """Bounds every request's body: flight records to `upload_bytes`, photos to 10 MiB, bundles to 1 GiB, everything
     else to 1 MiB."""
 
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
+        record = "a flight record has at most 200 000 rows, so thin a longer one or cut it"
         self._uploads = {
-            "/trajectory": upload_bytes,
-            "/controller-checks": upload_bytes,
-            "/photos": PHOTO_BYTES,
-            "/api/bundles": BUNDLE_BYTES,
+            "/trajectory": _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs"),
+            "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),
+            "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),
+            "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` brings in larger ones"),
         }
         self._refuse = refuse
 
@@ -35,11 +49,11 @@ class BodyLimitMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        named = next((limit for ending, limit in self._uploads.items() if scope["path"].endswith(ending)), None)
-        field, limit = ("body", JSON_BYTES) if named is None else ("file", named)
+        path: str = scope["path"]
+        limit = next((limit for ending, limit in self._uploads.items() if path.endswith(ending)), _JSON)
         stated = Headers(scope=scope).get("content-length", "")
-        if stated.isdecimal() and int(stated) > limit:
-            await self._refuse(_too_large(field, limit))(scope, receive, send)
+        if stated.isdecimal() and int(stated) > limit.size_bytes:
+            await self._refuse(_too_large(limit))(scope, receive, send)
             return
         received = 0
 
@@ -47,19 +61,17 @@ class BodyLimitMiddleware:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
-            if received > limit:
-                raise _too_large(field, limit)
+            if received > limit.size_bytes:
+                raise _too_large(limit)
             return message
 
         await self._app(scope, receive_bounded, send)
 
 
-def _too_large(field: str, limit_bytes: int) -> TooLargeError:
-    size = f"{limit_bytes / 2**20:.4g} MiB"
+def _too_large(limit: _Limit) -> TooLargeError:
+    size = f"{limit.size_bytes / 2**20:.4g} MiB"
     return TooLargeError(
         "The request is too large; nothing was stored.",
-        hint=f"Send at most {size}: a photo in a lower resolution is enough; a flight record has at most 200 000 rows, "
-        "so thin a longer one or cut it. "
-        "`gainline import` reads larger logs.",
-        problems=(Problem(field, f"is larger than {size}"),),
+        hint=f"Send at most {size}: {limit.otherwise}.",
+        problems=(Problem(limit.field, f"is larger than {size}"),),
     )

@@ -13,8 +13,9 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 _READS = frozenset({"GET", "HEAD", "OPTIONS"})
-_GUARDED = frozenset({"/api/system/backup"})
-"""What is not for another site even to set going, though its page could not read it: everything there is, in one."""
+_GUARDED = ("/api/system/backup", "/report.pdf", "/bundle")
+"""How the paths end that another site may not even set going, though its page could not read what comes: they take a
+browser's start or a whole database's or campaign's room on the disk, while something may fly."""
 
 
 class OriginMiddleware:
@@ -42,7 +43,7 @@ class OriginMiddleware:
                 f"This server does not answer to the name “{address}”.",
                 "Use localhost or the machine's address, or start it with that name as --host (GAINLINE_HOST).",
             )
-        is_read = scope["method"] in _READS and scope["path"] not in _GUARDED
+        is_read = scope["method"] in _READS and not scope["path"].endswith(_GUARDED)
         if not is_read and _is_foreign(headers, address):
             return (
                 "This was asked for by a page of another site; nothing was done.",

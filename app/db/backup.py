@@ -1,5 +1,6 @@
 """A consistent copy of the database, taken while others read and write."""
 
+import shutil
 import sqlite3
 import tempfile
 from contextlib import closing
@@ -7,16 +8,21 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from app.db.session import translated
+from app.errors import StorageError
 
 _SUFFIX: Final = "gainline.sqlite3"
+SPARE_BYTES: Final = 2**28
+"""What a copy must leave free for what is flown meanwhile."""
 
 
 def take_backup(database_file: Path) -> BinaryIO:
     """The copy as an open file without a name, so that nothing is left behind once it is closed.
 
     It is one moment's state: the write-ahead log lets writers go on meanwhile, and what they commit is not in it. It
-    lies beside the database until then, and needs as much space. Raises StorageError.
+    lies beside the database until then, and needs as much space. Raises StorageError, before anything is written where
+    there is hardly more than that.
     """
+    _require_room(database_file)
     with (
         translated(database_file),
         tempfile.TemporaryDirectory(prefix="backup-", dir=database_file.parent) as folder,
@@ -27,6 +33,16 @@ def take_backup(database_file: Path) -> BinaryIO:
             source.backup(copy)
             copy.execute("PRAGMA journal_mode = DELETE")  # one file, readable without -wal beside it
         return copied.open("rb")
+
+
+def _require_room(database_file: Path) -> None:
+    needed, free = database_bytes(database_file) + SPARE_BYTES, shutil.disk_usage(database_file.parent).free
+    if free < needed:
+        raise StorageError(
+            f"There is too little room for a copy: {free / 1e9:.1f} GB are free, and {needed / 1e9:.1f} GB are needed "
+            "so that flights can still be stored.",
+            hint="Free some disk space; or stop Gainline, and copy gainline.sqlite3 to another disk.",
+        )
 
 
 def database_bytes(database_file: Path) -> int:

@@ -1,6 +1,7 @@
 """What the server says of itself: where a tablet finds it, and a copy of the database that can be relied on."""
 
 import io
+import shutil
 import sqlite3
 import threading
 from contextlib import closing
@@ -14,6 +15,7 @@ from fastapi.testclient import TestClient
 
 from app import network
 from app.data_dir import folder_bytes
+from app.db.backup import SPARE_BYTES
 from app.db.migrate import migrate, newest_revision
 from app.db.session import Database
 from app.main import create_app
@@ -166,7 +168,38 @@ def test_a_backup_comes_as_a_file_with_its_size_and_the_date(client: TestClient)
     [{"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"}, {"Origin": "http://evil.example"},
      {"Host": "evil.example"}],
 )  # fmt: skip
-def test_no_page_of_another_site_gets_a_backup(client: TestClient, headers: dict[str, str]) -> None:
-    answer = client.get("/api/system/backup", headers=headers)
+@pytest.mark.parametrize("path", ["system/backup", "campaigns/1/report.pdf", "campaigns/1/bundle"])
+def test_no_page_of_another_site_sets_a_backup_a_print_or_a_bundle_going(
+    client: TestClient, path: str, headers: dict[str, str]
+) -> None:
+    answer = client.get(f"/api/{path}", headers=headers)
     assert answer.status_code == 403
     assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_a_backup_never_takes_the_room_that_flights_need(
+    client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    room = shutil.disk_usage(settings.data_dir)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _folder: room._replace(free=SPARE_BYTES))
+    answer = client.get("/api/system/backup")
+    assert answer.status_code == 503
+    assert "so that flights can still be stored" in answer.json()["detail"]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _folder: room._replace(free=2 * SPARE_BYTES))
+    assert client.get("/api/system/backup").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("path", "size", "otherwise"),
+    [
+        ("/api/bundles", "1024 MiB", "gainline unbundle"),
+        ("/api/controller-checks", "48 MiB", "gainline controller check"),
+        ("/api/trials/1/photos", "10 MiB", "a lower resolution"),
+        ("/api/campaigns", "1 MiB", "no act of the API needs more"),
+    ],
+)
+def test_what_is_too_large_is_told_its_own_way_out(client: TestClient, path: str, size: str, otherwise: str) -> None:
+    answer = client.post(path, content=b"x", headers={"Content-Length": str(10**10)})
+    assert answer.status_code == 413
+    assert f"at most {size}" in answer.json()["hint"]
+    assert otherwise in answer.json()["hint"]
