@@ -10,13 +10,14 @@ const PICTURES = "image/jpeg,image/png,image/webp";
 
 /** What people keep of a flight beside its record: a note, and photos, straight from the camera on a tablet. */
 export function FlightNotes({ trial }: { trial: Trial }) {
-  const photos = usePhotos(trial.id).data ?? [];
+  const { data: photos = [], error } = usePhotos(trial.id);
   const { add, remove } = usePhotoActs(trial.id);
   const kept = trial.note !== "" || photos.length > 0;
   return (
     <details className={classes["notes"]} open={kept || undefined}>
       <summary>Note and photos</summary>
-      <Note key={`${trial.id} ${trial.version}`} trial={trial} />
+      {/* What is being written outlives a verdict, which makes another version of the trial. */}
+      <Note key={`${trial.id} ${trial.note}`} trial={trial} />
       {photos.length > 0 && (
         <ul className={classes["photos"]}>
           {photos.map(({ id }, index) => (
@@ -48,7 +49,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
           </Button>
         )}
       </FileButton>
-      <Trouble error={add.error ?? remove.error} />
+      <Trouble error={add.error ?? remove.error ?? error} />
     </details>
   );
 }
