@@ -1,23 +1,21 @@
-import { Anchor, SegmentedControl, Skeleton, useComputedColorScheme } from "@mantine/core";
-import { useCallback, useEffect, useState } from "react";
-import { Link, useParams } from "react-router";
-import { useCampaign, useCampaignFigure, useCurveOf, useProposal, useTrials } from "../api/queries";
+import { Skeleton, useComputedColorScheme } from "@mantine/core";
+import { memo, startTransition, useCallback, useEffect, useState } from "react";
+import { useParams } from "react-router";
+import { useCampaign, useCampaignFigure, useProposal, useTrials } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
+import { ByFlightPanels, CurvesPanel } from "../components/CampaignCharts";
 import { CampaignHeader } from "../components/CampaignHeader";
-import { FigurePanel } from "../components/FigurePanel";
+import { FlightsPanel } from "../components/FlightsPanel";
 import { LandscapePanel } from "../components/LandscapePanel";
 import { Missing } from "../components/Missing";
 import { NextFlightCard } from "../components/NextFlightCard";
-import { Panel } from "../components/Panel";
 import { loadPlotly } from "../components/plotly";
 import { StatisticsPanel } from "../components/StatisticsPanel";
-import { TrialsTable } from "../components/TrialsTable";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import { useUnits } from "../components/useUnits";
 import { VerdictPanel } from "../components/VerdictPanel";
 import { pointAt } from "../lib/pointing";
-import { type PlotlyFigure, type Seconds, withChosen, withTimeRange } from "../lib/traces";
 import { shownTrial } from "../lib/verdict";
 import classes from "./CampaignPage.module.css";
 import { NotFoundPage } from "./NotFoundPage";
@@ -56,23 +54,11 @@ function Coming({ campaignId }: { campaignId: number }) {
   );
 }
 
-/** Height of the lower charts: enough for a panel of each gain. */
-const LOWER_PX = 300;
-const PANEL_PX = 84;
-const FIRST_SECONDS = [-0.3, 8] as const;
 const NONE: readonly Trial[] = [];
-/** Of more flights the server gives an envelope, and a flight's own curve when it is asked for. */
-const EACH_DRAWN = 30;
-
-function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure) => PlotlyFigure {
-  return useCallback(
-    (figure) => ({
-      data: withChosen(figure.data, chosen),
-      layout: withTimeRange(figure.layout, span === "first" ? FIRST_SECONDS : null),
-    }),
-    [chosen, span],
-  );
-}
+const Verdict = memo(VerdictPanel);
+const Next = memo(NextFlightCard);
+const Statistics = memo(StatisticsPanel);
+const Landscape = memo(LandscapePanel);
 
 interface View {
   campaign: Campaign;
@@ -83,23 +69,15 @@ interface View {
 
 function CampaignView({ campaign, trials: read, trouble }: View) {
   const trials = read ?? NONE;
-  const theme = useComputedColorScheme("light");
   const [chosen, setChosen] = useState<number | null>(null);
-  const [span, setSpan] = useState("whole");
-  const [zoom, setZoom] = useState<Seconds | null>(null);
   const next = useProposal(campaign.id);
-  const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme, {
-    window: zoom ?? (span === "first" ? FIRST_SECONDS : null),
-    flight: campaign.trials.flown > EACH_DRAWN ? chosen : null,
-  });
-  const errors = useCampaignFigure(campaign.id, "errors", theme);
-  const gains = useCampaignFigure(campaign.id, "gains", theme);
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
-  const curveOf = useCurveOf(trials, experiment);
-  const lower = Math.max(LOWER_PX, PANEL_PX * ((gains.data?.table?.columns.length ?? 1) - 1));
   const shown = shownTrial(trials, chosen);
-  const choose = useCallback((number: number) => setChosen((before) => (before === number ? null : number)), []);
+  const choose = useCallback(
+    (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
+    [],
+  );
   useEffect(() => () => pointAt(null), []);
   return (
     <>
@@ -109,35 +87,9 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <CampaignHeader campaign={campaign} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
         <div className={classes["flown"]}>
-          <FigurePanel
-            title={takeoffs.data?.title ?? "Curves"}
-            card={takeoffs.data}
-            error={takeoffs.error}
-            height={440}
-            topic="curves"
-            dressed={useDressed(chosen, span)}
-            liveTrial={campaign.flying?.trial_id ?? null}
-            onChoose={choose}
-            onWindow={setZoom}
-            curveOf={curveOf}
-            tools={
-              <SegmentedControl
-                aria-label="Time shown"
-                size="sm"
-                value={span}
-                onChange={(value) => {
-                  setSpan(value);
-                  setZoom(null);
-                }}
-                data={[
-                  { value: "first", label: "First 8 s" },
-                  { value: "whole", label: "Whole flight" },
-                ]}
-              />
-            }
-          />
+          <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} onChoose={choose} />
           {shown !== null && (
-            <VerdictPanel
+            <Verdict
               trial={shown}
               trials={trials}
               isBest={shown.id === campaign.best?.trial_id}
@@ -149,52 +101,18 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
         <div className={classes["next"]}>
           {read === null && trouble === null && <Skeleton height={480} radius="md" />}
           {next.data && read !== null ? (
-            <NextFlightCard campaign={campaign} next={next.data} trials={trials} onChoose={setChosen} />
+            <Next campaign={campaign} next={next.data} trials={trials} onChoose={setChosen} />
           ) : (
             <Trouble error={next.error ?? trouble} />
           )}
         </div>
       </div>
       <div className={classes["halves"]}>
-        <FigurePanel
-          title="Error per flight"
-          card={errors.data}
-          error={errors.error}
-          height={lower}
-          topic="threshold"
-          onChoose={choose}
-        />
-        <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={lower} onChoose={choose} />
+        <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
       </div>
-      <LandscapePanel campaignId={campaign.id} />
-      <div className={classes["row"]}>{read !== null && <StatisticsPanel campaignId={campaign.id} />}</div>
-      <Panel
-        title="All flights"
-        className={classes["row"]}
-        tools={
-          trials.length > 0 && (
-            <Anchor component={Link} to={`/compare?campaign=${campaign.id}`} py={12}>
-              Compare flights
-            </Anchor>
-          )
-        }
-      >
-        {read === null ? (
-          <Skeleton height={320} radius="md" />
-        ) : trials.length === 0 ? (
-          <p className={classes["none"]}>
-            Nothing has flown yet. The first flight will stand here with its gains and error.
-          </p>
-        ) : (
-          <TrialsTable
-            campaign={campaign}
-            trials={trials}
-            shown={shown?.number ?? null}
-            unit={unit}
-            onChoose={choose}
-          />
-        )}
-      </Panel>
+      <Landscape campaignId={campaign.id} />
+      <div className={classes["row"]}>{read !== null && <Statistics campaignId={campaign.id} />}</div>
+      <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
     </>
   );
 }
