@@ -5,8 +5,8 @@ import { CampaignPage } from "./pages/CampaignPage";
 import { CampaignsPage } from "./pages/CampaignsPage";
 import { NotFoundPage } from "./pages/NotFoundPage";
 
-const ControllerPage = later("ControllerPage");
 const ComparePage = later("ComparePage");
+const ControllerPage = later("ControllerPage");
 const FlightPage = later("FlightPage");
 const FlyPage = later("FlyPage");
 const JobsPage = later("JobsPage");

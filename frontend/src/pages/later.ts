@@ -1,6 +1,6 @@
 /** Every page that is not looked at first, in one piece: it comes while the first page is idle. */
-export { ControllerPage } from "./ControllerPage";
 export { ComparePage } from "./ComparePage";
+export { ControllerPage } from "./ControllerPage";
 export { FlightPage } from "./FlightPage";
 export { FlyPage } from "./FlyPage";
 export { JobsPage } from "./JobsPage";
