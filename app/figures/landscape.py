@@ -12,19 +12,19 @@ from app.core.policy import Gain, Gains
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.history import FlightData, History
+from app.figures.slices import holds, is_high, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 LEVELS: Final = 9
 """Contours, about."""
 SHOWN_SHARE: Final = 0.8
 """Share of all points that the scale covers; what lies beyond is shaded as off the scale."""
-MOST_NUMBERED: Final = 12
-"""Of more flights only the first, the best and the latest bear their number."""
 _TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
 """The lower the error, the fuller the colour: shares of it from the bottom to the top of the scale."""
 _GROUND: Final = "ground"
-_EDGE: Final = 0.03
 _GAP: Final = 0.09
+_STAR_PX: Final = 17
+"""The best flight's own mark is as wide as the star over it and unseen, so that its number stands clear."""
 _STACK_GAP: Final = 0.085
 
 
@@ -112,14 +112,20 @@ class LandscapeFigure:
         flights, best = self.history.flights, self.history.best
         if not flights:
             return []
-        unit = self.history.error_unit
+        unit, proposal = self.history.error_unit, self.history.proposal
+        stars = [flight is best for flight in flights]
         path = _marks(index, one, [flight.gains for flight in flights], "path") | {
-            "name": "Flights, in their order",
+            "name": "Flights in order",
             "mode": "lines+markers+text",
             "line": theme.line(palette.ink, 1.5),
-            "marker": {"size": 7, "color": palette.surface, "opacity": 1, "line": {"width": 1.5, "color": palette.ink}},
-            "text": _numbers(flights, best, one),
-            "textposition": "top center",
+            "marker": {
+                "size": [_STAR_PX if star else 7 for star in stars],
+                "opacity": [0 if star else 1 for star in stars],
+                "color": palette.surface,
+                "line": {"width": 1.5, "color": palette.ink},
+            },
+            "text": numbers(flights, best, one, aside=None if proposal is None else proposal.gains),
+            "textposition": ["bottom center" if is_high(one, flight.gains) else "top center" for flight in flights],
             "textfont": {"size": 12, "color": palette.ink, "weight": 700},
             "hovertext": [_told(flight, unit) for flight in flights],
         }
@@ -129,7 +135,7 @@ class LandscapeFigure:
             "name": f"Best, flight {best.number}",
             "mode": "markers",
             "marker": {
-                "size": 17,
+                "size": _STAR_PX,
                 "symbol": "star",
                 "color": palette.best,
                 "opacity": 1,
@@ -141,12 +147,12 @@ class LandscapeFigure:
 
     def _line(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
         """From the centre along the direction that was searched, to the edge of the slice."""
-        ends = _to_edge(one, self.landscape.centre, self.search.direction)
+        ends = to_edge(one, self.landscape.centre, self.search.direction)
         if ends is None:
             return []
         is_gradient = bool(self.search.tried)
         line = _marks(index, one, ends, "line") | {
-            "name": "Along the gradient" if is_gradient else "Towards the model's optimum",
+            "name": "Along gradient" if is_gradient else "To the optimum",
             "mode": "lines",
             "line": theme.line(palette.prediction, 2, "dot"),
             "hoverinfo": "skip",
@@ -155,12 +161,12 @@ class LandscapeFigure:
         return [line]
 
     def _tried(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
-        inside = [step for step in self.search.tried if _holds(one, step.gains)]
+        inside = [step for step in self.search.tried if holds(one, step.gains)]
         if not inside:
             return []
         unit = self.history.error_unit
         steps = _marks(index, one, [step.gains for step in inside], "tried") | {
-            "name": "Steps tried on the model",
+            "name": "Tried on model",
             "mode": "markers",
             "marker": {
                 "size": 6,
@@ -179,7 +185,7 @@ class LandscapeFigure:
             return []
         told = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
         mark = _marks(index, one, [proposal.gains], "proposed") | {
-            "name": f"Flight {proposal.number}, proposed",
+            "name": f"Next, flight {proposal.number}",
             "mode": "markers",
             "marker": {
                 "size": 13,
@@ -202,7 +208,7 @@ class LandscapeFigure:
                 _title(named[one.x]),
                 domain=across,
                 anchor=f"y{suffix}",
-                range=_padded(one.x_values),
+                range=padded(one.x_values),
                 nticks=5,
                 showgrid=False,
             ),
@@ -211,7 +217,7 @@ class LandscapeFigure:
                 _title(named[one.y]),
                 domain=up,
                 anchor=f"x{suffix}",
-                range=_padded(one.y_values),
+                range=padded(one.y_values),
                 nticks=6,
                 showgrid=False,
             ),
@@ -351,36 +357,9 @@ def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str) -> dict[st
     }
 
 
-def _numbers(flights: Sequence[FlightData], best: FlightData | None, one: Slice) -> list[str]:
-    """The numbers beside the path, those of one place together at its first flight."""
-    named = flights if len(flights) <= MOST_NUMBERED else [flights[0], *([best] if best else []), flights[-1]]
-    numbers: dict[tuple[float, float], list[int]] = {}
-    for flight in sorted({flight.number: flight for flight in named}.values(), key=lambda flight: flight.number):
-        numbers.setdefault((flight.gains[one.x], flight.gains[one.y]), []).append(flight.number)
-    return [", ".join(map(str, numbers.pop((flight.gains[one.x], flight.gains[one.y]), []))) for flight in flights]
-
-
 def _told(flight: FlightData, unit: str) -> str:
     error = "no error" if flight.error is None else f"{flight.error:.4f} {unit} measured"
     return f"Flight {flight.number}, {error}"
-
-
-def _to_edge(one: Slice, centre: Gains, direction: Gains) -> list[Gains] | None:
-    """The centre, and where the direction leaves the slice; None where it does not lead anywhere in it."""
-    lengths = []
-    for name, values in ((one.x, one.x_values), (one.y, one.y_values)):
-        if slope := direction.get(name, 0.0):
-            edge = values[-1] if slope > 0.0 else values[0]
-            lengths.append((edge - centre[name]) / slope)
-    if not lengths or min(lengths) <= 0.0:
-        return None
-    return [centre, {name: value + min(lengths) * direction.get(name, 0.0) for name, value in centre.items()}]
-
-
-def _holds(one: Slice, gains: Gains) -> bool:
-    return all(
-        values[0] <= gains[name] <= values[-1] for name, values in ((one.x, one.x_values), (one.y, one.y_values))
-    )
 
 
 def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[float]]:
@@ -391,12 +370,6 @@ def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[
     if stacked:
         return [0.0, 1.0], [max(0.0, 1.0 - first - size), 1.0 - first]
     return [first, min(1.0, first + size)], [0.0, 1.0]
-
-
-def _padded(values: Sequence[float]) -> list[float]:
-    """A slice's range, with room for marks that stand on its edge."""
-    room = _EDGE * (values[-1] - values[0])
-    return [values[0] - room, values[-1] + room]
 
 
 def _nice(width: float) -> float:

@@ -1,5 +1,7 @@
 """Contours that one cliff cannot flatten, and a path whose numbers can be read."""
 
+from dataclasses import replace
+
 import pytest
 
 from app.core.landscape import Landscape, Slice
@@ -43,3 +45,22 @@ def test_flights_of_one_place_share_a_number_and_the_line_ends_at_the_edge() -> 
     assert (trace(card, "line")["x"], trace(card, "line")["y"]) == ([4.0, 0.0], [6.0, 8.0])
     assert (trace(card, "tried")["x"], trace(card, "proposed")["x"]) == ([2], [500])
     assert trace(LandscapeFigure(twice, land, search).compute(), "path")["text"] == ["1", "", "2"]
+
+
+def test_numbers_that_would_cover_each_other_are_left_out_but_never_the_first_best_and_latest() -> None:
+    land = Landscape(centre={"kp": 4.0, "ki": 6.0, "kd": 80.0}, slices=(cliff(None),))
+    places = ((1.0, 1.0), (1.2, 1.2), (5.0, 5.0), (5.1, 5.2), (1.1, 1.1), (5.2, 5.1))
+    flights = [
+        replace(flight(number, error), gains={"kp": kp, "ki": ki, "kd": 80.0})
+        for number, (error, (kp, ki)) in enumerate(
+            zip((0.3, 0.2, 0.25, 0.24, 0.26, 0.27), places, strict=True), start=1
+        )
+    ]
+    card = LandscapeFigure(history(*flights), land, Search(gradient={}, direction={})).compute()
+    assert trace(card, "path")["text"] == ["1, 2", "", "", "", "", "6"]
+    spread = [replace(one, gains={**one.gains, "kp": float(one.number)}) for one in flights]
+    card = LandscapeFigure(history(*spread), land, Search(gradient={}, direction={})).compute()
+    assert trace(card, "path")["text"] == ["1", "2", "3", "4", "5", "6"]
+    covering = history(*spread, proposal=replace(proposal(7), gains={"kp": 4.1, "ki": 5.2, "kd": 80.0}))
+    card = LandscapeFigure(covering, land, Search(gradient={}, direction={})).compute()
+    assert trace(card, "path")["text"] == ["1", "2", "3", "", "5", "6"]
