@@ -1,11 +1,15 @@
 """The voltage before and after each flight of a vehicle, by battery."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
 from app.figures.theme import PALETTES, Palette, ThemeName
+
+_BEFORE_PX: Final = 14
+_AFTER_PX: Final = 7
+"""A voltage that did not change is a dot in its ring."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +43,11 @@ class BatteriesFigure:
             palette,
             uirevision="batteries",
             xaxis=theme.titled(
-                palette, "Flight of this vehicle", showgrid=False, dtick=max(1, len(self.flights) // 12)
+                palette,
+                "Flight of this vehicle",
+                showgrid=False,
+                range=[0.5, len(self.flights) + 0.5],
+                dtick=max(1, len(self.flights) // 12),
             ),
             yaxis=theme.titled(palette, "Voltage (V)"),
         )
@@ -72,7 +80,13 @@ class BatteriesFigure:
             "x": [x for flight in own for x in (flight.flight, flight.flight, None)],
             "y": [y for flight in own for y in (flight.before_v, flight.after_v, None)],
             "line": theme.line(colour, 2),
-            "marker": {"color": colour, "size": 9, "opacity": 1, "symbol": [before, after, after] * len(own)},
+            "marker": {
+                "color": colour,
+                "size": [_BEFORE_PX, _AFTER_PX, _AFTER_PX] * len(own),
+                "opacity": 1,
+                "symbol": [before, after, after] * len(own),
+                "line": {"width": [2, 0, 0] * len(own), "color": colour},
+            },
             "meta": {"role": "battery", "battery": label},
             "hovertemplate": f"<b>Flight %{{x}}</b>, {label or 'no label'}<br>%{{y:.2f}} V<extra></extra>",
         }
@@ -80,4 +94,4 @@ class BatteriesFigure:
     def _summary(self, labels: list[str]) -> str:
         counted = [(label, sum(flight.battery == label for flight in self.flights)) for label in labels]
         told = ", ".join(f"{label or 'no label'}: {count} flight{'s' if count > 1 else ''}" for label, count in counted)
-        return f"Open marks are before a flight, full ones after it. {told}."
+        return f"Open marks are before a flight, the smaller full ones after it. {told}."
