@@ -1,6 +1,7 @@
 /** Everything that pages do. The event stream makes the answers doubtful; what comes back is put in at once. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useNavigate } from "react-router";
 import type { RecordFiles } from "../lib/records";
 import { controlHeader } from "../live/leases";
 import { answer } from "./client";
@@ -51,13 +52,19 @@ export function useCreateCampaign() {
   });
 }
 
-/** Plan a trial of a proposal or of gains of one's own, and fly it if the body says so. */
+/** Plan a trial of a proposal or of gains of one's own, and fly it if the body says so; that of a registered vehicle is
+ * otherwise staged: its fly screen opens. Here and not where it was asked for: the card that asked is gone as soon as
+ * the trial is known, and would not hear of it. */
 export function useCreateTrial({ id, vehicle }: Campaign) {
   const settled = useSettled();
+  const navigate = useNavigate();
   return useMutation({
     mutationFn: (body: NewTrial) =>
       answer(createTrial({ path: { campaign_id: id }, body, headers: controlHeader(vehicle.id) })),
-    onSuccess: settled.trial,
+    onSuccess: (trial, { fly }) => {
+      if (vehicle.registered && !fly) void navigate(`/fly/${trial.id}`);
+      return settled.trial(trial);
+    },
     onError: () => settled.ofCampaign(id),
   });
 }

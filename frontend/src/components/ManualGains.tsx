@@ -1,7 +1,6 @@
 import { Button, TextInput } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useState } from "react";
-import { useNavigate } from "react-router";
 import { useCreateTrial } from "../api/mutations";
 import { useCatalogue } from "../api/queries";
 import type { Campaign } from "../api/types";
@@ -36,7 +35,6 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
   const gains = Object.fromEntries(
     readings.flatMap(({ name, value }) => (value === undefined ? [] : [[name, value] as const])),
   );
-  const navigate = useNavigate();
   const { can_fly, needs_staging } = campaign.vehicle;
   const flies = can_fly && !needs_staging;
   const act = flies ? "Fly" : "Plan";
@@ -52,7 +50,7 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
         ...(overrule === undefined ? {} : { overrule }),
         ...(flies ? { fly: { speed } } : {}),
       },
-      { onSuccess: ({ id }) => (needs_staging ? void navigate(`/fly/${id}`) : onClose()) },
+      { onSuccess: onClose },
     );
   }
   return (

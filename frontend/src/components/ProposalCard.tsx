@@ -1,7 +1,6 @@
 import { Button } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useState } from "react";
-import { useNavigate } from "react-router";
 import { type RecordUpload, useCreateTrial } from "../api/mutations";
 import type { Campaign, Proposal, Trial } from "../api/types";
 import { speedOf } from "../lib/nextStep";
@@ -40,9 +39,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const { can_fly, needs_staging, registered } = campaign.vehicle;
   const order = can_fly && !needs_staging ? { fly: { speed: speedOf(speed) } } : {};
   const advice = advised(proposal);
-  const navigate = useNavigate();
-  const toFlyScreen = { onSuccess: ({ id }: Trial) => void navigate(`/fly/${id}`) };
-  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order }, needs_staging ? toFlyScreen : {});
+  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order });
   if (editing) {
     return (
       <Panel title={`Flight ${number}, gains of your own`}>
@@ -88,7 +85,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
                 quiet={!needs_staging || advice.variant !== null || advice.kind === "stop"}
                 loading={create.isPending}
                 disabled={!proposal.gate.passed}
-                onClick={() => create.mutate({ proposal_id: proposal.id }, toFlyScreen)}
+                onClick={() => create.mutate({ proposal_id: proposal.id })}
               />
             ) : (
               <SpeedSwitch value={speed} onChange={setSpeed} />

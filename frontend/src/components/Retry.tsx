@@ -1,6 +1,5 @@
 import { Button } from "@mantine/core";
 import { IconRepeat } from "@tabler/icons-react";
-import { useNavigate } from "react-router";
 import { useCreateTrial } from "../api/mutations";
 import type { Campaign, Trial } from "../api/types";
 import { speedOf } from "../lib/nextStep";
@@ -10,21 +9,17 @@ import { Trouble } from "./Trouble";
 /** The gains of a flight that came to nothing once more: flown at once by a simulation, else to be staged. */
 export function Retry({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
   const create = useCreateTrial(campaign);
-  const navigate = useNavigate();
   const [speed] = useSpeed();
   const { can_fly, needs_staging } = campaign.vehicle;
   if (!campaign.actions.includes("plan") || !can_fly || !["aborted", "invalid"].includes(trial.state)) return null;
-  const retry = (): void => {
-    if (needs_staging) create.mutate({ gains: trial.gains }, { onSuccess: ({ id }) => void navigate(`/fly/${id}`) });
-    else create.mutate({ gains: trial.gains, fly: { speed: speedOf(speed) } });
-  };
+  const order = needs_staging ? {} : { fly: { speed: speedOf(speed) } };
   return (
     <>
       <Button
         variant="default"
         leftSection={<IconRepeat size={18} aria-hidden />}
         loading={create.isPending}
-        onClick={retry}
+        onClick={() => create.mutate({ gains: trial.gains, ...order })}
       >
         Retry these gains
       </Button>
