@@ -6,7 +6,6 @@ from datetime import datetime
 from app.campaigns.schemas import Campaign, CampaignStatistics
 from app.core.policy import Gain
 from app.figures.base import Card
-from app.fleet.schemas import Identity
 from app.trials.schemas import Trial
 
 
@@ -38,7 +37,6 @@ class Report:
     statistics: CampaignStatistics
     trials: tuple[Trial, ...]
     gains: tuple[Gain, ...]
-    identity: Identity | None
     what: tuple[Fact, ...]
     how: tuple[Fact, ...]
     cards: tuple[Card, ...]
@@ -50,11 +48,6 @@ class Report:
     def flown(self) -> tuple[Trial, ...]:
         """Trials that left the ground, the ones in the table of runs."""
         return tuple(trial for trial in self.trials if trial.state in FLOWN)
-
-    @property
-    def first(self) -> Trial | None:
-        """The baseline: the first valid flight."""
-        return next((trial for trial in self.trials if trial.state == "valid"), None)
 
 
 FLOWN = frozenset({"captured", "valid", "aborted", "invalid", "lost"})

@@ -39,7 +39,6 @@ def report_of(session: Session, campaign_id: int) -> Report:
         statistics=statistics,
         trials=trials,
         gains=experiment.space.gains,
-        identity=vehicle.identity,
         what=what_was_tuned(campaign, experiment, vehicle.identity),
         how=how_it_was_tuned(campaign, experiment),
         cards=tuple(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),

@@ -58,6 +58,8 @@ test("a job is named after what it does and leads to where that is seen", () => 
   const proposal: Job = { ...JOB, kind: "proposal", name: "", campaign_id: 4 };
   expect(jobTitle(proposal, titles)).toBe("Next gains of campaign 4");
   expect(jobLink(proposal)).toBe("/campaigns/4");
+  const landscape: Job = { ...JOB, kind: "landscape", name: "campaign 4", campaign_id: 4 };
+  expect(jobTitle(landscape, titles)).toBe("Error landscape of campaign 4");
 });
 
 test("rows stand under their headings, and the nearness to the paper is that of the first with ratios", () => {

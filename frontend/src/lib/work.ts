@@ -47,6 +47,7 @@ export function progressText({ state, done_share: share, doing, remaining_s: lef
 /** What a job does, for a person. `titles` are those of the reproductions by name. */
 export function jobTitle({ kind, name, campaign_id }: Job, titles: ReadonlyMap<string, string>): string {
   if (kind === "proposal") return campaign_id === null ? "Next gains" : `Next gains of campaign ${campaign_id}`;
+  if (kind === "landscape" && campaign_id !== null) return `Error landscape of campaign ${campaign_id}`;
   if (kind === "reproduction") return titles.get(name) ?? name;
   return name === "" ? kind : `${kind} ${name}`;
 }

@@ -49,7 +49,7 @@ export function JobsPage() {
       {isEmpty && (
         <p className={classes["none"]}>
           {filter === "all"
-            ? "Nothing has been computed yet. Proposals and reproductions appear here."
+            ? "Nothing has been computed yet. Proposals, error landscapes and reproductions appear here."
             : GROUPS[filter].none}
         </p>
       )}
