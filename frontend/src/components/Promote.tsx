@@ -22,7 +22,15 @@ export function Promote({ campaign }: { campaign: Campaign }) {
   if (!possible) return <p className={classes["quiet"]}>{why}</p>;
   if (!asking) {
     return (
-      <Button variant="default" leftSection={<IconShieldCheck size={20} aria-hidden />} onClick={() => setAsking(true)}>
+      <Button
+        variant="default"
+        h="auto"
+        mih={48}
+        py={8}
+        styles={{ label: { whiteSpace: "normal" } }}
+        leftSection={<IconShieldCheck size={20} aria-hidden />}
+        onClick={() => setAsking(true)}
+      >
         Make the best gains the safe ones
       </Button>
     );
