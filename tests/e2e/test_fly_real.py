@@ -1,6 +1,5 @@
 """The fly screen with a REAL vehicle: a simulated drone over loopback UDP, registered as real and flown by hand."""
 
-import re
 from collections.abc import Iterator
 
 import pytest
@@ -8,9 +7,23 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.e2e.conftest import Opener, Server, served
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard
+from tests.e2e.flying_by_hand import (
+    DRONE_SPEED,
+    abort,
+    hold,
+    hold_button,
+    hold_until_it_flies,
+    in_state,
+    line_of,
+    middle_of,
+    register,
+    see_it_fly,
+    stage,
+    state_of,
+    take_control,
+    word,
+)
 from tests.runtime.drones import SAFE, TRIED, Drone
-
-DRONE_SPEED = 5.0
 
 
 @pytest.fixture(scope="module")
@@ -26,20 +39,7 @@ def vehicle_id(server: Server, browser: Browser) -> Iterator[int]:
         office = Dashboard(context.new_page(), server.url)
         office.page.goto("/")
         expect(office.page.get_by_text("Live", exact=True)).to_be_visible(timeout=120_000)
-        registered = office.post(
-            "/vehicles",
-            {
-                "name": "Number 1",
-                "kind": "mavlink",
-                "options": {"address": drone.address},
-                "safe_gains_confirmed": True,
-                "statement": "Ada has seen it fly on these",
-            },
-        )
-        assert registered["is_real"]
-        office.post(f"/vehicles/{registered['id']}/connect")
-        in_state(office, registered["id"], "ready")
-        yield registered["id"]
+        yield register(office, drone)
 
 
 @pytest.fixture
@@ -64,72 +64,15 @@ def trial_id(dashboard: Dashboard, vehicle_id: int) -> Iterator[int]:
         dashboard.post(f"/trials/{trial}/abort")
 
 
-def in_state(dashboard: Dashboard, vehicle_id: int, state: str) -> None:
-    dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["state"] == state)
-
-
-def state_of(dashboard: Dashboard, trial_id: int) -> str:
-    state: str = dashboard.get(f"/trials/{trial_id}")["state"]
-    return state
-
-
-def stage(dashboard: Dashboard) -> None:
-    """Take control as Ada, and have the gains set."""
-    dashboard.page.get_by_label("Your name").fill("Ada")
-    dashboard.page.get_by_role("button", name=re.compile("^Take (control|over)$")).click()
-    dashboard.button("Stage").click()
-    expect(dashboard.page.get_by_label("read back")).to_have_count(len(TRIED))
-    expect(hold_button(dashboard.page)).to_be_enabled()
-
-
-def hold_button(page: Page) -> Locator:
-    return page.get_by_role("button", name=re.compile("^(Hold to fly|Hold on)"))
-
-
-def hold(page: Page, seconds: float) -> None:
-    middle_of(page, hold_button(page))
-    page.mouse.down()
-    page.wait_for_timeout(1000 * seconds)
-    page.mouse.up()
-
-
-def hold_until_it_flies(dashboard: Dashboard, trial_id: int) -> None:
-    """A page that hung meanwhile does not count a hold: then it is held once more."""
-    for _ in range(5):
-        hold(dashboard.page, 2.6)
-        for _ in range(50):
-            if dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is not None:
-                return
-            dashboard.page.wait_for_timeout(100)
-    raise AssertionError("it was held five times and did not fly")
-
-
-def middle_of(page: Page, target: Locator) -> tuple[float, float]:
-    """Where the pointer then is."""
-    box = target.bounding_box()
-    assert box is not None
-    place = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(*place)
-    return place
-
-
-def word(dashboard: Dashboard) -> Locator:
-    return dashboard.page.get_by_role("heading", level=1)
-
-
-def line_of(dashboard: Dashboard) -> Locator:
-    """What every page says of the vehicle."""
-    return dashboard.page.get_by_role("region", name=re.compile("^Vehicle "))
-
-
 def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
-    stage(dashboard)
+    take_control(dashboard)
+    stage(dashboard, len(TRIED))
     assert dashboard.get(f"/vehicles/{vehicle_id}")["control"]["operator"] == "Ada"
     expect(line_of(dashboard)).to_contain_text("[300 20 90]safe [283 13 82]")
     hold_until_it_flies(dashboard, trial_id)
     expect(word(dashboard)).to_have_text("Recording")
-    dashboard.until(lambda: (live := dashboard.trace("Live curve", "live")) is not None and len(live["x"]) > 40)
-    dashboard.page.get_by_label("What to do now").get_by_role("button", name=re.compile("^ABORT")).click()
+    see_it_fly(dashboard, 40)
+    abort(dashboard)
     expect(word(dashboard)).to_have_text("Aborted")
     expect(dashboard.page.get_by_role("link", name="Next flight")).to_be_visible()
     trial = dashboard.get(f"/trials/{trial_id}")
@@ -142,7 +85,8 @@ def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, 
 def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
     dashboard: Dashboard, vehicle_id: int, trial_id: int
 ) -> None:
-    stage(dashboard)
+    take_control(dashboard)
+    stage(dashboard, len(TRIED))
     hold_until_it_flies(dashboard, trial_id)
     expect(dashboard.page.get_by_text("Suggested: valid")).to_be_visible(timeout=60_000)
     expect(word(dashboard)).to_have_text("Landed")
@@ -154,7 +98,8 @@ def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
 
 
 def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
-    stage(dashboard)
+    take_control(dashboard)
+    stage(dashboard, len(TRIED))
     hold(dashboard.page, 1.2)
     hold_button(dashboard.page).focus()
     for key in ("Enter", "Space"):
@@ -172,7 +117,8 @@ def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: 
 def test_one_operator_is_in_control_and_a_take_over_is_seen(
     open_dashboard: Opener, dashboard: Dashboard, vehicle_id: int, trial_id: int
 ) -> None:
-    stage(dashboard)
+    take_control(dashboard)
+    stage(dashboard, len(TRIED))
     second = open_dashboard(dashboard.url)
     second.open(f"/fly/{trial_id}")
     expect(second.page.get_by_text("Ada is in control.")).to_be_visible()
@@ -192,7 +138,8 @@ def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_not_before(
     page = dashboard.page
     knob = page.get_by_role("button", name="Motors off – the drone falls")
     expect(knob).to_be_disabled()
-    stage(dashboard)
+    take_control(dashboard)
+    stage(dashboard, len(TRIED))
     hold_until_it_flies(dashboard, trial_id)
     expect(word(dashboard)).to_have_text("Recording")
     knob.click()

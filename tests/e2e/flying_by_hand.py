@@ -1,0 +1,101 @@
+"""What a person does with a registered vehicle at the fly screen: take control, stage, hold to fly."""
+
+import re
+
+from playwright.sync_api import Locator, Page, expect
+
+from tests.e2e.dashboard import Dashboard
+from tests.runtime.drones import Drone
+
+DRONE_SPEED = 5.0
+
+
+def register(dashboard: Dashboard, drone: Drone) -> int:
+    """The drone as a REAL vehicle of the server, connected."""
+    registered = dashboard.post(
+        "/vehicles",
+        {
+            "name": "Number 1",
+            "kind": "mavlink",
+            "options": {"address": drone.address},
+            "safe_gains_confirmed": True,
+            "statement": "Ada has seen it fly on these",
+        },
+    )
+    assert registered["is_real"]
+    vehicle_id: int = registered["id"]
+    dashboard.post(f"/vehicles/{vehicle_id}/connect")
+    in_state(dashboard, vehicle_id, "ready")
+    return vehicle_id
+
+
+def in_state(dashboard: Dashboard, vehicle_id: int, state: str) -> None:
+    dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["state"] == state)
+
+
+def state_of(dashboard: Dashboard, trial_id: int) -> str:
+    state: str = dashboard.get(f"/trials/{trial_id}")["state"]
+    return state
+
+
+def take_control(dashboard: Dashboard) -> None:
+    """As Ada."""
+    dashboard.page.get_by_label("Your name").fill("Ada")
+    dashboard.page.get_by_role("button", name=re.compile("^Take (control|over)$")).click()
+
+
+def stage(dashboard: Dashboard, gains: int) -> None:
+    """Have so many gains set, and see each one read back."""
+    dashboard.button("Stage").click()
+    expect(dashboard.page.get_by_label("read back")).to_have_count(gains)
+    expect(hold_button(dashboard.page)).to_be_enabled()
+
+
+def hold_button(page: Page) -> Locator:
+    return page.get_by_role("button", name=re.compile("^(Hold to fly|Hold on)"))
+
+
+def hold(page: Page, seconds: float) -> None:
+    middle_of(page, hold_button(page))
+    page.mouse.down()
+    page.wait_for_timeout(1000 * seconds)
+    page.mouse.up()
+
+
+def hold_until_it_flies(dashboard: Dashboard, trial_id: int) -> None:
+    """A page that hung meanwhile does not count a hold: then it is held once more."""
+    for _ in range(5):
+        hold(dashboard.page, 2.6)
+        for _ in range(50):
+            if dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is not None:
+                return
+            dashboard.page.wait_for_timeout(100)
+    raise AssertionError("it was held five times and did not fly")
+
+
+def see_it_fly(dashboard: Dashboard, points: int) -> None:
+    """Until the live curve has more than so many."""
+    dashboard.until(lambda: (live := dashboard.trace("Live curve", "live")) is not None and len(live["x"]) > points)
+
+
+def abort(dashboard: Dashboard) -> None:
+    """The big button, beside the vehicle's own in the bar."""
+    dashboard.page.get_by_label("What to do now").get_by_role("button", name=re.compile("^ABORT")).click()
+
+
+def middle_of(page: Page, target: Locator) -> tuple[float, float]:
+    """Where the pointer then is."""
+    box = target.bounding_box()
+    assert box is not None
+    place = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(*place)
+    return place
+
+
+def word(dashboard: Dashboard) -> Locator:
+    return dashboard.page.get_by_role("heading", level=1)
+
+
+def line_of(dashboard: Dashboard) -> Locator:
+    """What every page says of the vehicle."""
+    return dashboard.page.get_by_role("region", name=re.compile("^Vehicle "))
