@@ -104,8 +104,8 @@ def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
     """The operator's own act, after which a staged vehicle takes off. For a real one it has to come from a page of
     ours, with the token of who is in control, on a server that nobody else reaches.
 
-    Raises ConflictError when nothing is staged, the word was given already, or somebody else is in control;
-    NotAllowedError otherwise.
+    Raises ConflictError when nothing is staged, the word was given already, somebody else is in control, or the
+    rehearsal does not stand any more; NotAllowedError otherwise.
     """
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "take-off", row.state, f"Trial {row.number}")
@@ -115,6 +115,7 @@ def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
     vehicle = campaign.vehicle
     if fleet.needs_staging(vehicle):
         require_control(vehicle, asker)
+        rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may have been found bad while staged
     else:
         require_no_other(vehicle, asker)
     flight.take_off_at = utc_now()

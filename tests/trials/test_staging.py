@@ -112,6 +112,19 @@ def test_without_anybody_in_control_nothing_real_takes_off(client: TestClient, s
     assert take_off(client, staged, OUR_PAGE) == (409, "Nobody is in control of Drone.")
 
 
+def test_a_rehearsal_that_is_found_bad_while_its_vehicle_is_staged_keeps_it_on_the_ground(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    rehearsal = get(client, f"/api/campaigns/{staged['campaign_id']}")["rehearsal"]
+    flown = get(client, f"/api/campaigns/{rehearsal['campaign_id']}/trials")["items"][1]
+    body = {"version": flown["version"], "outcome": "invalid", "reason": "it flew with the wrong mass"}
+    assert client.post(f"/api/trials/{flown['id']}/classify", json=body).status_code == 200
+    status, sentence = take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
+    assert (status, sentence.endswith("has not passed its rehearsal: flight 2 is invalid.")) == (409, True)
+    assert is_wanted(database, staged) == (False, None)
+    assert trial(client, staged)["flight"]["take_off_at"] is None
+
+
 def test_the_word_sent_twice_with_one_key_is_one_word(client: TestClient, real: Json, staged: Json) -> None:
     headers = {**OUR_PAGE, **control_header(client, real), "Idempotency-Key": "hold"}
     assert take_off(client, staged, headers) == (202, "")
