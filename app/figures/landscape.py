@@ -15,6 +15,8 @@ from app.figures.history import FlightData, History
 from app.figures.slices import holds, is_high, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
 
+LONGEST_PATH: Final = 60
+"""Of more flights the path shows the latest, and the first and the best."""
 LEVELS: Final = 9
 """Contours, about."""
 SHOWN_SHARE: Final = 0.8
@@ -108,14 +110,20 @@ class LandscapeFigure:
             *self._proposed(palette, index, one),
         ]
 
+    def _shown(self) -> list[FlightData]:
+        """All flights, or of many the latest, with the first and the best before them."""
+        earlier = self.history.flights[:-LONGEST_PATH]
+        kept = [flight for flight in earlier if flight is earlier[0] or flight is self.history.best]
+        return [*kept, *self.history.flights[-LONGEST_PATH:]]
+
     def _path(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
-        flights, best = self.history.flights, self.history.best
+        flights, best = self._shown(), self.history.best
         if not flights:
             return []
         unit, proposal = self.history.error_unit, self.history.proposal
         stars = [flight is best for flight in flights]
         path = _marks(index, one, [flight.gains for flight in flights], "path") | {
-            "name": "Flights in order",
+            "name": "Flights in order" if len(flights) == len(self.history.flights) else f"Last {LONGEST_PATH} flights",
             "mode": "lines+markers+text",
             "line": theme.line(palette.ink, 1.5),
             "marker": {
@@ -309,7 +317,8 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
         "xaxis": f"x{suffix}",
         "yaxis": f"y{suffix}",
         "showscale": False,
-        "line": {"width": 0.9, "color": theme.faint(palette.dim, 0.75), "smoothing": 1},
+        # Straight pieces: to place labels along smooth ones takes Plotly most of a second.
+        "line": {"width": 0.9, "color": theme.faint(palette.dim, 0.75), "smoothing": 0},
     }
     ground = common | {
         "name": "Predicted error",
@@ -334,7 +343,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
         "legendgroup": "beyond",
         "contours": {"type": "constraint", "operation": "<", "value": scale.high},  # Plotly shades what is refused
         "fillcolor": theme.mixed(palette.earlier, palette.surface, 0.4),
-        "line": {"width": 0.9, "color": palette.earlier, "smoothing": 1},
+        "line": {"width": 0.9, "color": palette.earlier, "smoothing": 0},
         "hoverinfo": "skip",
         "meta": {"role": "beyond", "slice": index},
     }
