@@ -24,7 +24,8 @@ const coarse = window.matchMedia("(pointer: coarse)");
 /** Brushing zooms with a mouse; a finger has to be able to scroll the page. */
 function layoutFor({ data, layout }: PlotlyFigure, width: number): Record<string, unknown> {
   const fitting = width < NARROW_PX ? narrowed(layout, data) : layout;
-  return { ...fitting, autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
+  // A copy: Plotly writes a zoom into the layout that it is given, and the figure has to stay what it was.
+  return { ...structuredClone(fitting), autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
 }
 
 function wholeOf({ layout }: PlotlyFigure): Seconds | null {
