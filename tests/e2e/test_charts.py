@@ -31,7 +31,17 @@ def page_of_many(open_dashboard: Opener, crowded: tuple[Server, int]) -> Dashboa
     dashboard.open_campaign(campaign_id)
     for chart in ("errors", "gains"):
         expect(dashboard.plot(chart)).to_be_visible()
+    expect(row(dashboard, FLIGHTS)).to_be_attached()
+    at_rest(dashboard)
     return dashboard
+
+
+def at_rest(dashboard: Dashboard) -> None:
+    """Wait until nothing on the page moves any more, so that a place on it stays what it is."""
+    heights: list[object] = []
+    while len(heights) < 10 or len(set(map(str, heights[-10:]))) > 1:
+        heights.append(dashboard.plot("errors").bounding_box())
+        dashboard.page.wait_for_timeout(100)
 
 
 def row(dashboard: Dashboard, flight: int) -> Locator:
@@ -92,19 +102,37 @@ def test_a_flight_that_is_pointed_at_stands_out_as_curve_mark_and_row(page_of_ma
     np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)
 
 
-def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None:
-    number = best_of(page_of_many)["trial_number"]
-    chart = page_of_many.plot("errors")
-    chart.scroll_into_view_if_needed()
-    place = chart.evaluate(
+def place_of(chart: Locator, flight: int) -> tuple[float, float]:
+    """Where the mark of its error is drawn."""
+    x, y = chart.evaluate(
         """(chart, number) => {
           const {xaxis, yaxis} = chart._fullLayout, box = chart.getBoundingClientRect();
           const marks = chart.data.find(trace => trace.meta.role === 'measured');
           const at = marks.x.indexOf(number);
           return [box.x + xaxis._offset + xaxis.l2p(number), box.y + yaxis._offset + yaxis.l2p(marks.y[at])];
         }""",
-        number,
+        flight,
     )
+    return x, y
+
+
+def brush(dashboard: Dashboard, first: tuple[float, float], last: tuple[float, float]) -> None:
+    mouse = dashboard.page.mouse
+    mouse.move(*first)
+    mouse.down()
+    mouse.move(*last, steps=5)
+    mouse.up()
+
+
+def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None:
+    number = best_of(page_of_many)["trial_number"]
+    chart = page_of_many.plot("errors")
+    chart.scroll_into_view_if_needed()
+    at_rest(page_of_many)
+    x, y = place_of(chart, number)
+    brush(page_of_many, (x - 15, y - 60), (x + 15, y - 60))  # else a pixel holds three flights
+    at_rest(page_of_many)
+    place = place_of(chart, number)
     page_of_many.page.mouse.move(place[0] - 3, place[1])
     page_of_many.page.mouse.move(*place)
     expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
@@ -139,10 +167,8 @@ def test_a_zoom_shows_more_of_each_record_and_a_double_click_all_again(page_of_m
     box = page_of_many.plot("takeoffs").locator(".nsewdrag").first.bounding_box()
     assert box is not None
     middle = box["y"] + 0.5 * box["height"]
-    page_of_many.page.mouse.move(box["x"] + 0.3 * box["width"], middle)
-    page_of_many.page.mouse.down()
-    page_of_many.page.mouse.move(box["x"] + 0.4 * box["width"], middle, steps=5)
-    page_of_many.page.mouse.up()
+    start, end = (box["x"] + share * box["width"] for share in (0.3, 0.4))
+    brush(page_of_many, (start, middle), (end, middle))
     page_of_many.until(lambda: len(drawn()["x"]) > before + 200)
     seconds = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
     assert 8.0 < seconds[0] < seconds[1] < 15.0

@@ -68,6 +68,7 @@ export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, 
   });
   chart.on?.("plotly_hover", ({ points }) => chart.matches(":hover") && pointAt(flightOf(points)));
   chart.on?.("plotly_unhover", () => chart.matches(":hover") && pointAt(null));
+  chart.onmouseleave = () => pointAt(null);
   let settling: ReturnType<typeof setTimeout> | undefined;
   chart.on?.("plotly_relayout", (event) => {
     const seconds = whole && onWindow ? windowFrom(event, whole) : undefined;
