@@ -25,6 +25,9 @@ VERSION: Final = 1
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
+MAX_CAMPAIGNS: Final = 20
+"""In one bundle."""
+
 JsonObject = dict[str, Any]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
@@ -191,4 +194,4 @@ class Campaign(_Strict):
 class Contents(_Strict):
     """The campaign last, after those that it starts from, the first of them first."""
 
-    campaigns: Annotated[list[Campaign], Field(min_length=1, max_length=20)]
+    campaigns: Annotated[list[Campaign], Field(min_length=1, max_length=MAX_CAMPAIGNS)]

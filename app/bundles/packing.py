@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Final
 
+from pydantic import ValidationError
 from sqlalchemy.orm import Session
 
 from app import __version__
@@ -27,6 +28,7 @@ from app.bundles.contents import (
 )
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.types import utc_now
+from app.errors import ConflictError
 from app.fleet.elsewhere import origin_of
 from app.trials import history
 from app.trials.photos import ENDINGS
@@ -46,9 +48,13 @@ class Packer:
         self._digests: dict[str, str] = {}
 
     def pack(self, campaigns: Sequence[CampaignRow]) -> None:
-        """All of it; the campaign last, after those that it starts from."""
+        """All of it; the campaign last, after those that it starts from. Raises ConflictError for what a bundle cannot
+        hold."""
         with self._zip:
-            contents = Contents(campaigns=[self._campaign(row) for row in campaigns])
+            try:
+                contents = Contents(campaigns=[self._campaign(row) for row in campaigns])
+            except ValidationError as error:
+                raise _too_much(error) from error
             self._write(CONTENTS, _json(contents.model_dump(mode="json")), squeeze=True)
             manifest = Manifest(
                 format=FORMAT, version=VERSION, program=__version__, made_at=utc_now(), parts=self._digests
@@ -131,6 +137,16 @@ class Packer:
             logs.insert(0, telemetry_log(self._data_dir, flight))
         found = next((log for log in logs if log.is_file()), None)
         return None if found is None else self._write(f"telemetry/{row.id}.tlog", found.read_bytes(), squeeze=True)
+
+
+def _too_much(error: ValidationError) -> ConflictError:
+    """What the database holds and a bundle may not: longer lists, mostly."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(map(str, first["loc"]))
+    return ConflictError(
+        f"This campaign, or one that it starts from, does not fit into a bundle: {where}: {first['msg']}.",
+        hint="Nothing is lost: its report and the records of its trials can be taken one by one.",
+    )
 
 
 def _vehicle(row: VehicleRow) -> Vehicle:

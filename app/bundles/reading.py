@@ -5,9 +5,11 @@ Parts are read by name and never written where they say; each is bounded while i
 
 import hashlib
 import json
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
+from io import SEEK_END
 from types import TracebackType
 from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
 
@@ -28,6 +30,7 @@ MAX_PART_BYTES: Final = 256 * 2**20
 MAX_TOTAL_BYTES: Final = 4 * 2**30
 MAX_NUMBERS: Final = 20_000_000
 """In one record: columns times samples."""
+_IN_MEMORY_BYTES: Final = 64 * 2**20
 _METHODS: Final = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 _ENCRYPTED: Final = 0x1
 _WIDTH: Final = 4
@@ -35,8 +38,30 @@ _WIDTH: Final = 4
 M = TypeVar("M", bound=BaseModel)
 
 
+class _Unpacked:
+    """Parts that were looked at, set aside: what stores them within a transaction has but to read them."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES, prefix="gainline-bundle-")  # noqa: SIM115  # until `close`
+        self._places: dict[str, tuple[int, int]] = {}
+
+    def keep(self, name: str, data: bytes) -> None:
+        self._places[name] = self._file.seek(0, SEEK_END), len(data)
+        self._file.write(data)
+
+    def get(self, name: str) -> bytes | None:
+        """None for a part that was not kept."""
+        if (place := self._places.get(name)) is None:
+            return None
+        self._file.seek(place[0])
+        return self._file.read(place[1])
+
+    def close(self) -> None:
+        self._file.close()
+
+
 class Bundle:
-    """An opened bundle whose manifest and contents were read; `check` looks at everything else."""
+    """An opened bundle whose manifest and contents were read; `check` looks at everything else, and unpacks it."""
 
     def __init__(self, file: BinaryIO) -> None:
         """Raises InputError naming what is wrong with it."""
@@ -49,7 +74,8 @@ class Bundle:
         listed = self.manifest.parts.keys() | {MANIFEST}
         if odd := sorted(listed ^ set(self._zip.namelist())):
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip are not the same: {odd[0][:80]!r}")
-        self.contents = _parsed(CONTENTS, self.part(CONTENTS, MAX_JSON_BYTES), Contents)
+        self.contents = _parsed(CONTENTS, self._listed(CONTENTS, MAX_JSON_BYTES), Contents)
+        self._unpacked = _Unpacked()  # last: a bundle that is refused has nothing to close
 
     def __enter__(self) -> Self:
         return self
@@ -58,14 +84,14 @@ class Bundle:
         self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
     ) -> None:
         self._zip.close()
+        self._unpacked.close()
 
     def part(self, name: str, limit: int = MAX_PART_BYTES) -> bytes:
         """A part as it was written. Raises InputError when it is missing, too large, or not the one of the manifest."""
-        if name not in self.manifest.parts:
-            _refuse(name, "is named in the contents, and is not in the bundle")
-        data = self._read(name, limit)
-        if hashlib.sha256(data).hexdigest() != self.manifest.parts[name]:
-            _refuse(name, "does not have the SHA-256 that the manifest says: the file was damaged or changed")
+        if (kept := self._unpacked.get(name)) is not None:
+            return kept
+        data = self._listed(name, limit)
+        self._unpacked.keep(name, data)
         return data
 
     def check(self) -> None:
@@ -86,6 +112,14 @@ class Bundle:
                     self.part(trial.telemetry)
         if idle := sorted(self.manifest.parts.keys() - used):
             _refuse(idle[0], "belongs to nothing in the contents")
+
+    def _listed(self, name: str, limit: int) -> bytes:
+        if name not in self.manifest.parts:
+            _refuse(name, "is named in the contents, and is not in the bundle")
+        data = self._read(name, limit)
+        if hashlib.sha256(data).hexdigest() != self.manifest.parts[name]:
+            _refuse(name, "does not have the SHA-256 that the manifest says: the file was damaged or changed")
+        return data
 
     def _look_at_directory(self) -> None:
         infos = self._zip.infolist()

@@ -5,20 +5,21 @@ from typing import IO
 
 from sqlalchemy.orm import Session
 
+from app.bundles.contents import MAX_CAMPAIGNS
 from app.bundles.packing import Packer
 from app.bundles.reading import Bundle
 from app.bundles.storing import keep_telemetry, store
 from app.campaigns import service as campaigns
 from app.campaigns.schemas import Campaign
 from app.db.models import CampaignRow
-from app.errors import BusyError
+from app.errors import BusyError, ConflictError
 from app.trials import history
 
 
 def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[bytes]) -> str:
     """Write the campaign, after those that it starts from; gives the name for the file.
 
-    Raises NotFoundError, and BusyError while it has a flight under way.
+    Raises NotFoundError, BusyError while it has a flight under way, and ConflictError for more than a bundle holds.
     """
     row = campaigns.get_row(session, campaign_id)
     chain = _chain(session, row)
@@ -33,19 +34,33 @@ def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[byt
 
 def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
     """The campaign and those that it starts from, the first of them first: without them its first gains could not be
-    computed again."""
+    computed again, so none can be left out."""
     chain = [row]
     while (donor := (chain[0].definition.get("start") or {}).get("donor")) is not None:
         found = campaigns.get_row(session, donor["campaign_id"])
         if any(found is known for known in chain):
             break
         chain.insert(0, found)
+    if len(chain) > MAX_CAMPAIGNS:
+        raise ConflictError(
+            f"Campaign {row.id} goes back over {len(chain) - 1} warm starts, and a bundle holds {MAX_CAMPAIGNS} "
+            "campaigns: without the first of them its gains could not be computed again.",
+            hint=f"Take the bundle of an earlier one of them (campaign {chain[MAX_CAMPAIGNS - 1].id} is the last that "
+            "fits), or the report and the records of this one.",
+        )
     return chain
 
 
 def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> Campaign:
     """A new campaign from a checked bundle, and those that it starts from. Raises InputError for what this version
-    cannot hold."""
+    cannot hold, ConflictError while anything flies: a large bundle holds the write lock for longer than a flight
+    waits."""
+    if (flight := history.any_flight_under_way(session)) is not None:
+        raise ConflictError(
+            f"Campaign {flight.campaign_id} has a flight asked for, staged or under way, and storing a bundle would "
+            "keep its commands and its record waiting.",
+            hint="Bring the bundle in once it has landed, or unstage it.",
+        )
     arrived = store(session, bundle)
     keep_telemetry(bundle, arrived, data_dir)
     return campaigns.get_campaign(session, arrived.rows[-1].id)

@@ -108,6 +108,11 @@ def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:
     return repository.flight_of_campaign_under_way(session, campaign_id)
 
 
+def any_flight_under_way(session: Session) -> FlightRow | None:
+    """A flight of any campaign that is asked for, staged or flying."""
+    return repository.first_under_way(session)
+
+
 def has_begun_flight(session: Session, campaign_id: int) -> bool:
     """Whether a worker has begun any flight of the campaign, so that its vehicle's ledger needs it."""
     return repository.has_claimed_flight(session, campaign_id)

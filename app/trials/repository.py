@@ -123,6 +123,11 @@ def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRo
     )
 
 
+def first_under_way(session: Session) -> FlightRow | None:
+    """Of whatever vehicle."""
+    return session.scalar(select(FlightRow).where(FlightRow.state.in_(UNDER_WAY)).order_by(FlightRow.id).limit(1))
+
+
 def first_requested(session: Session) -> FlightRow | None:
     """The flight that has waited longest."""
     return session.scalar(

@@ -1,11 +1,14 @@
 """A campaign out of one installation and into another: every number is the same, and nothing more than it can be."""
 
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
+from app.bundles.reading import Bundle
+from app.bundles.service import store_bundle
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.session import Database
 from app.settings import Settings
@@ -175,6 +178,64 @@ def test_a_campaign_in_the_air_stays_with_its_vehicle(client: TestClient, databa
     refused = client.get(f"/api/campaigns/{ready['id']}/bundle")
     assert refused.status_code == 409
     assert "under way" in refused.json()["detail"]
+
+
+def test_nothing_is_brought_in_while_anything_is_staged_or_flies(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    bundle = take(client, campaign["id"])
+    ready = create_ready_campaign(client, database)
+    create_trial(client, ready["id"], fly={"speed": None})
+    task = lift_off(database)
+    refused = bring(client, bundle)
+    assert refused.status_code == 409, refused.text
+    assert f"Campaign {ready['id']} has a flight" in refused.json()["detail"]
+    land(database, task, modelled(task.gains))
+    brought(client, bundle)
+
+
+def test_a_bundle_is_unpacked_and_hashed_before_the_transaction_that_stores_it(
+    client: TestClient, database: Database, campaign: Json, settings: Settings
+) -> None:
+    """A writer is let in until the very moment of storing; from then on the zip is not touched any more."""
+    with Bundle(BytesIO(take(client, campaign["id"]))) as bundle:
+        bundle.check()
+        bundle._zip.close()
+        with database.write() as session:
+            arrived = store_bundle(session, bundle, settings.data_dir)
+    assert arrived.trials.flown == campaign["trials"]["flown"]
+
+
+def test_a_longer_chain_of_warm_starts_than_a_bundle_holds_is_refused_in_words(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    ids = [campaign["id"]]
+    with database.write() as session:
+        donor = session.get_one(CampaignRow, campaign["id"])
+        names = set(CampaignRow.__mapper__.columns.keys()) - {"id", "definition", "version"}
+        same = {name: getattr(donor, name) for name in names}
+        for _ in range(20):
+            named = {"campaign_id": ids[-1], "trial_number": 1, "checksum": "0" * 64}
+            start = {"kind": "campaign", "gains": donor.safe_gains, "donor": named}
+            row = CampaignRow(**same, definition={**donor.definition, "start": start})
+            session.add(row)
+            session.flush()
+            ids.append(row.id)
+    assert client.get(f"/api/campaigns/{ids[19]}/bundle").status_code == 200
+    refused = client.get(f"/api/campaigns/{ids[20]}/bundle")
+    assert refused.status_code == 409, refused.text
+    assert "goes back over 20 warm starts, and a bundle holds 20 campaigns" in refused.json()["detail"]
+    assert f"campaign {ids[19]} is the last that fits" in refused.json()["hint"]
+
+
+def test_what_a_bundle_cannot_hold_is_refused_in_words(client: TestClient, database: Database, campaign: Json) -> None:
+    with database.write() as session:
+        trial = session.query(TrialRow).order_by(TrialRow.id).first()
+        assert trial is not None
+        trial.curve = [[float(time), 0.0] for time in range(5001)]
+    refused = client.get(f"/api/campaigns/{campaign['id']}/bundle")
+    assert refused.status_code == 409, refused.text
+    assert "does not fit into a bundle: curve: List should have at most 5000 items" in refused.json()["detail"]
 
 
 def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestClient, campaign: Json) -> None:
