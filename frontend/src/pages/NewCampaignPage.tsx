@@ -184,16 +184,17 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       </Accordion>
       <Trouble error={create.error} shown={[...plain, ...advanced]} />
       {unread.length > 0 && <p role="status">Not a number yet: {unread.join(", ")}.</p>}
-      <Button
-        type="submit"
-        size="lg"
-        disabled={unread.length > 0}
-        loading={create.isPending}
-        leftSection={<IconPlus size={22} aria-hidden />}
-        className={classes["create"]}
-      >
-        Create campaign
-      </Button>
+      <div className={classes["create"]}>
+        <Button
+          type="submit"
+          size="lg"
+          disabled={unread.length > 0}
+          loading={create.isPending}
+          leftSection={<IconPlus size={22} aria-hidden />}
+        >
+          Create campaign
+        </Button>
+      </div>
     </form>
   );
 }
