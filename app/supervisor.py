@@ -1,5 +1,7 @@
 """Keeps one child process running: started again with back-off when it dies, stopped with patience."""
 
+import os
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -16,6 +18,7 @@ HEALTHY_AFTER_S: Final = 20.0
 """A child that lived this long starts again after the shortest pause."""
 PATIENCE_S: Final = 60.0
 """How long a child that was asked to stop may take to land what flies and to record it: landing alone may take 40 s."""
+TELLS_WITHIN_S: Final = 0.5
 
 _log = structlog.get_logger(__name__)
 T = TypeVar("T")
@@ -52,6 +55,7 @@ class Supervisor(Generic[T]):
         finally:
             if process.is_alive():
                 _log.error("child did not stop and is killed", child=self._name, pid=process.pid)
+                _have_it_tell(process)
                 process.kill()
                 process.join()
 
@@ -83,3 +87,10 @@ class Supervisor(Generic[T]):
             if not self._stopping.wait(pause_s):
                 self._process = self._start()
                 started_s = time.monotonic()
+
+
+def _have_it_tell(process: BaseProcess) -> None:
+    """Where its threads hang, on standard error (`app.observability`)."""
+    if process.pid is not None:
+        os.kill(process.pid, signal.SIGUSR1)
+        time.sleep(TELLS_WITHIN_S)

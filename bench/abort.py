@@ -44,6 +44,9 @@ DRONE_SPEED: Final = 5.0
 SAFE_KP: Final = 283.0
 TRIED: Final = {"kp": 300, "ki": 20, "kd": 90}
 PATIENCE_S: Final = 60.0
+SLOW_END_S: Final = 30.0
+ENDS_WITHIN_S: Final = 90.0
+"""Longer than a server waits for its worker."""
 ORDERS_EVERY_S: Final = 0.4
 """Each is written down afterwards, which costs the worker more than to pass it on."""
 SEED: Final = 20261121
@@ -134,8 +137,13 @@ def program(*arguments: str, until: str) -> Iterator[str]:
             yield line
         finally:
             process.send_signal(signal.SIGINT)
+            asked_s = time.monotonic()
             try:
-                process.wait(PATIENCE_S)
+                process.wait(ENDS_WITHIN_S)
+                if (took_s := time.monotonic() - asked_s) > SLOW_END_S:
+                    print(f"gainline {arguments[0]} took {took_s:.0f} s to end:", file=sys.stderr)
+                    said.seek(0)
+                    print("".join(said.readlines()[-300:]), file=sys.stderr)
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGUSR1)  # say what every thread does
                 time.sleep(1.0)
