@@ -115,7 +115,7 @@ def test_the_page_says_that_the_server_is_away_and_catches_up(open_dashboard: Op
     dashboard.open_campaign(campaign_id)
     own_server.stop()
     expect(dashboard.page.get_by_text("Server away")).to_be_visible()
-    expect(dashboard.page.get_by_text("The server does not answer.")).to_be_visible()
+    expect(dashboard.page.get_by_role("banner").get_by_text("The server does not answer.")).to_be_visible()
     own_server.start()
     expect(dashboard.page.get_by_text("Live", exact=True)).to_be_visible(timeout=30_000)
     dashboard.fly_headless(campaign_id, 1)
