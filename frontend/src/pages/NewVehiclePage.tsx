@@ -180,7 +180,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         disabled={unread.length > 0}
         loading={register.isPending}
         leftSection={<IconPlus size={22} aria-hidden />}
-        className={classes["create"]}
+        className={classes["submit"]}
       >
         Register
       </Button>
