@@ -375,8 +375,10 @@ def test_an_error_says_what_happened_and_what_to_do(
 
 def test_a_server_that_cannot_be_reached_is_told_with_what_became_of_the_act(dashboard: Dashboard) -> None:
     dashboard.open("/new")
+    create = dashboard.button("Create campaign")
+    expect(create).to_be_visible()
     dashboard.page.context.set_offline(True)
-    dashboard.button("Create campaign").click()
+    create.click()
     alert = dashboard.page.get_by_role("alert")
     expect(alert).to_contain_text("The server cannot be reached.")
     expect(alert).to_contain_text("not known whether")

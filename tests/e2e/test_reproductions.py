@@ -15,6 +15,7 @@ def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, 
     dashboard = open_dashboard(own_server.url)
     page = dashboard.page
     dashboard.open("/")
+    dashboard.button("More pages").click()
     page.get_by_role("navigation", name="Pages").get_by_role("link", name="Reproductions").click()
     card = page.get_by_role("article", name=FIG6)
     expect(card.get_by_text("Not run yet.")).to_be_visible()

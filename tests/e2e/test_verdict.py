@@ -99,6 +99,21 @@ def test_a_note_and_a_photo_stay_with_the_flight(dashboard: Dashboard, campaign_
     assert dashboard.get(f"/trials/{trial['id']}/photos") == []
 
 
+def test_a_note_that_is_being_written_outlives_a_verdict(dashboard: Dashboard, campaign_id: int) -> None:
+    trial = dashboard.trials(campaign_id)[0]
+    verdict = open_flight(dashboard, trial)
+    verdict.get_by_text("Note and photos").click()
+    verdict.get_by_label("Note on flight 1").fill("Gust from the north")
+    verdict.get_by_role("button", name="Mark invalid").click()
+    verdict.get_by_text("Wind gust").click()
+    verdict.get_by_role("button", name="Mark invalid").click()
+    expect(verdict.get_by_role("button", name="Undo: count it as valid")).to_be_visible()
+    expect(verdict.get_by_label("Note on flight 1")).to_have_value("Gust from the north")
+    verdict.get_by_role("button", name="Keep the note").click()
+    expect(verdict.get_by_role("button", name="Keep the note")).to_have_count(0)
+    assert dashboard.get(f"/trials/{trial['id']}")["note"] == "Gust from the north"
+
+
 def test_it_fits_on_a_phone(open_dashboard: Opener, shared_server: Server) -> None:
     dashboard = open_dashboard(shared_server.url, viewport=PHONE)
     campaign_id = dashboard.create("twin")

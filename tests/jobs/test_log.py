@@ -10,12 +10,10 @@ from app.jobs import service as jobs
 from app.settings import Settings
 from tests.builders import get
 
-NOW = datetime.now(UTC)
-
 
 def line(after_s: float, message: str, job_id: int = 1, **more: object) -> str:
     said = {"event": message, "job_id": job_id, "level": "info", "logger": "app", **more}
-    return json.dumps({**said, "timestamp": (NOW + timedelta(seconds=after_s)).isoformat()})
+    return json.dumps({**said, "timestamp": (datetime.now(UTC) + timedelta(seconds=after_s)).isoformat()})
 
 
 def test_a_job_s_lines_are_found_in_turned_over_files_too_and_nobody_elses(
@@ -28,7 +26,7 @@ def test_a_job_s_lines_are_found_in_turned_over_files_too_and_nobody_elses(
     older = [line(-3600, "of an older database"), line(60, "job begun", order="name: table1")]
     newer = [
         line(61, "of another job", 11),
-        json.dumps({"event": 'says "job_id": 1', "timestamp": NOW.isoformat()}),
+        json.dumps({"event": 'says "job_id": 1', "timestamp": datetime.now(UTC).isoformat()}),
         '{"event": "cut off", "job_id": 1',
         line(62, "job failed", exception="Traceback\nValueError: 3", why="no such thing"),
     ]
