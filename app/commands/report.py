@@ -32,8 +32,8 @@ def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format 
     finally:
         database.close()
     html = render(found, chart_library(settings.ui_dir)).html
-    content = print_pdf(html) if chosen == "pdf" else html.encode()
-    target = out or Path(file_name(found.campaign, chosen))
+    content = print_pdf(lambda: html) if chosen == "pdf" else html.encode()
+    target = out or Path(file_name(found.campaign.id, chosen))
     try:
         target.write_bytes(content)
     except OSError as error:

@@ -2,9 +2,11 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -34,9 +36,9 @@ _places = threading.BoundedSemaphore(AT_ONCE)
 _log = structlog.get_logger(__name__)
 
 
-def print_pdf(html: str) -> bytes:
-    """The file as PDF. Raises UnavailableError when no browser is there to print it, it is printing others already, or
-    it fails."""
+def print_pdf(page: Callable[[], str]) -> bytes:
+    """The HTML that `page` gives, as PDF; it is asked for once there is a browser and a place to print it. Raises
+    UnavailableError when no browser is there, it is printing others already, or it fails; and what `page` raises."""
     browser = _browser()
     if not _places.acquire(blocking=False):
         raise UnavailableError(
@@ -44,7 +46,7 @@ def print_pdf(html: str) -> bytes:
         )
     try:
         with tempfile.TemporaryDirectory(prefix="gainline-print-", ignore_cleanup_errors=True) as folder:
-            return _printed(browser, html, Path(folder))
+            return _printed(browser, page(), Path(folder))
     finally:
         _places.release()
 
@@ -67,15 +69,29 @@ def _printed(browser: str, html: str, folder: Path) -> bytes:
     flags = [*_FLAGS, *(["--no-sandbox"] if os.geteuid() == 0 else []), f"--user-data-dir={folder / 'profile'}"]
     command = [browser, *flags, f"--print-to-pdf={out}", page.as_uri()]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)  # noqa: S603  # found in PATH
+        code, said = _run(command)
     except subprocess.TimeoutExpired as error:
         raise _failed(f"did not finish within {TIMEOUT_S:g} s") from error
     except OSError as error:
         raise _failed(f"could not be started: {error.strerror or error}") from error
-    if done.returncode != 0 or not out.is_file():
-        _log.error("printing failed", code=done.returncode, said=done.stderr.decode(errors="replace")[-2000:])
+    if code != 0 or not out.is_file():
+        _log.error("printing failed", code=code, said=said[-2000:])
         raise _failed("ended without a PDF; the server's log has its last words")
     return out.read_bytes()
+
+
+def _run(command: list[str]) -> tuple[int, str]:
+    """How it ended, and what it said. It has a process group of its own: when it takes too long, or whoever waits is
+    interrupted, its children end with it. Raises TimeoutExpired and OSError."""
+    with subprocess.Popen(  # noqa: S603  # found in PATH
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", process_group=0
+    ) as browser:
+        try:
+            _, said = browser.communicate(timeout=TIMEOUT_S)
+        except BaseException:
+            os.killpg(browser.pid, signal.SIGKILL)
+            raise
+    return browser.returncode, said
 
 
 def _failed(how: str) -> UnavailableError:

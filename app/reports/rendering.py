@@ -79,9 +79,9 @@ def chart_library(ui_dir: Path) -> str:
     return source
 
 
-def file_name(campaign: Campaign, ending: str) -> str:
+def file_name(campaign_id: int, ending: str) -> str:
     """What a report is saved as."""
-    return f"campaign-{campaign.id}-report.{ending}"
+    return f"campaign-{campaign_id}-report.{ending}"
 
 
 def _state(campaign: Campaign) -> str:

@@ -3,11 +3,12 @@
 from fastapi import APIRouter, Response
 
 from app.api.deps import CurrentDatabase, CurrentSettings, Id
+from app.campaigns.service import get_row
 from app.db.session import Database
-from app.reports.content import Report
 from app.reports.printing import print_pdf
-from app.reports.rendering import chart_library, file_name, render
+from app.reports.rendering import Document, chart_library, file_name, render
 from app.reports.service import report_of
+from app.settings import Settings
 
 router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 
@@ -19,14 +20,13 @@ router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 )
 def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
     """The whole campaign as one page that can be saved and sent: it needs neither this program nor a network."""
-    report = _report(database, campaign_id)
-    document = render(report, chart_library(settings.ui_dir))
+    document = _document(database, settings, campaign_id)
     return Response(
         document.html,
         media_type="text/html",
         headers={
             "Content-Security-Policy": document.policy,
-            "Content-Disposition": f'inline; filename="{file_name(report.campaign, "html")}"',
+            "Content-Disposition": f'inline; filename="{file_name(campaign_id, "html")}"',
         },
     )
 
@@ -38,16 +38,17 @@ def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id
 )
 def get_report_as_pdf(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
     """The same, printed by a Chromium on the server; 503 where there is none, or it is printing already."""
-    report = _report(database, campaign_id)
-    document = render(report, chart_library(settings.ui_dir))
+    with database.read() as session:
+        get_row(session, campaign_id)  # an unknown campaign is told of as such, whatever there is to print with
     return Response(
-        print_pdf(document.html),
+        print_pdf(lambda: _document(database, settings, campaign_id).html),
         media_type="application/pdf",
-        headers={"Content-Disposition": f'inline; filename="{file_name(report.campaign, "pdf")}"'},
+        headers={"Content-Disposition": f'inline; filename="{file_name(campaign_id, "pdf")}"'},
     )
 
 
-def _report(database: Database, campaign_id: int) -> Report:
-    """Read in a transaction of its own, which is over before anything is drawn or printed."""
+def _document(database: Database, settings: Settings, campaign_id: int) -> Document:
+    """Read in a transaction of its own, which is over before the page is made. Raises NotFoundError."""
     with database.read() as session:
-        return report_of(session, campaign_id)
+        report = report_of(session, campaign_id)
+    return render(report, chart_library(settings.ui_dir))

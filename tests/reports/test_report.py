@@ -2,7 +2,9 @@
 
 import base64
 import hashlib
+import os
 import re
+import select
 import shutil
 import subprocess
 import zlib
@@ -13,7 +15,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
-from app.reports import printing
+from app.reports import printing, router
 from app.reports.wording import plus_minus
 from tests.builders import Json, create_ready_campaign, get
 from tests.reports.conftest import NAME, REASON
@@ -163,21 +165,41 @@ def test_without_a_browser_the_pdf_is_refused_in_words(
 def test_a_browser_that_fails_is_told_of_in_words(
     client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    broken = tmp_path / "chromium"
-    broken.write_text("#!/bin/sh\nexit 7\n")
-    broken.chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
+    in_path("exit 7", monkeypatch, tmp_path)
     answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
     assert (answer.status_code, answer.json()["title"]) == (503, "Not available")
     assert "without a PDF" in answer.json()["detail"]
 
 
-def test_prints_beyond_a_few_at_once_are_refused_rather_than_queued(
+def test_a_browser_that_takes_too_long_is_ended_with_its_children(
     client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    (tmp_path / "chromium").write_text("#!/bin/sh\nexit 0\n")
-    (tmp_path / "chromium").chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
+    heard = tmp_path / "heard"
+    os.mkfifo(heard)
+    line = os.open(heard, os.O_RDONLY | os.O_NONBLOCK)  # it ends when the last process that holds the other side does
+    in_path(f"{{ echo up; exec /bin/sleep 60; }} > {heard} & wait", monkeypatch, tmp_path)
+    monkeypatch.setattr(printing, "TIMEOUT_S", 1.0)
+    answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
+    assert answer.status_code == 503
+    assert "within 1 s" in answer.json()["detail"]
+    assert os.read(line, 3) == b"up\n"
+    assert select.select([line], [], [], 5.0)[0], "its child is still there"
+    assert os.read(line, 3) == b""
+    os.close(line)
+
+
+def in_path(script: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """That shell script is the only Chromium there is."""
+    (folder / "chromium").write_text(f"#!/bin/sh\n{script}\n")
+    (folder / "chromium").chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
+
+
+def test_prints_beyond_a_few_at_once_are_refused_before_any_work_is_done(
+    client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    in_path("exit 0", monkeypatch, tmp_path)
+    monkeypatch.setattr(router, "render", lambda *_: pytest.fail("the page was made for nothing"))
     taken = [printing._places.acquire(blocking=False) for _ in range(printing.AT_ONCE)]
     try:
         assert all(taken)
