@@ -11,7 +11,8 @@ GainlineError                 (app.core.errors)
 ├── NotAllowedError           not from there, or not by them: a real vehicle's safety forbids it
 ├── NotFoundError             there is no such thing
 ├── ConflictError             it is not possible now: the state or the version forbids it
-│   └── BusyError             the vehicle is flying for somebody else
+│   ├── BusyError             the vehicle is flying for somebody else
+│   └── OvertakenError        what a job was to compute is no longer wanted
 ├── UnavailableError          this installation lacks what is needed, or it is in use; all else works
 ├── StorageError              the database cannot take or give what it should; nothing was changed
 ├── SchemaError               the database belongs to another version of the program
@@ -33,6 +34,7 @@ __all__ = [
     "MediaTypeError",
     "NotAllowedError",
     "NotFoundError",
+    "OvertakenError",
     "Problem",
     "SchemaError",
     "StorageError",
@@ -79,6 +81,10 @@ class ConflictError(GainlineError):
 
 class BusyError(ConflictError):
     """The vehicle has a flight already."""
+
+
+class OvertakenError(ConflictError):
+    """What a job was to compute, a newer state has overtaken: nothing failed, and nobody wants it any more."""
 
 
 class UnavailableError(GainlineError):

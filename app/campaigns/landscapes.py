@@ -17,7 +17,7 @@ from app.campaigns.proposing import History, is_stale, read_history
 from app.core.experiments import experiment_of
 from app.core.landscape import Landscape, Plan, free_gains, space_of
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
-from app.errors import ConflictError, GainlineError
+from app.errors import GainlineError, OvertakenError
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
 from app.figures.theme import ThemeName
@@ -56,9 +56,9 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stac
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
-    """A job computes the landscape of the latest proposal, unless one does or did already."""
+    """A job computes the landscape of the latest proposal, unless one does or did already, or a person cancelled it."""
     proposal = repository.latest_proposal(session, campaign_id)
-    if proposal is None or _job(session, campaign_id, proposal.id) is not None:
+    if proposal is None or not _is_wanted(_job(session, campaign_id, proposal.id)):
         return
     order: JsonObject = {"name": _name(campaign_id), "proposal_id": proposal.id}
     job = jobs.enqueue_job(session, LANDSCAPE_JOB, campaign_id=campaign_id, order=order)
@@ -66,14 +66,14 @@ def request_landscape(session: Session, campaign_id: int) -> None:
 
 
 def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Plan:
-    """What the job's proposal was computed from. Raises ConflictError once the campaign's flights are others."""
+    """What the job's proposal was computed from. Raises OvertakenError once the campaign's flights are others."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
     proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None
     if proposal is None:
         raise GainlineError("The order names no proposal.", hint="Open the campaign to have it computed anew.")
     if proposal.history_digest != past.digest:
-        raise ConflictError(
+        raise OvertakenError(
             "The campaign's flights have changed since these gains were proposed.",
             hint="Nothing is to be done: the landscape of the next proposal takes its place.",
         )
@@ -104,7 +104,8 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     if is_stale(campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed; the landscape that they lie in follows.")
     job = _job(session, campaign.id, proposal.id)
-    if job is not None and job.state in {JobState.FAILED, JobState.CANCELLED}:
+    wanted = _is_wanted(job)
+    if job is not None and not wanted and job.state in {JobState.FAILED, JobState.CANCELLED}:
         said = jobs.trouble(job)
         why = "It was cancelled." if said is None else f"{said.title} {said.hint}"
         return _waiting(f"The landscape could not be computed. {why} The page Jobs can start it again.")
@@ -112,7 +113,7 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
         "The model is being flown with several hundred gain sets around the flown and the proposed ones. That takes "
         "seconds, or half a minute with the calibrated model; the landscape appears here by itself."
     )
-    return Asked(_card(reason), wanted=job is None)
+    return Asked(_card(reason), wanted=wanted)
 
 
 def _waiting(reason: str) -> Asked:
@@ -131,6 +132,11 @@ def _job(session: Session, campaign_id: int, proposal_id: int) -> JobRow | None:
     """The newest job for that proposal."""
     job = jobs.latest_ordered(session, LANDSCAPE_JOB, _name(campaign_id), _EVERY)
     return job if job is not None and (job.order or {}).get("proposal_id") == proposal_id else None
+
+
+def _is_wanted(job: JobRow | None) -> bool:
+    """Whether a job is to be asked for where that is the newest one."""
+    return job is None or jobs.is_withdrawn(job)
 
 
 def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape | None:

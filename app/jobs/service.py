@@ -1,7 +1,7 @@
 """Numeric work as rows: written in the transaction that needs it, carried out by a worker, and again after a crash.
 
-For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job` or `fail_job`;
-`put_back_job` and `give_up_job` when it has to end before that.
+For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job`, `fail_job` or
+`withdraw_job`; `put_back_job` and `give_up_job` when it has to end before that.
 """
 
 from collections.abc import Collection
@@ -16,6 +16,7 @@ from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
+from app.errors import OvertakenError
 from app.jobs import repository
 from app.jobs.logs import lines_of_job
 from app.jobs.schemas import Job, JobLog
@@ -127,6 +128,21 @@ def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str
     return True
 
 
+def withdraw_job(session: Session, job_id: int, error: OvertakenError, *, worker: str) -> bool:
+    """What it was to compute is no longer wanted: it is cancelled, and says why. False when it was no longer this
+    worker's."""
+    row = repository.held_by_or_none(session, job_id, worker)
+    if row is None:
+        return False
+    _end(row, JobState.CANCELLED, error.message, error.hint, [])
+    return True
+
+
+def is_withdrawn(row: JobRow) -> bool:
+    """Whether a newer state cancelled it, and not a person."""
+    return row.state == JobState.CANCELLED and row.problem is not None
+
+
 def requeue_running_jobs(session: Session) -> list[int]:
     """At a worker's start, when no other worker can be there: whatever ran waits again."""
     return [_requeue(row) for row in repository.running(session)]
@@ -214,7 +230,7 @@ def job_view(row: JobRow) -> Job:
 
 
 def trouble(row: JobRow) -> Trouble | None:
-    """Why a job failed."""
+    """Why a job failed, or was withdrawn."""
     return None if row.problem is None else Trouble.model_validate(row.problem)
 
 
@@ -249,7 +265,11 @@ def _requeue(row: JobRow) -> int:
 
 
 def _fail(row: JobRow, happened: str, hint: str, problems: list[str]) -> None:
-    _move(row, JobState.FAILED)
+    _end(row, JobState.FAILED, happened, hint, problems)
+
+
+def _end(row: JobRow, state: JobState, happened: str, hint: str, problems: list[str]) -> None:
+    _move(row, state)
     said: JsonObject = {"title": happened, "detail": "; ".join(problems), "hint": hint}
     row.problem, row.finished_at, row.lease_until = said, utc_now(), None
 

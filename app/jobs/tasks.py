@@ -7,9 +7,10 @@ from time import monotonic
 from typing import Final
 
 import structlog
+from sqlalchemy.orm import Session
 
 from app.db.session import Database
-from app.errors import GainlineError, StorageError
+from app.errors import GainlineError, OvertakenError, StorageError
 from app.jobs import service as jobs
 
 BEATS_PER_LEASE: Final = 3
@@ -38,7 +39,7 @@ class Desk:
     any.
 
     `perform(job)` does the work and stores what came of it. It may raise GainlineError, which is kept with the job for
-    a person, and CancelledError when the worker ends.
+    a person, OvertakenError when nobody wants it any more, and CancelledError when the worker ends.
     """
 
     def __init__(
@@ -102,6 +103,8 @@ class Desk:
                 _log.info("job dropped, because the worker ends; it runs again with the next one")
             except StorageError as error:
                 _log.error("job given up; it runs again when its lease is over", why=str(error))
+            except OvertakenError as error:
+                self._withdraw(job, error)
             except GainlineError as error:
                 self._fail(job, error)
             except Exception as error:  # noqa: BLE001 - the edge of the thread
@@ -112,9 +115,16 @@ class Desk:
 
     def _fail(self, job: Claimed, error: GainlineError) -> None:
         _log.warning("job failed", why=str(error))
+        self._end(lambda session: jobs.fail_job(session, job.id, error, worker=self._worker))
+
+    def _withdraw(self, job: Claimed, error: OvertakenError) -> None:
+        _log.info("job withdrawn", why=str(error))
+        self._end(lambda session: jobs.withdraw_job(session, job.id, error, worker=self._worker))
+
+    def _end(self, store: Callable[[Session], bool]) -> None:
         try:
             with self._database.write() as session:
-                jobs.fail_job(session, job.id, error, worker=self._worker)
+                store(session)
         except StorageError as refused:
             _log.error("job given up; it runs again when its lease is over", why=str(refused))
 

@@ -6,17 +6,25 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns import landscapes
+from app.campaigns.tasks import Surveyor
 from app.core.landscape import foreseen, plan_survey
 from app.db.session import Database
 from app.jobs import service as jobs
+from app.jobs.tasks import Desk
+from app.pool import Pool
 from tests.builders import WORKER, create_flown_trial, create_ready_campaign, get
 
 Json = dict[str, Any]
 
 
-def waiting_jobs(client: TestClient) -> list[Json]:
+def landscape_jobs(client: TestClient) -> list[Json]:
+    """The newest first."""
     every: list[Json] = get(client, "/api/jobs")["items"]
-    return [job for job in every if job["kind"] == "landscape" and job["state"] == "queued"]
+    return [job for job in every if job["kind"] == "landscape"]
+
+
+def waiting_jobs(client: TestClient) -> list[Json]:
+    return [job for job in landscape_jobs(client) if job["state"] == "queued"]
 
 
 def run_landscapes(database: Database) -> int:
@@ -98,6 +106,43 @@ def test_another_proposal_has_a_landscape_of_its_own(client: TestClient, databas
     assert card_of(client, campaign_id)["state"] == "waiting"
     assert run_landscapes(database) == 1
     assert len(traces(card_of(client, campaign_id), "path")[0]["x"]) == 2
+
+
+def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_gains_hold_again(
+    client: TestClient, database: Database, campaign_id: int
+) -> None:
+    card_of(client, campaign_id)
+    classify(client, campaign_id, "invalid")
+    with Pool(1, prepare=int) as pool:
+        desk = Desk(database, landscapes.LANDSCAPE_JOB, Surveyor(database, pool, worker=WORKER),
+                    room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
+        claimed = desk.claim()
+        assert claimed is not None
+        desk.carry_out(claimed)
+    (withdrawn,) = landscape_jobs(client)
+    assert withdrawn["state"] == "cancelled"
+    assert "flights have changed" in withdrawn["problem"]["title"]
+    assert "being computed" in card_of(client, campaign_id)["reason"]
+    assert waiting_jobs(client) == []
+    classify(client, campaign_id, "valid")
+    assert "by itself" in card_of(client, campaign_id)["reason"]
+    assert len(waiting_jobs(client)) == 1
+    assert run_landscapes(database) == 1
+    assert card_of(client, campaign_id)["state"] == "ready"
+
+
+def classify(client: TestClient, campaign_id: int, outcome: str) -> None:
+    trial = get(client, f"/api/campaigns/{campaign_id}/trials")["items"][0]
+    said = {"version": trial["version"], "outcome": outcome, "reason": "Looked at again"}
+    assert client.post(f"/api/trials/{trial['id']}/classify", json=said).status_code == 200
+
+
+def test_one_that_a_person_cancelled_is_not_started_again_by_looking(client: TestClient, campaign_id: int) -> None:
+    card_of(client, campaign_id)
+    (job,) = waiting_jobs(client)
+    assert client.post(f"/api/jobs/{job['id']}/cancel").status_code == 200
+    assert "It was cancelled." in card_of(client, campaign_id)["reason"]
+    assert [one["state"] for one in landscape_jobs(client)] == ["cancelled"]
 
 
 def test_stacked_slices_stand_one_below_the_other(client: TestClient, database: Database, campaign_id: int) -> None:
