@@ -26,11 +26,30 @@ class Anomaly:
     sentence: str
 
 
+@dataclass(frozen=True, slots=True)
+class Photo:
+    """A picture as it was taken."""
+
+    media_type: str
+    data: bytes
+    added_at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Remark:
+    """What people left with a trial: its note, the photos that the report has room for, and how many it has not."""
+
+    trial: Trial
+    photos: tuple[Photo, ...]
+    left_out: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     """A campaign, as the API tells of it, with its settings in words and its figures drawn for a light page.
 
-    `what` was tuned and `how`, `anomalies` in the order of the flights, `made_at` by program `version`.
+    `remarks` in the order of the trials, at most `photo_bytes` of photos in all; `what` was tuned and `how`,
+    `anomalies` in the order of the flights, `made_at` by program `version`.
     """
 
     campaign: Campaign
@@ -40,6 +59,8 @@ class Report:
     what: tuple[Fact, ...]
     how: tuple[Fact, ...]
     cards: tuple[Card, ...]
+    remarks: tuple[Remark, ...]
+    photo_bytes: int
     anomalies: tuple[Anomaly, ...]
     version: str
     made_at: datetime

@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
 from functools import lru_cache
@@ -13,9 +14,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from app.campaigns.schemas import Campaign
-from app.figures.base import Cell, Column
+from app.figures.base import Card, Cell, Column
 from app.reports import wording
-from app.reports.content import Report
+from app.reports.content import Photo, Report
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 _BUNDLE: Final = "report/plotly-cartesian.min.js"
@@ -129,6 +130,9 @@ def _environment(zone: tzinfo | None) -> Environment:
         "count": wording.count,
         "flights": _flights,
         "cell": _cell,
+        "panels": _panels,
+        "data_uri": _data_uri,
+        "mebibytes": lambda size: f"{size / 2**20:g} MiB",
     }
     return environment
 
@@ -146,6 +150,16 @@ def _signed_gain(change: float) -> str:
 
 def _flights(numbers: list[int]) -> str:
     return f"flight{'' if len(numbers) == 1 else 's'} {', '.join(map(str, numbers))}"
+
+
+def _panels(card: Card) -> int:
+    """How many panels the figure has."""
+    layout = None if card.figure is None else card.figure["layout"]
+    return sum(name.startswith("xaxis") for name in layout) if isinstance(layout, Mapping) else 0
+
+
+def _data_uri(photo: Photo) -> Markup:
+    return Markup(f"data:{photo.media_type};base64,{base64.b64encode(photo.data).decode()}")  # noqa: S704  # no markup in it
 
 
 def _cell(value: Cell, column: Column) -> str:

@@ -8,14 +8,15 @@ from sqlalchemy.orm import Session
 from app import __version__
 from app.campaigns import drawing
 from app.campaigns import service as campaigns
+from app.campaigns.landscapes import landscape_card
 from app.campaigns.schemas import Campaign
 from app.campaigns.statistics import campaign_statistics
 from app.db.types import utc_now
 from app.figures import CAMPAIGN_FIGURES
-from app.figures.base import card_of
+from app.figures.base import Card, card_of
 from app.fleet import service as fleet
 from app.fleet.views import acts_view, ledger_view
-from app.reports import anomalies
+from app.reports import anomalies, remarks
 from app.reports.content import Anomaly, Report
 from app.reports.settings_in_words import experiment_of, how_it_was_tuned, what_was_tuned
 from app.schemas import Page
@@ -41,11 +42,23 @@ def report_of(session: Session, campaign_id: int) -> Report:
         gains=experiment.space.gains,
         what=what_was_tuned(campaign, experiment, vehicle.identity),
         how=how_it_was_tuned(campaign, experiment),
-        cards=tuple(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
+        cards=(
+            *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
+            *_landscape(session, campaign),
+        ),
+        remarks=tuple(remarks.remarks_on(session, campaign_id, trials)),
+        photo_bytes=remarks.MOST_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
         version=__version__,
         made_at=utc_now(),
     )
+
+
+def _landscape(session: Session, campaign: Campaign) -> Iterator[Card]:
+    """Where one was computed: a report is written from what there is."""
+    card = landscape_card(session, campaign.id, "light", stacked=True).card
+    if card.state == "ready":
+        yield card
 
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:

@@ -5,19 +5,20 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport
 from tests.e2e.test_pages import RULES, SCREENSHOTS
 
 NAME = "<script>document.title = 'taken'</script> & <b>wing</b>"
-CHARTS = ("takeoffs", "errors", "gains")
+CHARTS = ("takeoffs", "errors", "gains", "landscape")
+DRAWN = str(len(CHARTS))
 
 
 @pytest.fixture(scope="module")
 def campaign_id(shared_server: Server, browser: Browser) -> int:
-    """Three flights, one of them ruled out."""
+    """Three flights, one of them ruled out and with a photo; and the landscape of the next gains."""
     context = browser.new_context()
     dashboard = Dashboard(context.new_page(), shared_server.url)
     made = dashboard.create("twin", name=NAME, seed=6)
@@ -26,6 +27,10 @@ def campaign_id(shared_server: Server, browser: Browser) -> int:
     dashboard.post(f"/trials/{second['id']}/classify",
                    {"version": second["version"], "outcome": "invalid", "reason": "Gust"})  # fmt: skip
     dashboard.when_ready(made)
+    picture = FilePayload(name="photo.jpg", mimeType="image/jpeg", buffer=dashboard.page.screenshot(type="jpeg"))
+    added = context.request.post(f"{shared_server.url}/api/trials/{second['id']}/photos", multipart={"file": picture})
+    assert added.ok, added.text()
+    dashboard.until(lambda: dashboard.get(f"/campaigns/{made}/figures/landscape")["state"] == "ready")
     context.close()
     return made
 
@@ -50,7 +55,7 @@ def opened(browser: Browser, file: Path, viewport: Viewport) -> tuple[Page, list
     page.on("console", lambda message: noted.append(message.text))
     page.on("pageerror", lambda error: noted.append(str(error)))
     page.goto(file.as_uri())
-    expect(page.locator("html")).to_have_attribute("data-drawn", "3")
+    expect(page.locator("html")).to_have_attribute("data-drawn", DRAWN)
     return page, noted
 
 
@@ -66,6 +71,8 @@ def test_the_file_draws_its_charts_with_no_network_and_can_be_read_by_everybody(
         drawn = page.locator(f"#chart-{chart}").evaluate("one => [one.data.length, one.clientWidth]")
         assert drawn[0] > 0
         assert 300 < drawn[1] <= viewport["width"]
+    photo = page.get_by_role("img", name="Photo 1 of flight 2")
+    assert 100 < photo.evaluate("one => one.complete && one.naturalWidth && one.clientWidth") < viewport["width"]
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
     found = Axe().run(page, options={"runOnly": {"type": "tag", "values": RULES}})
@@ -82,7 +89,7 @@ def test_the_file_draws_what_the_page_draws(
     dashboard = open_dashboard(shared_server.url)
     page, _ = opened(browser, file, TABLET)
     for chart in CHARTS:
-        card = dashboard.get(f"/campaigns/{campaign_id}/figures/{chart}")
+        card = dashboard.get(f"/campaigns/{campaign_id}/figures/{chart}?stacked=true")
         ours = page.locator(f"#chart-{chart}").evaluate("one => one.data.map(trace => [trace.name, trace.y ?? []])")
         assert ours == [[trace.get("name"), trace.get("y") or []] for trace in card["figure"]["data"]]
     page.context.close()
@@ -109,7 +116,7 @@ def test_served_the_report_runs_under_a_policy_of_its_own(
     report = coming.value
     noted: list[str] = []
     report.on("console", lambda message: noted.append(message.text))
-    expect(report.locator("html")).to_have_attribute("data-drawn", "3")
+    expect(report.locator("html")).to_have_attribute("data-drawn", DRAWN)
     assert report.evaluate("origin") == "null", "the report shares the dashboard's origin"
     assert noted == []
 

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import os
 import re
 import select
@@ -15,10 +16,14 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
-from app.reports import printing, router
+from app.reports import printing, remarks, router
 from app.reports.wording import plus_minus
 from tests.builders import Json, create_ready_campaign, get
+from tests.campaigns.test_landscapes import card_of, run_landscapes
 from tests.reports.conftest import NAME, REASON
+from tests.trials.test_photos import JPEG, add, png
+
+POLICY = "content-security-policy"
 
 
 class Page(HTMLParser):
@@ -98,7 +103,7 @@ def test_what_people_wrote_is_text_and_never_markup(client: TestClient, campaign
 def test_the_file_runs_its_own_scripts_alone_and_reaches_nothing(client: TestClient, campaign: Json) -> None:
     answer = client.get(f"/api/campaigns/{campaign['id']}/report.html")
     page = Page(answer.text)
-    served = answer.headers["content-security-policy"]
+    served = answer.headers[POLICY]
     (own,) = (found["content"] for tag, found in page.tags if tag == "meta" and "http-equiv" in found)
     assert own is not None
     assert served.startswith(own)
@@ -107,6 +112,60 @@ def test_the_file_runs_its_own_scripts_alone_and_reaches_nothing(client: TestCli
     allowed = re.findall(r"'sha256-([^']+)'", own)
     assert allowed == [base64.b64encode(hashlib.sha256(each.encode()).digest()).decode() for each in page.scripts]
     assert not [name for _, attributes in page.tags for name in attributes if name in {"src", "href", "srcset"}]
+
+
+def test_notes_and_photos_stand_with_their_flights_in_the_file_itself(client: TestClient, campaign: Json) -> None:
+    first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
+    said = {"version": third["version"], "note": "<i>New</i> propellers."}
+    assert client.patch(f"/api/trials/{third['id']}", json=said).status_code == 200
+    pictures = [png(1), png(2), JPEG + b'"><script>alert(1)</script>']
+    for trial, picture in zip((third, third, first), pictures, strict=True):
+        assert add(client, trial, picture).status_code == 201
+    page = read(client, campaign)
+    assert re.search(r"Flight 1 valid, .*? Flight 3 valid, .*? <i>New</i> propellers\.", page.said)
+    shown = [found for tag, found in page.tags if tag == "img"]
+    assert [(found["alt"], found["src"]) for found in shown] == [
+        ("Photo 1 of flight 1", f"data:image/jpeg;base64,{base64.b64encode(pictures[2]).decode()}"),
+        ("Photo 1 of flight 3", f"data:image/png;base64,{base64.b64encode(pictures[0]).decode()}"),
+        ("Photo 2 of flight 3", f"data:image/png;base64,{base64.b64encode(pictures[1]).decode()}"),
+    ]
+    assert "img-src data:;" in client.get(f"/api/campaigns/{campaign['id']}/report.html").headers[POLICY]
+
+
+def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_each_flight_last(
+    client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
+    for trial in (first, first, first, third):
+        add(client, trial, png())
+    monkeypatch.setattr(remarks, "MOST_BYTES", 3 * len(png()) - 1)
+    page = read(client, campaign)
+    assert [found["alt"] for tag, found in page.tags if tag == "img"] == [
+        "Photo 1 of flight 1",
+        "Photo 1 of flight 3",
+    ]
+    assert "2 photos left out" in page.said
+    assert "2 photos of this flight left out" in page.said
+
+
+def test_the_landscape_is_in_the_report_once_it_is_computed(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    assert "landscape" not in drawn(client, campaign)
+    card_of(client, campaign["id"])
+    assert "landscape" not in drawn(client, campaign), "a figure that is not there yet would stay a promise"
+    assert run_landscapes(database) == 1
+    shown = drawn(client, campaign)["landscape"]
+    assert shown == card_of(client, campaign["id"], "?stacked=true")["figure"]
+
+
+def drawn(client: TestClient, campaign: Json) -> Json:
+    """The figures in the file, by name."""
+    html = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
+    found = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.DOTALL)
+    assert found is not None
+    figures: Json = json.loads(found[1])
+    return figures
 
 
 def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, database: Database) -> None:

@@ -1,0 +1,39 @@
+"""What people left with the flights: notes, and as many photos as a file can hold that is to be sent."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.db.models import TrialPhotoRow
+from app.reports import repository
+from app.reports.content import Photo, Remark
+from app.trials.schemas import Trial
+
+MOST_BYTES: Final = 24 * 2**20
+"""Of all photos together, as they were taken; in the file they take a third more."""
+
+
+def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
+    """Of the trials that have any, in their order."""
+    photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
+    for row, size in repository.photos(session, campaign_id):
+        photos.setdefault(row.trial_id, []).append((row, size))
+    kept = _fitting(photos)
+    for trial in trials:
+        own = photos.get(trial.id, [])
+        if not trial.note and not own:
+            continue
+        shown = [Photo(row.media_type, row.data, row.added_at) for row, _ in own if row.id in kept]
+        yield Remark(trial=trial, photos=tuple(shown), left_out=len(own) - len(shown))
+
+
+def _fitting(photos: dict[int, list[tuple[TrialPhotoRow, int]]]) -> set[int]:
+    """Ids of those that fit: the first of each trial comes before the second of any."""
+    kept, room = set[int](), MOST_BYTES
+    turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
+    for _, photo_id, size in turns:
+        if size <= room:
+            kept.add(photo_id)
+            room -= size
+    return kept
