@@ -1,5 +1,6 @@
 """What every figure is, and the card that a page, a report or a notebook shows it on."""
 
+import html
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -78,6 +79,11 @@ def card_of(figure: Figure) -> Card:
             state="failed",
             reason="This figure could not be drawn. The flights are safe; the server's log says why.",
         )
+
+
+def literal(text: str) -> str:
+    """Somebody's words for a trace's name or hover text: Plotly takes neither markup nor a template out of them."""
+    return html.escape(text, quote=False).replace("%{", "%&#123;")
 
 
 def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from app.figures import theme
-from app.figures.base import Card, Column, Table, plotly_json
+from app.figures.base import Card, Column, Table, literal, plotly_json
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 _BEFORE_PX: Final = 14
@@ -76,7 +76,7 @@ class BatteriesFigure:
         return {
             "type": "scatter",
             "mode": "lines+markers",
-            "name": label or "no label",
+            "name": literal(label or "no label"),
             "x": [x for flight in own for x in (flight.flight, flight.flight, None)],
             "y": [y for flight in own for y in (flight.before_v, flight.after_v, None)],
             "line": theme.line(colour, 2),
@@ -88,7 +88,7 @@ class BatteriesFigure:
                 "line": {"width": [2, 0, 0] * len(own), "color": colour},
             },
             "meta": {"role": "battery", "battery": label},
-            "hovertemplate": f"<b>Flight %{{x}}</b>, {label or 'no label'}<br>%{{y:.2f}} V<extra></extra>",
+            "hovertemplate": f"<b>Flight %{{x}}</b>, {literal(label or 'no label')}<br>%{{y:.2f}} V<extra></extra>",
         }
 
     def _summary(self, labels: list[str]) -> str:

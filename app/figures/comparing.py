@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.base import Card, Cell, Column, Table, literal, plotly_json
 from app.figures.history import Curve
 from app.figures.scale import robust_span, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -137,10 +137,10 @@ class ComparingFigure:
         error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.data.error_unit}"
         return {
             **self._line(palette, index, flight, "flight"),
-            "name": _shortened(f"{flight.label} · {flight.name}"),
+            "name": literal(_shortened(f"{flight.label} · {flight.name}")),
             "x": x,
             "y": y,
-            "hovertemplate": f"<b>{flight.label} · {flight.name}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
+            "hovertemplate": f"<b>{flight.label} · {literal(flight.name)}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
             f"{self.data.output_unit}{error}<extra></extra>",
         }
 

@@ -11,14 +11,20 @@ from app.figures.theme import PALETTES
 from tests.figures.builders import SET_POINT, TIME_S, climb, layout, trace, traces
 
 
-def compared(*curves: Curve | None) -> ComparingData:
+def compared(*curves: Curve | None, first: str = "flight 0") -> ComparingData:
     return ComparingData(
         output_title="Altitude",
         output_unit="m",
         error_unit="m",
         set_point=SET_POINT,
         flights=tuple(
-            ComparedCurve(trial_id=10 + index, label="ABCDE"[index], name=f"flight {index}", curve=curve, error=0.1)
+            ComparedCurve(
+                trial_id=10 + index,
+                label="ABCDE"[index],
+                name=f"flight {index}" if index else first,
+                curve=curve,
+                error=0.1,
+            )
             for index, curve in enumerate(curves)
         ),
     )
@@ -56,6 +62,16 @@ def test_a_wild_flight_is_marked_and_does_not_flatten_the_others() -> None:
     assert layout(card)["yaxis"]["range"][1] < 5.0
     assert trace(card, "off scale", trial=13)["text"] == ["D ↑ 43.0"]
     assert "1 off the scale" in card.summary
+
+
+def test_what_a_campaign_is_called_is_drawn_as_it_is_written() -> None:
+    card = card_of(ComparingFigure(compared(climb(0.2), climb(0.3), first="%{x} <b>& co</b>")))
+    drawn = trace(card, "flight", trial=10)
+    assert drawn["name"] == "A · %&#123;x} &lt;b&gt;&amp; co&lt;/b&gt;"
+    assert drawn["hovertemplate"].startswith(f"<b>{drawn['name']}</b><br>%{{x:.2f}} s")
+    assert "A, %{x} <b>& co</b>, error" in card.summary
+    assert card.table is not None
+    assert card.table.columns[2].title == "A · %{x} <b>& co</b>"
 
 
 def test_without_any_record_it_says_so() -> None:
