@@ -212,6 +212,7 @@ class CampaignSummary(BaseModel):
     best: BestTrial | None
     first_error: float | None
     verdict: Annotated[Word | None, Field(description=VERDICT)]
+    rehearsal: RehearsalState
     next_action: str
     spark: list[SparkCurve]
     updated_at: datetime

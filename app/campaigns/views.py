@@ -105,6 +105,7 @@ def _summary(
         best=best_trial(trials, now),
         first_error=valid[0].error if valid else None,
         verdict=_word(now),
+        rehearsal=rehearsal.state,
         next_action=_next_action(row, trials, rehearsal),
         spark=spark,
         updated_at=row.updated_at,

@@ -1,10 +1,11 @@
 /** Everything that pages read. Keys are what `lib/events.ts` makes doubtful. */
 
 import { keepPreviousData, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
-import { useCallback } from "react";
+import { useCallback, useState } from "react";
 import type { Seconds } from "../lib/traces";
 import { answer } from "./client";
 import {
+  type Campaign,
   type CampaignState,
   getCampaign,
   getCampaignFigure,
@@ -16,6 +17,7 @@ import {
   getTrial,
   listCampaigns,
   listTrials,
+  type NextFlight,
   type PageTrial,
   type Sort,
   type Trial,
@@ -90,6 +92,31 @@ export function useTrials(campaignId: number) {
     queryKey: ["campaign", campaignId, "trials"],
     queryFn: () => allTrials(campaignId),
   });
+}
+
+/** A campaign with its flights and its next one, as they belong together. */
+export interface Standing {
+  campaign: Campaign;
+  trials: readonly Trial[];
+  next: NextFlight;
+}
+
+/** Null until all of it is known. Each part is read by itself: what a change has made doubtful is not put beside what is
+ * new already, so that nobody is asked for what was said a moment ago, or offered gains that are overtaken. */
+export function useStanding(campaignId: number): Standing | null {
+  const campaign = useCampaign(campaignId);
+  const trials = useTrials(campaignId);
+  const next = useProposal(campaignId);
+  const [held, setHeld] = useState<Standing | null>(null);
+  const parts = { campaign: campaign.data, trials: trials.data, next: next.data };
+  const areNew = [campaign, trials, next].every(({ isStale, error }) => !isStale || error !== null);
+  const areOther = parts.campaign !== held?.campaign || parts.trials !== held?.trials || parts.next !== held?.next;
+  if (areNew && areOther && isKnown(parts)) setHeld(parts);
+  return held;
+}
+
+function isKnown(parts: { [Part in keyof Standing]: Standing[Part] | undefined }): parts is Standing {
+  return parts.campaign !== undefined && parts.trials !== undefined && parts.next !== undefined;
 }
 
 export function useTrial(trialId: number) {

@@ -18,23 +18,23 @@ import { VehicleBadge } from "./VehicleBadge";
 
 /** A campaign at a glance: what it reached, how its curves look, what to do next. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
-  const { id, name, state, outcome, vehicle, best, flights, next_action, spark } = campaign;
-  const unit = useUnits(campaign.experiment).error;
+  const { id, name, state, outcome, vehicle, best, flights, rehearsal, next_action, spark } = campaign;
+  const units = useUnits(campaign.experiment);
   return (
     <li className={classes["card"]}>
       <div className={classes["top"]}>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={campaignWords(state, outcome)} />
+        <StateBadge words={campaignWords(state, outcome, rehearsal)} />
       </div>
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
       </h2>
       <p className={classes["vehicle"]}>{vehicle.registered ? vehicle.name : vehicle.title}</p>
-      <Sparkline curves={spark} />
+      <Sparkline curves={spark} setPoint={units.setPoint} />
       <dl className={`${classes["figures"]} numbers`}>
         <div>
           <dt>{best === null ? "Best error" : "Best error ± standard error"}</dt>
-          <dd>{plusMinus(best?.mean, best?.standard_error, unit)}</dd>
+          <dd>{plusMinus(best?.mean, best?.standard_error, units.error)}</dd>
         </div>
         <div>
           <dt>{count(flights, "flight")}</dt>

@@ -33,7 +33,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         </div>
       )}
       <div className={classes["facts"]}>
-        <StateBadge words={campaignWords(campaign.state, campaign.outcome)} />
+        <StateBadge words={campaignWords(campaign.state, campaign.outcome, campaign.rehearsal.state)} />
         <span>{count(campaign.trials.flown, "flight")}</span>
         <details className={classes["settings"]}>
           <summary>Settings</summary>

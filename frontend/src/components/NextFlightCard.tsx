@@ -1,6 +1,7 @@
 import { Button, Loader } from "@mantine/core";
 import { useRecompute, useUploadRecord } from "../api/mutations";
-import type { Campaign, NextFlight, Trial } from "../api/types";
+import type { Standing } from "../api/queries";
+import type { NextFlight } from "../api/types";
 import { nextStep } from "../lib/nextStep";
 import { FinishedCard } from "./FinishedCard";
 import { FlyingCard } from "./FlyingCard";
@@ -11,10 +12,7 @@ import { ProposalCard } from "./ProposalCard";
 import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
 import { Trouble } from "./Trouble";
 
-interface Props {
-  campaign: Campaign;
-  next: NextFlight;
-  trials: readonly Trial[];
+interface Props extends Standing {
   onChoose: (trialNumber: number) => void;
 }
 

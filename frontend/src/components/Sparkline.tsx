@@ -3,20 +3,20 @@ import { type Point, path, scaleFor } from "../lib/spark";
 import classes from "./Sparkline.module.css";
 
 const BOX = { width: 300, height: 84 };
-const TARGET_M = 3;
 
 function points(curve: SparkCurve): Point[] {
   return curve.time_s.map((time, index) => [time, curve.values[index] ?? 0]);
 }
 
 /** A campaign's curves in miniature: the first flight grey, the best in colour, the set point dotted. */
-export function Sparkline({ curves }: { curves: readonly SparkCurve[] }) {
+export function Sparkline({ curves, setPoint }: { curves: readonly SparkCurve[]; setPoint: number }) {
   const drawn = curves.map((curve) => ({ ...curve, points: points(curve) }));
   const scale = scaleFor(
     drawn.map((curve) => curve.points),
-    TARGET_M,
+    setPoint,
   );
-  const target = BOX.height * (1 - TARGET_M / scale.y[1]);
+  const [low, high] = scale.y;
+  const target = BOX.height * (1 - (setPoint - low) / (high - low));
   const ordered = [...drawn].sort((one, other) => Number(one.best) - Number(other.best));
   return (
     <svg

@@ -28,6 +28,18 @@ test("a wild curve is cut at the edge instead of flattening the others", () => {
   expect(path([[10, 30]], scale, box)).toBe("M100.0 0.0");
 });
 
+test("an output that is to stay at zero is drawn around the middle, as far as the first flight strays", () => {
+  const first = [
+    [0, 0.1],
+    [10, -0.2],
+  ] as const;
+  const scale = scaleFor([first, [[5, 9]]], 0);
+  expect(scale.y[0]).toBeCloseTo(-0.22, 9);
+  expect(scale.y[1]).toBeCloseTo(0.22, 9);
+  expect(path([[10, 0]], scale, box)).toBe("M100.0 25.0");
+  expect(scaleFor([], 0).y).toEqual([-1.1, 1.1]);
+});
+
 test("no curve gives an empty path", () => {
   expect(path([], scaleFor([], 3), box)).toBe("");
 });

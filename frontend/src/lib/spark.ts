@@ -12,10 +12,14 @@ export interface Scale {
   y: readonly [number, number];
 }
 
-/** One scale for all curves; a curve that leaves it is cut at the edge. */
+/** One scale for all curves; a curve that leaves it is cut at the edge. It goes from the ground to above the set point;
+ * around one that is zero as far as the first flight strays. */
 export function scaleFor(curves: readonly (readonly Point[])[], setPoint: number): Scale {
   const times = curves.flatMap((curve) => curve.map((point) => point[0]));
-  return { x: [Math.min(0, ...times), Math.max(1, ...times)], y: [0, 1.35 * setPoint] };
+  const x = [Math.min(0, ...times), Math.max(1, ...times)] as const;
+  if (setPoint > 0) return { x, y: [0, 1.35 * setPoint] };
+  const strays = Math.max(...(curves[0] ?? []).map((point) => Math.abs(point[1])), 0) || 1;
+  return { x, y: [-1.1 * strays, 1.1 * strays] };
 }
 
 /** Slopes that keep a curve through `points` from overshooting them (Steffen, Astron. Astrophys. 239, 443, 1990). */

@@ -1,6 +1,6 @@
 /** What the states are called on a page, and how much they ask for attention. */
 
-import type { CampaignState, TrialState } from "../api/types";
+import type { Campaign, CampaignState, TrialState } from "../api/types";
 
 export type Tone = "quiet" | "good" | "busy" | "bad";
 
@@ -24,9 +24,23 @@ const OUTCOME: Record<string, StateWords> = {
   stopped: { word: "Stopped by the operator", tone: "quiet" },
 };
 
-export function campaignWords(state: CampaignState, outcome: string | null): StateWords {
+type RehearsalState = Campaign["rehearsal"]["state"];
+
+/** What a campaign on a real vehicle waits for, where anything else would say that it may fly. */
+const REHEARSAL: Partial<Record<RehearsalState, StateWords>> = {
+  missing: { word: "To be rehearsed first", tone: "quiet" },
+  "under way": { word: "Being rehearsed", tone: "busy" },
+  failed: { word: "Rehearsal failed", tone: "bad" },
+};
+
+export function campaignWords(
+  state: CampaignState,
+  outcome: string | null,
+  rehearsal: RehearsalState = "not needed",
+): StateWords {
   if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
-  return CAMPAIGN[state];
+  const mayFly = state === "ready" || state === "deciding";
+  return (mayFly && REHEARSAL[rehearsal]) || CAMPAIGN[state];
 }
 
 const TRIAL: Record<TrialState, StateWords> = {

@@ -18,8 +18,8 @@ const catalogue = {
 } as unknown as Catalogue;
 
 test("units are those of the campaign's experiment", () => {
-  expect(unitsOf(catalogue, "takeoff")).toEqual({ error: "m", output: "m", gains: "counts" });
-  expect(unitsOf(catalogue, "pitch-tracking")).toEqual({ error: "rad·s", output: "rad", gains: "" });
+  expect(unitsOf(catalogue, "takeoff")).toEqual({ error: "m", output: "m", gains: "counts", setPoint: 3 });
+  expect(unitsOf(catalogue, "pitch-tracking")).toEqual({ error: "rad·s", output: "rad", gains: "", setPoint: 0 });
 });
 
 test("a gain has a name that says what it is, once the catalogue is there", () => {

@@ -7,9 +7,11 @@ export interface Units {
   output: string;
   /** Of the gains; empty when they have several. */
   gains: string;
+  /** Where the scored output is to go, in its unit. */
+  setPoint: number;
 }
 
-const TAKEOFF: Units = { error: "m", output: "m", gains: "counts" };
+const TAKEOFF: Units = { error: "m", output: "m", gains: "counts", setPoint: 3 };
 
 /** Those of the experiment; of the takeoff until the catalogue is there. */
 export function unitsOf(catalogue: Catalogue | undefined, experiment: string): Units {
@@ -20,6 +22,7 @@ export function unitsOf(catalogue: Catalogue | undefined, experiment: string): U
     error: found.error_unit,
     output: found.output_unit,
     gains: units.size === 1 ? ([...units][0] ?? "") : "",
+    setPoint: found.output_unit === TAKEOFF.output ? TAKEOFF.setPoint : 0,
   };
 }
 

@@ -1,7 +1,7 @@
 import { Skeleton, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
-import { useCampaign, useCampaignFigure, useProposal, useTrials } from "../api/queries";
+import { useCampaign, useCampaignFigure, useProposal, useStanding, useTrials } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
 import { ByFlightPanels, CurvesPanel } from "../components/CampaignCharts";
 import { CampaignHeader } from "../components/CampaignHeader";
@@ -70,7 +70,8 @@ interface View {
 function CampaignView({ campaign, trials: read, trouble }: View) {
   const trials = read ?? NONE;
   const [chosen, setChosen] = useState<number | null>(null);
-  const next = useProposal(campaign.id);
+  const standing = useStanding(campaign.id);
+  const unproposed = useProposal(campaign.id).error;
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
   const shown = shownTrial(trials, chosen);
@@ -99,12 +100,9 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
           )}
         </div>
         <div className={classes["next"]}>
-          {read === null && trouble === null && <Skeleton height={480} radius="md" />}
-          {next.data && read !== null ? (
-            <Next campaign={campaign} next={next.data} trials={trials} onChoose={setChosen} />
-          ) : (
-            <Trouble error={next.error ?? trouble} />
-          )}
+          {standing !== null && <Next {...standing} onChoose={setChosen} />}
+          {standing === null &&
+            (unproposed || trouble ? <Trouble error={unproposed ?? trouble} /> : <Skeleton height={480} radius="md" />)}
         </div>
       </div>
       <div className={classes["halves"]}>

@@ -325,6 +325,10 @@ export type CampaignSummary = {
      */
     verdict: 'better' | 'worse' | 'unresolved' | null;
     /**
+     * Rehearsal
+     */
+    rehearsal: 'not needed' | 'missing' | 'under way' | 'passed' | 'failed';
+    /**
      * Next Action
      */
     next_action: string;
