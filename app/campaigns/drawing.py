@@ -108,7 +108,7 @@ def _flight(row: TrialRow) -> FlightData:
     return FlightData(
         number=row.number,
         gains=row.gains,
-        outcome=cast("Outcome", row.state.value),
+        outcome="not yet judged" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
         curve=None,
         error=row.error,
         predicted_error=row.predicted_error,

@@ -8,7 +8,8 @@ import numpy as np
 from app.core.policy import Gain, Gains
 from app.core.trajectory import Samples
 
-Outcome = Literal["captured", "valid", "aborted", "invalid", "lost"]
+Outcome = Literal["not yet judged", "valid", "aborted", "invalid", "lost"]
+"""What a flight is called where it is drawn."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,9 +28,9 @@ class TakeoffsFigure:
     `TABLE_TIMES_S` that the experiment lasts.
 
     Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, band, glitch, live,
-    pointed, off scale) and, for flights, `trial` and `standing` (best, latest, earlier, invalid); a flight's `uid` is
-    `flight-` and its number. The traces `live` and `pointed` are empty: a page fills one while it flies, the other with
-    a flight that is pointed at and has no curve of its own.
+    pointed, off scale) and, for flights, `trial` and `standing` (best, latest, earlier, invalid, unjudged); a flight's
+    `uid` is `flight-` and its number. The traces `live` and `pointed` are empty: a page fills one while it flies, the
+    other with a flight that is pointed at and has no curve of its own.
     """
 
     history: History
@@ -100,6 +100,8 @@ class TakeoffsFigure:
         return robust_span(curves, low=low, high=high)
 
     def _standing(self, flight: FlightData) -> str:
+        if flight.outcome == "not yet judged":
+            return "unjudged"
         if flight.outcome != "valid":
             return "invalid"
         if flight is self.history.best:
@@ -108,7 +110,7 @@ class TakeoffsFigure:
 
     def _weight(self, flight: FlightData) -> tuple[int, int]:
         """Drawing order: what matters most comes last, on top."""
-        return ("invalid", "earlier", "latest", "best").index(self._standing(flight)), flight.number
+        return ("invalid", "earlier", "latest", "unjudged", "best").index(self._standing(flight)), flight.number
 
     def _flight(self, palette: Palette, flight: FlightData, points: int) -> dict[str, object]:
         assert flight.curve is not None
@@ -118,6 +120,7 @@ class TakeoffsFigure:
             "latest": f"{flight.number} · latest",
             "earlier": f"{flight.number}",
             "invalid": f"{flight.number} · {flight.outcome}",
+            "unjudged": f"{flight.number} · {flight.outcome}",
         }[standing]
         error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.history.error_unit}"
         return self._trace(
@@ -128,7 +131,7 @@ class TakeoffsFigure:
             line=_style(palette, standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
-            showlegend=standing in {"best", "latest"},
+            showlegend=standing not in ALIKE,
             meta={"role": "flight", "trial": flight.number, "standing": standing},
             hovertemplate=f"<b>Flight {label}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
             f"{self.history.output_unit}{error}<extra></extra>",
@@ -270,6 +273,7 @@ def _style(palette: Palette, standing: str) -> dict[str, object]:
         "latest": theme.line(palette.ink, 2),
         "earlier": theme.line(palette.earlier, 1.25),
         "invalid": theme.line(palette.bad, 1.25, "dot"),
+        "unjudged": theme.line(palette.ink, 2, "longdash"),
     }[standing]
 
 

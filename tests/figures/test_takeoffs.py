@@ -45,6 +45,15 @@ def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
     assert entries == ["Set point", "Reference", "Flight 5 · best", "Earlier", "Not counted"]
 
 
+def test_a_flight_that_nobody_has_judged_is_not_drawn_like_one_that_does_not_count() -> None:
+    card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet judged"))).compute()
+    drawn = trace(card, "flight", trial=2)
+    assert (drawn["name"], drawn["meta"]["standing"], drawn["line"]["dash"]) == (
+        "Flight 2 · not yet judged", "unjudged", "longdash")  # fmt: skip
+    assert [one["name"] for one in traces(card) if one.get("showlegend", True)] == [
+        "Set point", "Reference", "Flight 2 · not yet judged", "Flight 1 · best"]  # fmt: skip
+
+
 def test_the_prediction_is_dashed_and_named_after_the_next_flight() -> None:
     drawn = trace(TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute(), "prediction")
     assert drawn["line"]["dash"] == "dash"
