@@ -1,6 +1,8 @@
 """What streams that join late are told first: what has been measured so far of each flight in the air, and how the
 vehicles are. One event loop only."""
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from app.live.messages import FlightPhase, Shown, Telemetry, VehicleStatus
@@ -10,21 +12,22 @@ _OVER = frozenset({"landed", "ended"})
 
 class Memory:
     """Grows with the telemetry of a flight and forgets it when the flight is over; of a vehicle's status it keeps the
-    newest."""
+    newest. `clock_s` tells how old each is when it is told again: of a worker that hangs nothing newer comes."""
 
-    def __init__(self) -> None:
-        self._flights: dict[int, Telemetry] = {}
-        self._vehicles: dict[int, VehicleStatus] = {}
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._clock_s = clock_s
+        self._flights: dict[int, tuple[Telemetry, float]] = {}
+        self._vehicles: dict[int, tuple[VehicleStatus, float]] = {}
 
     def take(self, message: Shown) -> None:
         match message:
             case VehicleStatus():
-                self._vehicles[message.vehicle_id] = message
+                self._vehicles[message.vehicle_id] = message, self._clock_s()
             case FlightPhase():
                 if message.phase in _OVER:
                     self._flights.pop(message.trial_id, None)
             case Telemetry():
-                self._grow(message)
+                self._flights[message.trial_id] = self._grown(message), self._clock_s()
 
     def forget_all(self) -> None:
         """The worker is gone, and with it whatever flew or was connected."""
@@ -32,14 +35,20 @@ class Memory:
         self._vehicles.clear()
 
     def so_far(self) -> list[Shown]:
-        """One message for each vehicle, and one for each flight with everything measured since its command."""
-        flights = (replace(flight, samples=list(flight.samples)) for flight in self._flights.values())
-        return [*self._vehicles.values(), *flights]
+        """One message for each vehicle, and one for each flight with everything measured since its command, each with
+        its age."""
+        now_s = self._clock_s()
+        vehicles = (replace(status, age_s=now_s - heard_s) for status, heard_s in self._vehicles.values())
+        flights = (
+            replace(flight, samples=list(flight.samples), age_s=now_s - heard_s)
+            for flight, heard_s in self._flights.values()
+        )
+        return [*vehicles, *flights]
 
-    def _grow(self, message: Telemetry) -> None:
-        before = self._flights.get(message.trial_id)
-        if before is None:
-            self._flights[message.trial_id] = replace(message, samples=list(message.samples))
-            return
+    def _grown(self, message: Telemetry) -> Telemetry:
+        """The message with everything measured before it."""
+        if message.trial_id not in self._flights:
+            return replace(message, samples=list(message.samples))
+        before, _ = self._flights[message.trial_id]
         before.samples.extend(message.samples)
-        self._flights[message.trial_id] = replace(message, samples=before.samples)
+        return replace(message, samples=before.samples)

@@ -19,7 +19,8 @@ Order = Literal["land", "motors off"]
 class Telemetry:
     """What was measured since the last message of this flight: rows of `columns`, the first of which is the seconds
     since the command and the second the scored channel. `error_so_far` is the error up to `time_s`, in the experiment's
-    unit; None until the first scored sample."""
+    unit; None until the first scored sample. `age_s` is how long ago the worker said it: of what a stream that joins
+    late is told once more."""
 
     campaign_id: int
     trial_id: int
@@ -27,6 +28,7 @@ class Telemetry:
     columns: list[str]
     samples: list[list[float]]
     error_so_far: float | None
+    age_s: float = 0.0
     type: Literal["telemetry"] = "telemetry"
 
 
@@ -45,12 +47,14 @@ class FlightPhase:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleStatus(Condition):
     """How a vehicle with a link of its own is; `at` is UTC in ISO 8601. While nothing of it is heard the state is
-    `gone`, and the rest is as last heard. `concern` says why it may only be observed; empty when it may fly."""
+    `gone`, and the rest is as last heard. `concern` says why it may only be observed; empty when it may fly. `age_s` as
+    in `Telemetry`; the other ages are as they were when it was said."""
 
     vehicle_id: int
     state: LinkTo
     at: str
     concern: str = ""
+    age_s: float = 0.0
     type: Literal["vehicle"] = "vehicle"
 
 

@@ -3,9 +3,11 @@
 import asyncio
 import sqlite3
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live
+from app.live.memory import Memory
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.live.watch import DatabaseWatch
 
@@ -95,11 +97,25 @@ def test_a_stream_that_joins_late_is_told_how_the_vehicles_are_while_there_is_a_
         hub = Hub()
         for item in (status(5, 0.1), status(6, 0.0), status(5, 2.9)):
             hub.publish(item)
-        assert await first_heard(hub, 3) == [change(1), status(5, 2.9), status(6, 0.0)]
+        first, *told = await first_heard(hub, 3)
+        assert first == change(1)
+        assert [replace(one, age_s=0.0) for one in told if isinstance(one, VehicleStatus)] == [
+            status(5, 2.9), status(6, 0.0)]  # fmt: skip
         hub.publish(LinkState(worker=False))
         assert await first_heard(hub, 1) == [change(1)]
 
     asyncio.run(scenario())
+
+
+def test_what_is_told_once_more_says_how_old_it_is_so_that_a_worker_that_hangs_does_not_look_alive() -> None:
+    now_s = 100.0
+    memory = Memory(lambda: now_s)
+    memory.take(VehicleStatus(vehicle_id=5, state="connected", at="", step="record", packet_age_s=0.1))
+    now_s += 1.5
+    memory.take(telemetry(0.1))
+    now_s += 2.5
+    assert [(type(one), one.age_s) for one in memory.so_far() if not isinstance(one, FlightPhase)] == [
+        (VehicleStatus, 4.0), (Telemetry, 2.5)]  # fmt: skip
 
 
 def test_a_stream_too_far_behind_is_ended_so_that_it_resumes_from_the_database() -> None:

@@ -24,7 +24,7 @@ test("telemetry grows the curve and updates the readings", () => {
 });
 
 test("another experiment sends other columns, the scored one second", () => {
-  const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1 };
+  const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
   const columns = ["time_s", "pitch_error_rad", "elevator_rad"];
   const flight = extended(begun(1, 5), { ...news, columns, samples: [[1, -0.02, 0.1]] });
   expect([flight.channel, flight.measured, flight.thrust, flight.batteryV]).toEqual([

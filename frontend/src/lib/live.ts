@@ -25,6 +25,8 @@ export interface Telemetry {
   columns: string[];
   samples: number[][];
   error_so_far: number | null;
+  /** How long ago it was said, in seconds; of what a tab that joins late is told once more. */
+  age_s: number;
 }
 
 export function begun(campaignId: number, trialId: number): LiveFlight {
@@ -97,7 +99,7 @@ function isRow(value: unknown): value is number[] {
 export function telemetryFrom(json: string): Telemetry | null {
   const parsed: unknown = JSON.parse(json);
   if (typeof parsed !== "object" || parsed === null) return null;
-  const { campaign_id, trial_id, time_s, columns, samples, error_so_far } = parsed as Record<string, unknown>;
+  const { campaign_id, trial_id, time_s, columns, samples, error_so_far, age_s } = parsed as Record<string, unknown>;
   if (typeof campaign_id !== "number" || typeof trial_id !== "number" || !Array.isArray(samples)) return null;
   if (!Array.isArray(columns)) return null;
   return {
@@ -107,5 +109,6 @@ export function telemetryFrom(json: string): Telemetry | null {
     columns: columns.map(String),
     samples: samples.filter(isRow),
     error_so_far: typeof error_so_far === "number" ? error_so_far : null,
+    age_s: typeof age_s === "number" ? age_s : 0,
   };
 }

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { aged, ageText, type Heard, linkText, secondsBetween, statusFrom, stepWord } from "./vehicle";
+import { aged, ageText, before, type Heard, linkText, secondsBetween, statusFrom, stepWord } from "./vehicle";
 
 const line = JSON.stringify({
   type: "vehicle",
@@ -43,6 +43,13 @@ test("the age counts on while nothing comes, and after two seconds nothing is cu
   const late = aged(heard(), after(2));
   expect([late.isCurrent, linkText(late)]).toEqual([false, "silent for 2.1 s"]);
   expect(linkText(aged(heard(), after(200)))).toBe("silent for 3 min");
+});
+
+test("a status that is told once more is as old as it was said, not as it was told", () => {
+  const { status } = heard({ age_s: 1.95 });
+  const now = after(0);
+  const replayed = aged({ status, heardAt: before(now, status.ageS) }, now);
+  expect([replayed.linkAgeS, replayed.isCurrent]).toEqual([2.05, false]);
 });
 
 test("news that come while the vehicle itself is silent do not make it current", () => {

@@ -7,6 +7,8 @@ export interface VehicleStatus {
   state: LinkState;
   /** UTC, when it was said. */
   at: string;
+  /** Seconds since it was said, when the stream told it: of what a tab that joins late is told once more. */
+  ageS: number;
   step: string;
   /** Seconds since the last packet, when it was said. */
   packetAgeS: number | null;
@@ -48,6 +50,11 @@ export interface Aged {
 }
 
 export const CURRENT_S = 2;
+
+/** The moment so many seconds before `now`: when that was news which is told only now. */
+export function before(now: Moment, ageS: number): Moment {
+  return { wallMs: now.wallMs - 1000 * ageS, steadyMs: now.steadyMs - 1000 * ageS };
+}
 
 /** The larger of what both clocks say: a clock set back or asleep must not make old news look new. */
 export function secondsBetween(from: Moment, to: Moment): number {
@@ -131,6 +138,7 @@ export function statusFrom(json: string): VehicleStatus | null {
     vehicleId,
     state,
     at: text(found["at"]),
+    ageS: number(found["age_s"]) ?? 0,
     step: text(found["step"]),
     packetAgeS: number(found["packet_age_s"]),
     heartbeatAgeS: number(found["heartbeat_age_s"]),

@@ -6,6 +6,7 @@ import type { News } from "../lib/speech";
 import {
   type Aged,
   aged,
+  before,
   CURRENT_S,
   type Heard,
   type Moment,
@@ -59,7 +60,7 @@ export function setNotLive(state: "connecting" | "away", heardAt: string | null)
 
 export function takeTelemetry(news: Telemetry): void {
   const known = flights.get().get(news.trial_id) ?? begun(news.campaign_id, news.trial_id);
-  flights.set(withFlight(flights.get(), { ...extended(known, news), heardAt: momentNow() }));
+  flights.set(withFlight(flights.get(), { ...extended(known, news), heardAt: before(momentNow(), news.age_s) }));
 }
 
 export function takePhase(campaignId: number, trialId: number, phase: string): void {
@@ -68,7 +69,7 @@ export function takePhase(campaignId: number, trialId: number, phase: string): v
 }
 
 export function takeStatus(status: VehicleStatus): void {
-  vehicles.set(new Map([...vehicles.get(), [status.vehicleId, { status, heardAt: momentNow() }]]));
+  vehicles.set(new Map([...vehicles.get(), [status.vehicleId, { status, heardAt: before(momentNow(), status.ageS) }]]));
 }
 
 export function momentNow(): Moment {
