@@ -54,8 +54,7 @@ class Gauges:
 
     def _mode(self, number: str) -> str:
         """The block of the flight plan where the vehicle tells of one, for that says more than its mode."""
-        block = self._radio.block
-        return block or number
+        return self._radio.block or self._radio.profile.mode_names.get(number, number)
 
     def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
         if now_s - self._counts[-1].at_s >= _EVERY_S:

@@ -34,9 +34,9 @@ _REBOOT_S: Final = 1.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it;
-    modes are as `Heartbeat` names them, empty where any will do; heartbeats come every `heartbeat_s`. `blocks` are a
-    flight plan's by number, `arming_blocks` and so on the names of those that the vehicle may be in, empty where it has
-    none."""
+    modes are as `Heartbeat` names them, empty where any will do, `mode_names` what people call them; heartbeats come
+    every `heartbeat_s`. `blocks` are a flight plan's by number, `arming_blocks` and so on the names of those that
+    the vehicle may be in, empty where it has none."""
 
     set_point_m: float
     heartbeat_s: float
@@ -50,6 +50,7 @@ class Limits:
     crossings: int = 4
     flying_modes: frozenset[str] = frozenset()
     landing_modes: frozenset[str] = frozenset()
+    mode_names: Mapping[str, str] = field(default_factory=dict)
     blocks: Mapping[int, str] = field(default_factory=dict)
     arming_blocks: frozenset[str] = frozenset()
     flying_blocks: frozenset[str] = frozenset()
@@ -201,18 +202,24 @@ def _accept(watch: Watch, position: Position, limits: Limits) -> Watch:
     return replace(watch, last=position, origin=watch.origin or position, side=side, crossings=crossed)
 
 
-def find_unexpected(watch: Watch, modes: frozenset[str], blocks: frozenset[str] = frozenset()) -> Finding | None:
+def find_unexpected(
+    watch: Watch, limits: Limits, modes: frozenset[str], blocks: frozenset[str] = frozenset()
+) -> Finding | None:
     """`modes` and `blocks` are those that it may be in, empty where any will do."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
     if not watch.armed:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle disarmed itself in the air.")
     if modes and watch.mode not in modes:
-        return Finding(failure=Failure.UNEXPECTED, why=f"The vehicle went into mode {watch.mode}.")
+        return Finding(failure=Failure.UNEXPECTED, why=f"The vehicle went into mode {_named(watch, limits)}.")
     if blocks and watch.block and watch.block not in blocks:
         why = f"Its flight plan went to the block “{watch.block}”."
         return Finding(failure=Failure.UNEXPECTED, why=why)
     return None
+
+
+def _named(watch: Watch, limits: Limits) -> str:
+    return limits.mode_names.get(watch.mode, watch.mode)
 
 
 def find_own_landing(watch: Watch, limits: Limits, ground_m: float, *, mode_known: bool) -> Finding | None:
@@ -220,7 +227,7 @@ def find_own_landing(watch: Watch, limits: Limits, ground_m: float, *, mode_know
     the vehicle's own ceiling, somewhat below ours, that was met."""
     why = ""
     if mode_known and watch.mode in limits.landing_modes - limits.flying_modes:
-        why = f"It went into mode {watch.mode}."
+        why = f"It went into mode {_named(watch, limits)}."
     elif watch.block in limits.landing_blocks:
         why = f"Its flight plan went to the block “{watch.block}”."
     if not why or watch.last is None:

@@ -246,7 +246,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     """The gravest limit that is not kept between the command and the end of the record."""
     plan, watch = trial.plan, trial.watch
     return (
-        watching.find_unexpected(watch, _modes(trial), _blocks(trial))
+        watching.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
         or watching.find_link(watch, plan.limits, now_s)
         or watching.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
         or watching.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
@@ -262,7 +262,7 @@ def _envelope(trial: Trial) -> Finding | None:
 
 def _taken_over(trial: Trial) -> Finding | None:
     """A reboot, or a mode that is neither flight nor landing: both end in disarming on the ground."""
-    return watching.find_unexpected(replace(trial.watch, armed=True), _modes(trial), _blocks(trial))
+    return watching.find_unexpected(replace(trial.watch, armed=True), trial.plan.limits, _modes(trial), _blocks(trial))
 
 
 def _modes(trial: Trial) -> frozenset[str]:

@@ -58,6 +58,7 @@ def limits_of(options: Options, radio: Radio, *, datum_m: float) -> Limits:
         radius_m=float(options["radius_m"]),
         flying_modes=profile.flying_modes,
         landing_modes=profile.landing_modes,
+        mode_names=profile.mode_names,
         blocks={number: name for name, number in radio.aim.blocks.items()},
         arming_blocks=profile.arming_blocks,
         flying_blocks=profile.flying_blocks,

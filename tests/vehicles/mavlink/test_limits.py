@@ -37,7 +37,7 @@ def test_a_hover_keeps_every_limit() -> None:
     assert limits.find_link(watch, LIMITS, 10.1) is None
     assert limits.find_frozen(watch, LIMITS, 10.3) is None
     assert limits.find_battery(watch, 10.1) is None
-    assert limits.find_unexpected(watch, LIMITS.flying_modes) is None
+    assert limits.find_unexpected(watch, LIMITS, LIMITS.flying_modes) is None
 
 
 def test_the_corridor_is_measured_from_the_ground_under_the_vehicle() -> None:
@@ -158,9 +158,9 @@ def test_silence_alone_is_not_frozen() -> None:
 
 def test_a_packet_that_was_overtaken_is_left_out_and_a_clock_that_falls_back_is_a_reboot() -> None:
     watch = told(watch_of(3.0, 3.0), Position(10.0, 3.0, 0.0), at_s=10.03)
-    assert limits.find_unexpected(replace(watch, armed=True), frozenset()) is None
+    assert limits.find_unexpected(replace(watch, armed=True), LIMITS, frozenset()) is None
     watch = told(watch, Position(0.5, 3.0, 0.0), at_s=10.04)
-    reboot = limits.find_unexpected(replace(watch, armed=True), frozenset())
+    reboot = limits.find_unexpected(replace(watch, armed=True), LIMITS, frozenset())
     assert reboot is not None
     assert reboot.why == "The vehicle rebooted."
 
@@ -182,11 +182,20 @@ def test_a_battery_that_says_nothing_for_ten_seconds_counts_as_low() -> None:
 
 def test_a_disarming_and_a_strange_mode_are_unexpected() -> None:
     watch = watch_of(3.0)
-    disarmed = limits.find_unexpected(watch, LIMITS.flying_modes)
-    strange = limits.find_unexpected(told(watch, Heartbeat(9, True, "0"), at_s=10.1), LIMITS.flying_modes)
+    disarmed = limits.find_unexpected(watch, LIMITS, LIMITS.flying_modes)
+    named = replace(LIMITS, mode_names={"64": "By hand"})
+    strange, taken = (
+        limits.find_unexpected(told(watch, Heartbeat(9, True, mode), at_s=10.1), named, LIMITS.flying_modes)
+        for mode in ("0", "64")
+    )
     assert disarmed is not None
     assert strange is not None
-    assert (disarmed.why, strange.why) == ("The vehicle disarmed itself in the air.", "The vehicle went into mode 0.")
+    assert taken is not None
+    assert (disarmed.why, strange.why, taken.why) == (
+        "The vehicle disarmed itself in the air.",
+        "The vehicle went into mode 0.",
+        "The vehicle went into mode By hand.",
+    )
 
 
 def test_the_ground_takes_height_and_speed_and_a_fresh_sample() -> None:

@@ -1,6 +1,7 @@
 """ArduCopter: guided mode, and its vertical controllers' gains under the names of before and after release 4.7."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
@@ -35,6 +36,13 @@ class ArduPilot:
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({str(GUIDED)})
     landing_modes: Final = frozenset({str(LAND)})
+    mode_names: Final = MappingProxyType(
+        {
+            "0": "Stabilize", "1": "Acro", "2": "AltHold", "3": "Auto", "4": "Guided", "5": "Loiter", "6": "RTL",
+            "7": "Circle", "9": "Land", "11": "Drift", "13": "Sport", "14": "Flip", "15": "AutoTune", "16": "PosHold",
+            "17": "Brake", "18": "Throw", "20": "Guided_NoGPS", "21": "SmartRTL",
+        }
+    )  # fmt: skip
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()

@@ -156,6 +156,11 @@ class Profile(Protocol):
     @property
     def landing_modes(self) -> frozenset[str]: ...
     @property
+    def mode_names(self) -> Mapping[str, str]:
+        """What people call its modes, by what a heartbeat names them; one that is not here goes by that."""
+        ...
+
+    @property
     def arming_blocks(self) -> frozenset[str]:
         """Of its flight plan, where it has one: in which it stands on the ground before the take-off."""
         ...

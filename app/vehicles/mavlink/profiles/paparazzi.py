@@ -1,6 +1,7 @@
 """Paparazzi: MAVLink 1, flight plan blocks instead of modes, gains that are integers."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.errors import VehicleError
@@ -38,6 +39,7 @@ class Paparazzi:
     climbs_from_ground: Final = False
     flying_modes: Final = frozenset({_NAV})
     landing_modes: Final = frozenset({_NAV})
+    mode_names: Final = MappingProxyType({_NAV: "Automatic", "8": "Guided", "64": "By hand", "80": "By hand"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})

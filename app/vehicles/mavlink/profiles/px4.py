@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import COMMON, Message, number
@@ -36,6 +37,12 @@ class Px4:
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
+    mode_names: Final = MappingProxyType(
+        {
+            "1.0": "Manual", "2.0": "Altitude", "3.0": "Position", "4.1": "Ready", "4.2": "Take-off", "4.3": "Hold",
+            "4.4": "Mission", "4.5": "Return", "4.6": "Land", "5.0": "Acro", "6.0": "Offboard", "7.0": "Stabilized",
+        }
+    )  # fmt: skip
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
