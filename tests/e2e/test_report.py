@@ -139,7 +139,7 @@ def test_a_campaign_travels_as_a_file(
     dashboard = open_dashboard(shared_server.url)
     dashboard.open_campaign(campaign_id)
     with dashboard.page.expect_download() as coming:
-        dashboard.page.get_by_role("link", name="Download bundle").click()
+        dashboard.page.get_by_role("button", name="Download bundle").click()
     bundle = tmp_path / "campaign.zip"
     coming.value.save_as(bundle)
     there = open_dashboard(own_server.url)

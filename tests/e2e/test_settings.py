@@ -76,12 +76,23 @@ def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(dashboard: Da
     campaign_id = dashboard.create("twin", name="Worth keeping")
     dashboard.open("/settings")
     with dashboard.page.expect_download() as waiting:
-        dashboard.page.get_by_role("link", name="Download a backup").click()
+        dashboard.button("Download a backup").click()
     assert waiting.value.suggested_filename.endswith(".sqlite3")
     waiting.value.save_as(tmp_path / "copy.sqlite3")
     with closing(sqlite3.connect(tmp_path / "copy.sqlite3")) as copy:
         found = copy.execute("SELECT name FROM campaign WHERE id = ?", (campaign_id,)).fetchone()
     assert found == ("Worth keeping",)
+
+
+def test_a_backup_that_is_refused_says_why_instead_of_failing_as_a_download(dashboard: Dashboard) -> None:
+    dashboard.open("/settings")
+    problem = {"title": "Storage trouble", "status": 507, "detail": "There is too little room for a copy.",
+               "hint": "Free some disk space."}  # fmt: skip
+    dashboard.page.route("**/api/system/backup", lambda route: route.fulfill(status=507, json=problem))
+    dashboard.button("Download a backup").click()
+    told = dashboard.panel("Backup").get_by_role("alert")
+    expect(told).to_contain_text("There is too little room for a copy.")
+    expect(told).to_contain_text("Free some disk space.")
 
 
 def test_what_the_server_is_asked_about_stands_there_with_units(dashboard: Dashboard) -> None:

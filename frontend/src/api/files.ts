@@ -1,6 +1,7 @@
-/** Campaigns as files: a report printed by the server, and bundles that come in from another installation. */
+/** Files that the server makes or takes: reports, bundles, backups. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { fileNameIn } from "../lib/files";
 import { randomKey } from "../lib/ids";
 import { ApiError, problemFrom } from "../lib/problems";
 import type { Campaign } from "./types";
@@ -16,14 +17,15 @@ async function asked(path: string, init?: RequestInit): Promise<Response> {
   throw new ApiError(problemFrom(response?.status, await response?.json().catch(() => null)));
 }
 
-/** Have the report printed, which takes some seconds, and save it. */
-export function usePdf(campaignId: number) {
+/** Save what the server makes, under the name that it gives it, or say why it makes nothing: a link with `download`
+ * would hide that. */
+export function useDownload(path: string) {
   return useMutation({
     mutationFn: async () => {
-      const response = await asked(pathOf(campaignId, "report.pdf"));
+      const response = await asked(path);
       const link = document.createElement("a");
       link.href = URL.createObjectURL(await response.blob());
-      link.download = `campaign-${campaignId}-report.pdf`;
+      link.download = fileNameIn(response.headers.get("Content-Disposition"));
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
     },

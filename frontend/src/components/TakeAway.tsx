@@ -1,29 +1,40 @@
 import { Button } from "@mantine/core";
-import { pathOf, usePdf } from "../api/files";
+import { pathOf, useDownload } from "../api/files";
 import type { Campaign } from "../api/types";
 import classes from "./CampaignHeader.module.css";
 import { Trouble } from "./Trouble";
 
 /** The campaign on paper, and as one file for another installation; what flies is not whole yet. */
 export function TakeAway({ campaign }: { campaign: Campaign }) {
-  const pdf = usePdf(campaign.id);
-  const link = { component: "a", variant: "default" } as const;
+  const pdf = useDownload(pathOf(campaign.id, "report.pdf"));
+  const bundle = useDownload(pathOf(campaign.id, "bundle"));
   return (
     <>
       <div className={classes["away"]}>
-        <Button {...link} href={pathOf(campaign.id, "report.html")} target="_blank" rel="noreferrer">
+        <Button
+          component="a"
+          variant="default"
+          href={pathOf(campaign.id, "report.html")}
+          target="_blank"
+          rel="noreferrer"
+        >
           Report
         </Button>
         <Button variant="default" loading={pdf.isPending} onClick={() => pdf.mutate()}>
           PDF
         </Button>
         {campaign.flying === null && (
-          <Button {...link} href={pathOf(campaign.id, "bundle")} download aria-label="Download bundle">
+          <Button
+            variant="default"
+            loading={bundle.isPending}
+            aria-label="Download bundle"
+            onClick={() => bundle.mutate()}
+          >
             Bundle
           </Button>
         )}
       </div>
-      <Trouble error={pdf.error} />
+      <Trouble error={pdf.error ?? bundle.error} />
     </>
   );
 }

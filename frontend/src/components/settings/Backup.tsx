@@ -1,12 +1,15 @@
 import { Button } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
+import { useDownload } from "../../api/files";
 import { BACKUP, type System } from "../../api/system";
 import { bytesText } from "../../lib/format";
 import classes from "../../pages/SettingsPage.module.css";
 import { Panel } from "../Panel";
+import { Trouble } from "../Trouble";
 
 /** A copy of everything, and how it comes back. */
 export function Backup({ system }: { system: System }) {
+  const backup = useDownload(BACKUP);
   return (
     <Panel title="Backup">
       <div className={classes["stack"]}>
@@ -16,10 +19,15 @@ export function Backup({ system }: { system: System }) {
           are not in it.
         </p>
         <div>
-          <Button component="a" href={BACKUP} download leftSection={<IconDownload size={18} aria-hidden />}>
+          <Button
+            leftSection={<IconDownload size={18} aria-hidden />}
+            loading={backup.isPending}
+            onClick={() => backup.mutate()}
+          >
             Download a backup
           </Button>
         </div>
+        <Trouble error={backup.error} />
         <details className={classes["details"]}>
           <summary>How to restore it</summary>
           <ol>
