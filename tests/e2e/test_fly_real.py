@@ -1,9 +1,12 @@
 """The fly screen with a REAL vehicle: a simulated drone over loopback UDP, registered as real and flown by hand."""
 
+import re
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from tests.e2e.conftest import Opener, Server, served
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard
@@ -91,10 +94,44 @@ def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
     expect(dashboard.page.get_by_text("Suggested: valid")).to_be_visible(timeout=60_000)
     expect(word(dashboard)).to_have_text("Landed")
     assert state_of(dashboard, trial_id) == "captured"
-    dashboard.button("Count it as valid").click()
-    dashboard.page.get_by_role("link", name="Next flight").click()
+    dashboard.until(lambda: dashboard.trace("Live curve", "flight", trial=1, standing="unjudged") is not None)
+    in_sight_and_large_enough(dashboard)
+    with slow_answers(dashboard.page):
+        dashboard.button("Count it as valid").click()
+        dashboard.page.get_by_role("link", name="Next flight").click()
+        headings = dashboard.page.get_by_role("heading", level=2)
+        said: set[str] = set()
+        while "Flight budget used" not in said:
+            said.update(text.strip() for text in headings.all_inner_texts())
+            dashboard.page.wait_for_timeout(20)
+    assert "Flight 1 wants your word" not in said
     expect(dashboard.panel("Flight 1")).to_be_visible()
     assert state_of(dashboard, trial_id) == "valid"
+
+
+def in_sight_and_large_enough(dashboard: Dashboard) -> None:
+    """The reasons for which a flight does not count, and the way back, on the fly screen."""
+    page = dashboard.page
+    dashboard.button("Mark invalid").click()
+    for label in page.get_by_label("What to do now").locator("form label:visible").filter(has_not_text="Reason").all():
+        box = label.bounding_box()
+        assert box is not None
+        assert box["height"] >= 48, label.inner_text()
+    expect(dashboard.button("Keep it")).to_be_in_viewport(ratio=1)
+    dashboard.button("Keep it").click()
+
+
+@contextmanager
+def slow_answers(page: Page) -> Iterator[None]:
+    """What is read of a campaign comes late, its list of flights last."""
+
+    def late(route: Route) -> None:
+        time.sleep(0.3)
+        route.continue_()
+
+    page.route(re.compile("/api/campaigns/[0-9]+/(proposal|trials)"), late)
+    yield
+    page.unroute(re.compile("/api/campaigns/[0-9]+/(proposal|trials)"), late)
 
 
 def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:

@@ -95,6 +95,11 @@ def test_a_note_and_a_photo_stay_with_the_flight(dashboard: Dashboard, campaign_
     expect(verdict.get_by_label("Note on flight 1")).to_have_value("Gust from the north at 4 s")
     expect(photo).to_be_visible()
     verdict.get_by_role("button", name="Delete photo 1 of flight 1").click()
+    verdict.get_by_role("button", name="Keep it").click()
+    expect(verdict.get_by_text("for good?")).to_have_count(0)
+    assert len(dashboard.get(f"/trials/{trial['id']}/photos")) == 1
+    verdict.get_by_role("button", name="Delete photo 1 of flight 1").click()
+    verdict.get_by_role("button", name="Delete photo 1", exact=True).click()
     expect(photo).to_have_count(0)
     assert dashboard.get(f"/trials/{trial['id']}/photos") == []
 

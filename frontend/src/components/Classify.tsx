@@ -52,7 +52,7 @@ export function Classify({ trial, trials }: Props) {
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
           <div className={classes["chips"]}>
             {INVALID_REASONS.map((one) => (
-              <Chip key={one} value={one} size="lg" variant="outline">
+              <Chip key={one} value={one} size="sm" variant="outline">
                 {one}
               </Chip>
             ))}
@@ -65,7 +65,7 @@ export function Classify({ trial, trials }: Props) {
           error={refused}
           onChange={(event) => setReason(event.currentTarget.value)}
         />
-        <div className={classes["acts"]}>
+        <div className={classes["inSight"]}>
           <Button type="submit" color="red" disabled={reason.trim() === ""} loading={classify.isPending}>
             Mark invalid
           </Button>

@@ -12,6 +12,8 @@ const PICTURES = "image/jpeg,image/png,image/webp";
 export function FlightNotes({ trial }: { trial: Trial }) {
   const { data: photos = [], error } = usePhotos(trial.id);
   const { add, remove } = usePhotoActs(trial.id);
+  const [asked, setAsked] = useState<number | null>(null);
+  const doomed = photos.findIndex(({ id }) => id === asked);
   const kept = trial.note !== "" || photos.length > 0;
   return (
     <details className={classes["notes"]} open={kept || undefined}>
@@ -28,14 +30,25 @@ export function FlightNotes({ trial }: { trial: Trial }) {
               <button
                 type="button"
                 aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
-                disabled={remove.isPending}
-                onClick={() => remove.mutate(id)}
+                aria-expanded={id === asked}
+                onClick={() => setAsked(id === asked ? null : id)}
               >
                 <IconTrash size={18} aria-hidden />
               </button>
             </li>
           ))}
         </ul>
+      )}
+      {asked !== null && doomed >= 0 && (
+        <div className={classes["asks"]}>
+          <p role="status">Delete photo {doomed + 1} for good? Nothing else keeps it.</p>
+          <Button variant="default" onClick={() => setAsked(null)}>
+            Keep it
+          </Button>
+          <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
+            Delete photo {doomed + 1}
+          </Button>
+        </div>
       )}
       <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
         {(props) => (
