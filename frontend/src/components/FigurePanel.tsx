@@ -28,6 +28,8 @@ interface Props {
   tools?: ReactNode;
   /** What a newcomer asks of it. */
   topic?: Topic;
+  /** What there is to say of it in words. */
+  note?: string | undefined;
   className?: string | undefined;
 }
 
@@ -45,6 +47,7 @@ export function FigurePanel({
   curveOf,
   tools,
   topic,
+  note,
   className,
 }: Props) {
   const [asTable, setAsTable] = useState(false);
@@ -96,6 +99,7 @@ export function FigurePanel({
           curveOf={curveOf}
         />
       )}
+      {note && <p className={classes["note"]}>{note}</p>}
     </Panel>
   );
 }

@@ -4,9 +4,10 @@ import { useState } from "react";
 import { usePromote } from "../api/mutations";
 import type { Campaign } from "../api/types";
 import { useVehicle } from "../api/vehicles";
+import { sameHeld } from "../lib/flyScreen";
 import { gainsInBrackets } from "../lib/gains";
 import { problemOf, reasonsByField } from "../lib/problems";
-import { promotable } from "../lib/verdict";
+import { heldMeanwhile, promotable } from "../lib/verdict";
 import classes from "./NextFlight.module.css";
 import { Trouble } from "./Trouble";
 
@@ -19,7 +20,14 @@ export function Promote({ campaign }: { campaign: Campaign }) {
   const vehicle = useVehicle(campaign.vehicle.registered ? campaign.vehicle.id : null);
   if (vehicle === null || campaign.best === null) return null;
   const { possible, why } = promotable(campaign, vehicle);
-  if (!possible) return <p className={classes["quiet"]}>{why}</p>;
+  if (!possible) {
+    const isDone = sameHeld(vehicle.safe_gains, campaign.best.gains);
+    return (
+      <p className={classes["quiet"]}>
+        {why} {isDone && heldMeanwhile(vehicle)}
+      </p>
+    );
+  }
   if (!asking) {
     return (
       <Button

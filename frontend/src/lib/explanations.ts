@@ -83,7 +83,7 @@ export const EXPLANATIONS = explained({
   threshold: {
     question: "What has the next flight to beat?",
     answer: [
-      "The stop rule's threshold: with the paper's rule 5 % below the best error. A flight above it counts as no improvement, and two in a row end the campaign.",
+      "The threshold of the paper's stop rule: below the best error by the improvement that this campaign asks for (under Settings, Stop). A flight above it counts as no improvement, and two in a row end the campaign.",
       "The band is where another flight of the best gains would land by chance: what falls in there is no news.",
     ],
   },

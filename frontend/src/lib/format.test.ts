@@ -8,7 +8,6 @@ import {
   localTime,
   NOTHING,
   percentChange,
-  signed,
   utcTime,
   withUnit,
 } from "./format";
@@ -17,12 +16,6 @@ test("an error is printed to the millimetre, with its unit", () => {
   expect(withUnit(0.13189333802782058, "m")).toBe("0.132 m");
   expect(withUnit(null, "m")).toBe(NOTHING);
   expect(withUnit(Number.NaN, "m")).toBe(NOTHING);
-});
-
-test("a change has a sign, and a change too small to print has both", () => {
-  expect(signed(12.4)).toBe("+12");
-  expect(signed(-12.4, 1)).toBe("−12.4");
-  expect(signed(0.2)).toBe("±0");
 });
 
 test("a change is told in words, and one too small to print is none", () => {

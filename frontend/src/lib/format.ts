@@ -21,12 +21,6 @@ export function against(percent: number, base: string): string {
   return `${size} % ${percent < 0 ? "below" : "above"} ${base}`;
 }
 
-export function signed(value: number, digits = 0): string {
-  const text = Math.abs(value).toFixed(digits);
-  if (Number(text) === 0) return `±${text}`;
-  return `${value > 0 ? "+" : "−"}${text}`;
-}
-
 /** A gain: whole numbers as they are, others in four digits, with a true minus. */
 export function gainText(value: number): string {
   const text = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(4)));

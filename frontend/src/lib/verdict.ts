@@ -1,7 +1,8 @@
 /** What a finished flight is worth, and against what. */
 
 import type { Campaign, Trial, Vehicle } from "../api/types";
-import { sameHeld } from "./flyScreen";
+import { inOrder, sameHeld } from "./flyScreen";
+import { gainsInBrackets } from "./gains";
 import { wasFlown } from "./states";
 
 export const VERDICTS = { better: "Better", worse: "Worse", unresolved: "Unresolved" } as const;
@@ -107,6 +108,21 @@ export function promotable(
     possible: false,
     why: `The best gains cannot become the safe ones of ${name}: ${because}. Fly the best and the first ones again until the statistics say “better”.`,
   };
+}
+
+/** After a change of the safe gains: what is on the vehicle until they are written to it; empty when they are, or when
+ * nobody has read what it holds. */
+export function heldMeanwhile({
+  name,
+  state,
+  held,
+  safe_gains: safe,
+}: Pick<Vehicle, "name" | "state" | "held" | "safe_gains">): string {
+  if (held === null || Object.keys(held).length === 0 || sameHeld(held, safe)) return "";
+  const gains = gainsInBrackets(inOrder(held, Object.keys(safe)));
+  return state === "disconnected"
+    ? `${name} held ${gains} when it was last read, and gets the safe ones when it is next connected.`
+    : `${name} itself still holds ${gains}: the safe ones are written to it with its next check, restore or flight.`;
 }
 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong set-up", "Battery low", "Touched something"];

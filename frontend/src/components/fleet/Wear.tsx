@@ -33,8 +33,8 @@ export function Wear({ vehicleId }: { vehicleId: number }) {
           card={calibration.data}
           error={calibration.error}
           height={heightOf(calibration.data, 460)}
+          note={retune && !retune.due && calibration.data?.state === "ready" ? retune.sentence : undefined}
         />
-        {retune && !retune.due && <p className={classes["quiet"]}>{retune.sentence}</p>}
       </div>
       <FigurePanel
         title="Batteries"
