@@ -6,7 +6,8 @@ from typing import ClassVar, Final
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.crowd import MANY
-from app.figures.history import FlightData, History, Range, last_number
+from app.figures.history import History, Range, last_number
+from app.figures.off_scale import off_scale_traces
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
 
@@ -54,10 +55,7 @@ class ErrorsFigure:
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
         outside = [scored[index] for index in span.outside]
-        if self._is_crowded:
-            traces += _all_off_scale(palette, outside, span.high, history.error_unit)
-        else:
-            traces += [_off_scale(palette, flight, span.high, history.error_unit) for flight in outside]
+        traces += off_scale_traces(palette, outside, span.high, history.error_unit, crowded=self._is_crowded)
         layout = theme.layout(
             palette,
             xaxis=theme.titled(
@@ -365,42 +363,3 @@ def _ends(interval: Range | None) -> tuple[float | None, float | None]:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 6)
-
-
-def _off_scale(palette: Palette, flight: FlightData, top: float, unit: str) -> dict[str, object]:
-    text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "name": text,
-        "x": [flight.number],
-        "y": [top],
-        "text": [f"↑ {flight.error:.2f}"],
-        "textposition": "bottom center",
-        "showlegend": False,
-        "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},
-        "textfont": {"color": palette.bad},
-        "cliponaxis": False,
-        "meta": {"role": "off scale", "trial": flight.number},
-        "hovertemplate": f"{text}<extra></extra>",
-    }
-
-
-def _all_off_scale(palette: Palette, flights: list[FlightData], top: float, unit: str) -> list[dict[str, object]]:
-    """Many at once, without their errors in print."""
-    if not flights:
-        return []
-    return [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": "Off the scale",
-            "x": [flight.number for flight in flights],
-            "y": [top] * len(flights),
-            "text": [f"{flight.error:.2f} {unit}" for flight in flights],
-            "marker": {"symbol": "triangle-up", "size": 8, "color": palette.bad},
-            "cliponaxis": False,
-            "meta": {"role": "off scale"},
-            "hovertemplate": "<b>Flight %{x}</b><br>error %{text}<extra></extra>",
-        }
-    ]
