@@ -10,14 +10,22 @@ m being the number of parameters compared: so all of them together raise a false
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot
+from math import floor, hypot, log10
+from types import MappingProxyType
 from typing import Final
 
 from scipy.special import ndtri
 
 FALSE_ALARMS: Final = 0.05
-WATCHED: Final = ("hover_throttle", "start_latency_s", "motor_lag_s", "drag_1_s")
-"""What wears: propellers and weight, the link, the motors, the frame."""
+WATCHED: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "hover_throttle": "propellers, weight",
+        "start_latency_s": "link",
+        "motor_lag_s": "motors",
+        "drag_1_s": "frame",
+    }
+)
+"""What shows wear, and where to look for its cause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,13 +54,28 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
     moved = {name: now[name].value - before[name].value for name in names}
     allowed = {name: reach * hypot(before[name].standard_error, now[name].standard_error) for name in names}
     drifted = tuple(name for name in names if abs(moved[name]) > allowed[name])
+    if not names:
+        sentence = "The newest calibration and the one it was tuned with have no parameter in common to compare."
+        return Drift(due=False, drifted=(), sentence=sentence)
     if not drifted:
-        sentence = "No parameter of the model has moved further than its uncertainty since the vehicle was tuned last."
+        titles = [now[name].title.lower() for name in names]
+        compared = " or ".join(filter(None, (", ".join(titles[:-1]), titles[-1])))
+        sentence = f"Since it was last tuned the vehicle shows no change beyond chance in {compared}."
         return Drift(due=False, drifted=(), sentence=sentence)
     told = "; ".join(
-        f"{now[name].title.lower()} was {before[name].value:.3g} and is {now[name].value:.3g} {now[name].unit}, "
-        f"{abs(moved[name]):.2g} apart where {allowed[name]:.2g} is within the 95 % interval"
+        f"{now[name].title.lower()} from {_measured(before[name])} to {_measured(now[name])} {now[name].unit}"
         for name in drifted
     )
-    sentence = f"Since the vehicle was tuned last it has changed: {told}. Tune it again, or look for the cause first."
+    sentence = (
+        f"Since it was last tuned the vehicle has changed by more than chance explains: {told}. Look for the cause "
+        f"({', '.join(WATCHED[name] for name in drifted)}), then tune it again."
+    )
     return Drift(due=True, drifted=drifted, sentence=sentence)
+
+
+def _measured(fitted: Fitted) -> str:
+    """`0.6000 ± 0.0030`: as many digits as make two of the standard error."""
+    if fitted.standard_error <= 0.0:
+        return f"{fitted.value:.3g}"
+    digits = max(0, 1 - floor(log10(fitted.standard_error)))
+    return f"{fitted.value:.{digits}f} ± {fitted.standard_error:.{digits}f}"

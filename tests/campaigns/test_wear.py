@@ -1,6 +1,7 @@
 """What a vehicle's campaigns tell of it, over HTTP: campaigns with the calibrated model on one shared simulation, whose
 flights the simple model makes with parameters of its own."""
 
+import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -97,15 +98,18 @@ def test_a_vehicle_that_needs_more_throttle_than_when_it_was_tuned_is_due(
     run_jobs(database)
 
     known = about(client, tuned, "calibration")
-    before, now = (
-        {one["name"]: one["value"] for one in known["estimates"][place]["fitted"]}["hover_throttle"]
-        for place in (1, -1)
+    was, is_now = (
+        {one["name"]: one for one in known["estimates"][place]["fitted"]}["hover_throttle"] for place in (1, -1)
     )
+    before, now = was["value"], is_now["value"]
     assert (before, now) == (pytest.approx(TWIN[0], abs=0.01), pytest.approx(WORN[0], abs=0.01))
     retune = known["retune"]
     assert (retune["due"], retune["since"]) == (True, 2)
     assert "hover_throttle" in retune["drifted"]
-    assert f"hover throttle was {before:.3g} and is {now:.3g}" in retune["sentence"]
+    told = re.search(r"hover throttle from (\S+) ± (\S+) to (\S+) ± (\S+) of full", retune["sentence"])
+    assert told is not None
+    fitted = (before, was["standard_error"], now, is_now["standard_error"])
+    assert [float(number) for number in told.groups()] == pytest.approx(fitted, rel=0.05)
     assert retune["sentence"] in about(client, tuned, "figures/calibration")["summary"]
 
 

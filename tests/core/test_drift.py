@@ -21,7 +21,10 @@ def test_a_change_within_the_interval_is_no_drift() -> None:
 def test_a_change_beyond_the_interval_makes_a_re_tune_due_and_is_told() -> None:
     found = drift(hover(0.6, 0.003), hover(0.6099, 0.004))
     assert (found.due, found.drifted) == (True, ("hover_throttle",))
-    assert "hover throttle was 0.6 and is 0.61 of full" in found.sentence
+    assert found.sentence == (
+        "Since it was last tuned the vehicle has changed by more than chance explains: hover throttle from "
+        "0.6000 ± 0.0030 to 0.6099 ± 0.0040 of full. Look for the cause (propellers, weight), then tune it again."
+    )
 
 
 def test_of_two_parameters_each_is_allowed_more() -> None:
@@ -32,4 +35,6 @@ def test_of_two_parameters_each_is_allowed_more() -> None:
 
 
 def test_parameters_that_only_one_fit_has_are_not_compared() -> None:
-    assert not drift(hover(0.6, 0.001), lag(0.2, 0.001)).due
+    found = drift(hover(0.6, 0.001), lag(0.2, 0.001))
+    assert not found.due
+    assert "no parameter in common" in found.sentence

@@ -111,7 +111,7 @@ def test_the_chart_of_a_worn_vehicle_has_the_calibrations_and_the_page_says_what
     assert retune["since"] == 2
     said = dashboard.page.get_by_role("status").filter(has_text="Re-tune due.")
     expect(said).to_contain_text(retune["sentence"])
-    expect(said).to_contain_text("hover throttle was 0.61")
+    expect(said).to_contain_text("hover throttle from 0.6")
 
 
 def test_the_chart_of_the_batteries_has_the_voltages_of_the_flights(
