@@ -8,6 +8,7 @@ from app.campaigns.service import safe_gains_changed
 from app.campaigns.statistics import contest_of
 from app.core.confirming import Standing
 from app.core.strategies.history import describe
+from app.core.wording import percent
 from app.db.models import CampaignRow
 from app.errors import ConflictError
 from app.fleet.control import Asker
@@ -40,9 +41,8 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: As
 def _because(row: CampaignRow, now: Standing, asked: Promotion) -> str:
     assert now.comparison is not None
     flights = ", ".join(map(str, now.winner.numbers))
-    return (
-        f"{asked.statement} (campaign {row.id}, flights {flights}: better, {now.comparison.confidence:.0%} confidence)"
-    )
+    sure = percent(now.comparison.confidence)
+    return f"{asked.statement} (campaign {row.id}, flights {flights}: better, {sure} confidence)"
 
 
 def _not_shown(row: CampaignRow, why: str) -> ConflictError:

@@ -24,6 +24,7 @@ from app.core.predictions import TrackRecord as Record
 from app.core.predictions import track_record
 from app.core.statistics import Group, drift_of, optimism, pooled, trend_of
 from app.core.strategies.history import describe
+from app.core.wording import percent, plus_minus, short
 from app.db.models import CampaignRow, TrialRow
 from app.trials import history
 
@@ -122,7 +123,7 @@ def _drift(experiment: Experiment, now: Standing) -> Drift | None:
     found = drift_of(now.baseline, now.scatter)
     if found is None:
         return None
-    amount = f"{found.difference:+.4f} ± {found.standard_error:.4f} {experiment.error_unit}"
+    amount = plus_minus(found.difference, found.standard_error, experiment.error_unit, sign="+")
     word = "has drifted" if found.confidence >= _SURE else "has not drifted noticeably"
     return Drift(
         first_trial=found.first_number,
@@ -131,7 +132,7 @@ def _drift(experiment: Experiment, now: Standing) -> Drift | None:
         standard_error=found.standard_error,
         confidence=found.confidence,
         sentence=f"From flight {found.first_number} to {found.last_number}, with the same gains, the vehicle {word}: "
-        f"{amount}, {found.confidence:.0%} confidence.",
+        f"{amount}, {percent(found.confidence)} confidence.",
     )
 
 
@@ -168,7 +169,7 @@ def _trend(
         slope=found.slope,
         lower=found.lower,
         upper=found.upper,
-        sentence=f"The error {word} the {against}: {found.slope:+.2g} {unit}, {_SURE:.0%} interval "
+        sentence=f"The error {word} the {against}: {found.slope:+.2g} {unit}, {percent(_SURE)} interval "
         f"{found.lower:+.2g} … {found.upper:+.2g}.",
     )
 
@@ -191,8 +192,8 @@ def _notes(experiment: Experiment, now: Standing, expected: float, drift: Drift 
     if expected > _NO_OPTIMISM * now.winner.standard_error(now.scatter):
         notes.append(
             f"The best of {len(now.groups)} gain sets ({describe(now.winner.gains)}) looks better than it is, for "
-            f"having been chosen: by {expected:.4f} {unit} on average, so that its error is nearer to "
-            f"{now.winner.mean + expected:.4f} {unit}."
+            f"having been chosen: by {short(expected)} {unit} on average, so that its error is nearer to "
+            f"{short(now.winner.mean + expected)} {unit}."
         )
     if drift is not None:
         notes.append(drift.sentence)

@@ -15,6 +15,7 @@ from app.core.experiments.base import Experiment
 from app.core.statistics import Comparison, Group, Pooled, compare, groups_of, pooled, smallest_difference, winner_of
 from app.core.strategies.base import Proposal
 from app.core.strategies.history import describe
+from app.core.wording import percent, plus_minus, short
 
 _RESERVED: Final = 2
 """Flights kept back for flying the winner and the baseline again."""
@@ -117,10 +118,12 @@ def verdict_sentence(experiment: Experiment, now: Standing) -> str:
     if now.comparison is None:
         return f"The first flight's gains ({describe(now.baseline.gains)}) are the best flown."
     unit, said = experiment.error_unit, now.comparison
-    amount = f"{abs(said.difference):.4f} ± {said.standard_error:.4f} {unit}"
+    amount = plus_minus(abs(said.difference), said.standard_error, unit)
     pair = f"{describe(now.winner.gains)} against the first flight's {describe(now.baseline.gains)}"
     if said.verdict == "unresolved":
-        return f"Unresolved: {pair}, {amount} {_direction(said)}, {said.confidence:.0%} confidence. {_deciding(said)}"
+        return (
+            f"Unresolved: {pair}, {amount} {_direction(said)}, {percent(said.confidence)} confidence. {_deciding(said)}"
+        )
     return (
         f"{said.verdict.capitalize()} with {_percent(said.confidence)} confidence: {pair}, {amount} {_direction(said)}."
     )
@@ -172,8 +175,8 @@ def _promise(definition: Definition, experiment: Experiment, now: Standing, left
     promised = _promised(now, proposal)
     relation = "at least" if promised >= told else "below"
     return (
-        f"The next step promises {promised:.4f} {unit} less, {relation} the {told:.4f} {unit} that "
-        f"{_flights(left)} could tell from noise with {definition.stop.confidence:.0%} confidence."
+        f"The next step promises {short(promised)} {unit} less, {relation} the {short(told)} {unit} that "
+        f"{_flights(left)} could tell from noise with {percent(definition.stop.confidence)} confidence."
     )
 
 
@@ -182,7 +185,7 @@ def _direction(said: Comparison) -> str:
 
 
 def _percent(confidence: float) -> str:
-    return "more than 99.9 %" if confidence > 0.999 else f"{100 * confidence:.1f} %"
+    return f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1)
 
 
 def _deciding(said: Comparison) -> str:

@@ -19,6 +19,7 @@ from app.core.strategies.bias import corrected_by, nominal
 from app.core.strategies.history import describe
 from app.core.strategies.manual import propose as by_hand
 from app.core.transfer import Transfer, transfer
+from app.core.wording import short
 
 _ORIGIN = {
     "default": "the experiment's default gains",
@@ -90,7 +91,7 @@ def _start(
     teller = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     summary = (
         f"The first flight uses {_ORIGIN[definition.start.kind]} ({describe(gains)}); {teller} "
-        f"predicts {error:.4f} {experiment.error_unit}."
+        f"predicts {short(error)} {experiment.error_unit}."
     )
     lesson = "How far this vehicle is from the model." if donor is None else "Whether the two vehicles are alike."
     start = Proposal(

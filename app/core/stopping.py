@@ -7,6 +7,7 @@ from typing import Final, Literal
 from app.core.definition import Definition, Flight, StopRule
 from app.core.strategies.base import Kind, Proposal
 from app.core.trajectory import Trajectory
+from app.core.wording import percent
 
 Reason = Literal["not improving", "flight budget", "nothing better", "told from noise", "battery low"]
 
@@ -110,7 +111,7 @@ def _reason(
 def _sentence(
     rule: StopRule, reason: Reason | None, flights: int, failures: int, battery_v: float | None, because: str
 ) -> str:
-    by = f"more than {rule.improvement:.0%}"
+    by = f"more than {percent(rule.improvement)}"
     if reason is None and rule.kind == "paper" and failures:
         return f"The last flight did not improve by {by} on the best before it; one more such flight ends it."
     if reason is None:

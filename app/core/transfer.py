@@ -22,6 +22,7 @@ from app.core.experiments.base import ModelledExperiment
 from app.core.predictions import cost_of_an_offset
 from app.core.strategies.bias import corrected_by
 from app.core.trajectory import CHANNEL_UNITS
+from app.core.wording import percent
 
 LEAST_AGREEMENT: Final = 0.5
 _TAKEN: Final = {
@@ -53,13 +54,13 @@ def transfer(
     unit = CHANNEL_UNITS.get(experiment.output, "")
     numbers = (
         f"this vehicle deviates from the data sheet's model by {own:.3f} {unit} r.m.s., from the other vehicle by "
-        f"{apart:.3f} {unit}: agreement {agreed:.0%}"
+        f"{apart:.3f} {unit}: agreement {percent(agreed)}"
     )
     if agreed < LEAST_AGREEMENT:
-        sentence = f"Nothing is taken over from the other vehicle: {numbers}, less than {LEAST_AGREEMENT:.0%}."
+        sentence = f"Nothing is taken over from the other vehicle: {numbers}, less than {percent(LEAST_AGREEMENT)}."
         return replace(plain, agreement=agreed, sentence=sentence)
     is_first_step = len(valid) == 1
-    shortened = f" The first step goes {agreed:.0%} as far as it might." if is_first_step and agreed < 1.0 else ""
+    shortened = f" The first step goes {percent(agreed)} as far as it might." if is_first_step and agreed < 1.0 else ""
     return Transfer(
         experiment=_informed(experiment, donor, agreed),
         step_fraction=definition.step_fraction * (agreed if is_first_step else 1.0),

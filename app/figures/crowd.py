@@ -64,7 +64,7 @@ def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> l
         return []
     quiet: dict[str, object] = {"type": "scatter", "mode": "lines", "legendgroup": "envelope", "legendrank": 800}
     edge = quiet | {"line": theme.line(palette.earlier, 0.75), "hoverinfo": "skip"}
-    name = f"80 % of {envelope.flights} flights"
+    name = f"80\u00a0% of {envelope.flights} flights"
     return [
         edge
         | _points(envelope.band.lower)

@@ -242,8 +242,11 @@ class TakeoffsFigure:
         if envelope is not None:
             curves = (envelope.band.lower, envelope.median, envelope.band.upper)
             named += [
-                (Column(f"envelope_{edge}", f"{percent:.0f} % of {envelope.flights} flights lay below", unit, 3), curve)
-                for edge, percent, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
+                (
+                    Column(f"envelope_{edge}", f"{part:.0f}\u00a0% of {envelope.flights} flights lay below", unit, 3),
+                    curve,
+                )
+                for edge, part, curve in zip(("lower", "middle", "upper"), PERCENTILES, curves, strict=True)
             ]
         named += [
             (Column(f"flight_{flight.number}", f"Flight {flight.number}", unit, 3), flight.curve)

@@ -10,6 +10,7 @@ from app.campaigns.statistics import standing_of
 from app.core.experiments import get_experiment
 from app.core.thinning import kept
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
+from app.core.wording import percent
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.moves import allowed
@@ -159,7 +160,7 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
         return f"the same as {than}"
     gain = best - error
     word = "lower than" if gain > 0 else "higher than"
-    share = f" ({100 * abs(gain) / best:.0f} %)" if best else ""
+    share = f" ({percent(abs(gain) / best)})" if best else ""
     return f"{abs(gain):.3f} {unit}{share} {word} {than}"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from app.core.control.vertical_loop import RATE_HZ, STEP_S
 from app.core.errors import Problem
 from app.core.policy import Gains
+from app.core.wording import percent
 from app.vehicles.base import Vehicle, VehicleOption
 from app.vehicles.disturbances import gusts, streams
 from app.vehicles.kernels import (
@@ -117,8 +118,8 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
     return (
         Problem(
             "battery_sag",
-            f"leaves too little thrust: at the end of a flight it takes {share:.0%} of it to hover, "
-            f"at most {_HIGHEST_HOVER:.0%} leaves room to control",
+            f"leaves too little thrust: at the end of a flight it takes {percent(share)} of it to hover, "
+            f"at most {percent(_HIGHEST_HOVER)} leaves room to control",
         ),
     )
 

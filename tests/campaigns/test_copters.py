@@ -66,7 +66,7 @@ def test_a_step_beyond_the_limit_or_the_bounds_is_refused_with_what_would_pass(
     campaign = create_ready_campaign(client, database, vehicle="import", definition=PX4)
     path = f"/api/campaigns/{campaign['id']}/trials"
     refused = problems_of(client.post(path, json={"gains": {**DEFAULT, "MPC_Z_VEL_P_ACC": 9.0}}))
-    assert "only 25% is allowed from the start gains" in refused["gains.MPC_Z_VEL_P_ACC"]
+    assert "only 25\u00a0% is allowed from the start gains" in refused["gains.MPC_Z_VEL_P_ACC"]
     refused = problems_of(client.post(path, json={"gains": {"MPC_Z_P": 1.0}}))
     assert refused["gains.MPC_Z_VEL_I_ACC"] == "is missing"
 

@@ -48,7 +48,7 @@ def phase(flights: list[Flight], proposal: Proposal, definition: Definition = NO
 def test_a_step_that_promises_more_than_noise_is_flown() -> None:
     found = confirm(NOISE, Bowl(), flown((1, 0.5)), proposed(error=0.3))
     assert found.phase == "step"
-    assert "promises 0.2000 m less, at least the" in found.why
+    assert "promises 0.200 m less, at least the" in found.why
 
 
 def test_a_step_that_promises_less_than_noise_ends_a_campaign_without_a_winner() -> None:
@@ -70,7 +70,7 @@ def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided
     found = confirm(NOISE, Bowl(), flights, proposed(error=0.0))
     assert found.phase == "decided"
     assert found.why.startswith(
-        "Better with more than 99.9 % confidence: a 2, b 40 against the first flight's a 1, b 40"
+        "Better with more than 99.9\u00a0% confidence: a 2, b 40 against the first flight's a 1, b 40"
     )
 
 

@@ -129,7 +129,7 @@ def test_under_the_rule_noise_the_winner_and_the_first_gains_are_flown_again() -
     assert set(kinds[1:-3]) <= {"step", "shorter step"}
     assert proposals[-3].gains == proposals[-1].gains == min(flights, key=lambda flight: flight.error or 1.0).gains
     assert proposals[-2].gains == flights[0].gains
-    assert proposals[-1].explanation.summary.startswith("Better with more than 99.9 % confidence")
+    assert proposals[-1].explanation.summary.startswith("Better with more than 99.9\u00a0% confidence")
 
 
 @pytest.mark.parametrize("strategy", ["gradient", "calibrated"])

@@ -51,7 +51,7 @@ def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first
     assert found.step_fraction == pytest.approx(found.agreement * WARM.step_fraction)
     assert found.experiment.nominal_model.tolist() == calibrate(TAKEOFF, [donor()]).model.tolist()
     assert "takes the data sheet's place" in found.sentence
-    assert f"agreement {found.agreement:.0%}" in found.sentence
+    assert f"agreement {100.0 * found.agreement:.0f}\u00a0%" in found.sentence
     notes = next_proposal(WARM, [first], donor()).explanation.notes
     assert found.sentence in notes
 

@@ -7,6 +7,7 @@ from typing import Final
 
 from app.core.checks import Check
 from app.core.policy import Gain, Gains, PolicySpace
+from app.core.wording import percent
 
 NUMBERS: Final = "numbers"
 """The check that nobody can overrule."""
@@ -50,8 +51,8 @@ def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fr
     vector = space.vector(gains)
     passed = worst <= fraction or bool(((low <= vector) & (vector <= high)).all())
     sentence = (
-        f"The largest change, of {name}, is {worst:.1%} of its range; "
-        f"{'at most' if passed else 'only'} {fraction:.0%} is allowed from {origin}."
+        f"The largest change, of {name}, is {percent(worst, 1)} of its range; "
+        f"{'at most' if passed else 'only'} {percent(fraction)} is allowed from {origin}."
     )
     beyond = {} if passed else space.mapping(space.nearest(vector.clip(low, high)))
     offer = {gain: value for gain, value in beyond.items() if value != gains[gain]}

@@ -28,6 +28,7 @@ from app.core.control.vertical_loop import (
 from app.core.hazards.kernels import find_wraps
 from app.core.plants.vertical import MEASUREMENT_DELAY_S, Counts
 from app.core.policy import Vector
+from app.core.wording import percent
 
 LONGEST_S: Final = 32.6
 _STARTS: Final = (
@@ -73,7 +74,7 @@ def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, .
     product = PRODUCTS[place]
     sentence = (
         f"No product can wrap: the largest, {product.gain}·({product.error}) with its limiter at {product.limiter}, "
-        f"is {worst / INT32_MAX:.0%} of what 32 bits hold."
+        f"is {percent(worst / INT32_MAX)} of what 32 bits hold."
     )
     return (Check("wrapping", True, sentence, worst=float(worst), limit=float(INT32_MAX)),)
 

@@ -22,6 +22,7 @@ from app.core.strategies.hedging import Box, best_in, merit
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.passing import may_fly
 from app.core.strategies.trust import trust_fraction
+from app.core.wording import percent, short
 
 MODELS: Final = 8
 HEDGE: Final = 0.75
@@ -143,23 +144,23 @@ def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
 def _summary(experiment: ModelledExperiment, base: Flight, choice: _Choice, foretold: Foretold, flights: int) -> str:
     unit = experiment.error_unit
     told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
-    best = f"flight {base.number} ({describe(base.gains)}, error {base.error:.4f} {unit})"
+    best = f"flight {base.number} ({describe(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
-        return f"{told} finds nothing that is better than {best} by {WORTH:.1%} and may be flown."
+        return f"{told} finds nothing that is better than {best} by {percent(WORTH, 1)} and may be flown."
     low, high = foretold.interval.lower, foretold.interval.upper
     assert base.error is not None
     share = 1.0 - foretold.error / base.error
     return (
-        f"{told} promises {abs(share):.0%} {'less' if share >= 0.0 else 'more'} error than with {best}: "
-        f"{foretold.error:.4f} {unit}, with {foretold.interval.confidence:.0%} confidence within "
-        f"{low:.4f} … {high:.4f} {unit}."
+        f"{told} promises {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than with {best}: "
+        f"{short(foretold.error)} {unit}, with {percent(foretold.interval.confidence)} confidence within "
+        f"{short(low)} … {short(high)} {unit}."
     )
 
 
 def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
     kept = "What the best flight did beyond the model is kept inside the control loop."
     limits = f"A bound or the trust region stopped {', '.join(clipped)}." if clipped else ""
-    trust = f"Steps of at most {fraction:.0%} of each range are trusted." if fraction < 1.0 else ""
+    trust = f"Steps of at most {percent(fraction)} of each range are trusted." if fraction < 1.0 else ""
     return tuple(filter(None, (kept, limits, trust)))
 
 

@@ -22,6 +22,7 @@ from app.core.strategies.bias import CorrectedModel, corrected_by, corrected_ins
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.line_search import Line, try_lengths
 from app.core.strategies.passing import may_fly
+from app.core.wording import short
 
 SCALED_LADDER: Final = tuple(2.0**power for power in range(3, -13, -1))
 RAW_LADDER: Final = tuple(10.0 ** (tenths / 10) for tenths in range(30, -1, -1))
@@ -151,19 +152,19 @@ def _summary(
     refused: Sequence[LadderStep],
 ) -> str:
     unit = experiment.error_unit
-    origin = f"The best flight so far is {base.number} ({describe(base.gains)}), error {base.error:.4f} {unit}."
+    origin = f"The best flight so far is {base.number} ({describe(base.gains)}), error {short(base.error)} {unit}."
     if chosen is None:
         may = " and may be flown" if refused else ""
         return f"{origin} Along its gradient the corrected model finds nothing better that was not flown yet{may}."
     if chosen is best:
         return (
             f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
-            f"{chosen.length:.4g} promises most: {chosen.predicted_error:.4f} {unit}."
+            f"{chosen.length:.4g} promises most: {short(chosen.predicted_error)} {unit}."
         )
     why = "is refused by the gate" if refused else "did not improve on it"
     return (
         f"{origin} The longer step along the same line {why}, so the next one goes less far, "
-        f"{chosen.length:.4g} instead of {best.length:.4g}; predicted {chosen.predicted_error:.4f} {unit}."
+        f"{chosen.length:.4g} instead of {best.length:.4g}; predicted {short(chosen.predicted_error)} {unit}."
     )
 
 

@@ -22,6 +22,7 @@ from app.core.strategies.bias import nominal
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.strategies.simplex import Optimum, model_optimum
 from app.core.trajectory import Samples, Trajectory
+from app.core.wording import short
 
 _STARTS: Final = 256
 _SEARCHES: Final = 1
@@ -184,9 +185,9 @@ def _explanation(
     gains = describe(space.mapping(optimum.gains))
     offer = (
         f"The identified model offers nothing worth a flight beyond flight {base.number}, "
-        f"error {base.error:.4f} {experiment.error_unit}."
+        f"error {short(base.error)} {experiment.error_unit}."
         if stays
-        else f"The identified model's optimum is at {gains}; predicted {error:.4f} {experiment.error_unit}."
+        else f"The identified model's optimum is at {gains}; predicted {short(error)} {experiment.error_unit}."
     )
     return Explanation(
         summary=f"{fitted} {offer}",

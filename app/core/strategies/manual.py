@@ -9,6 +9,7 @@ from app.core.policy import PolicySpace
 from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
 from app.core.strategies.bias import corrected_by
 from app.core.strategies.history import best_flight, describe
+from app.core.wording import short
 
 
 def propose(_definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
@@ -20,7 +21,7 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
     trajectory, error = (None, None) if modelled is None else corrected_by(modelled, best).predict(gains)
     summary = (
         f"You choose the next gains. The best so far are those of flight {best.number} ({describe(best.gains)}), "
-        f"error {best.error:.4f} {experiment.error_unit}."
+        f"error {short(best.error)} {experiment.error_unit}."
     )
     return Proposal(
         kind="manual",

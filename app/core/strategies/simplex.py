@@ -14,6 +14,7 @@ from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
 from app.core.strategies.bias import nominal
 from app.core.strategies.history import best_flight, describe, was_flown
+from app.core.wording import short
 
 _UNLIMITED: Final = 1_000_000
 
@@ -87,7 +88,7 @@ def propose(
     stopped = tuple(name for name, is_stopped in zip(space.names, target != optimum.gains, strict=True) if is_stopped)
     found = (
         f"{optimum.evaluations} runs of the nominal model end at {describe(space.mapping(optimum.gains))}, "
-        f"model error {optimum.error:.4f} {experiment.error_unit}."
+        f"model error {short(optimum.error)} {experiment.error_unit}."
     )
     summary = f"{found} That was flown; the model alone offers nothing more." if is_flown else found
     return Proposal(

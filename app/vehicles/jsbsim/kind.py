@@ -4,6 +4,7 @@ from typing import Final
 
 from app.core.errors import Problem
 from app.core.policy import Gains
+from app.core.wording import percent
 from app.vehicles.base import Vehicle, VehicleOption
 from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, MASS_KG, JsbsimFlight
 from app.vehicles.kinds import Hosts, Options, VehicleKind
@@ -26,8 +27,8 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
     return (
         Problem(
             "mass_kg",
-            f"is too much for these motors and this battery: it takes {share:.0%} of full thrust, "
-            f"at most {_HIGHEST_HOVER:.0%} leaves room to control",
+            f"is too much for these motors and this battery: it takes {percent(share)} of full thrust, "
+            f"at most {percent(_HIGHEST_HOVER)} leaves room to control",
         ),
     )
 

@@ -1,10 +1,10 @@
 import { Button } from "@mantine/core";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../api/types";
-import { withUnit } from "../lib/format";
+import { NOTHING, withUnit } from "../lib/format";
 import { gainsInBrackets } from "../lib/gains";
 import { type LiveFlight, readingOf } from "../lib/live";
-import { predictedText } from "../lib/uncertainty";
+import { percent, predictedText } from "../lib/uncertainty";
 import { useLiveFlight } from "../live/store";
 import { Marks } from "./Marks";
 import classes from "./NextFlight.module.css";
@@ -15,10 +15,6 @@ interface Props {
   campaign: Campaign;
   trial: Trial | undefined;
   step: { trialId: number; trialNumber: number };
-}
-
-function share(value: number | null | undefined): string {
-  return value === null || value === undefined ? "–" : `${Math.round(100 * value)} %`;
 }
 
 const STAGED = "Gains set, waiting for its operator";
@@ -63,7 +59,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           {live?.thrust !== null && (
             <div className={classes["reading"]}>
               <dt>Thrust</dt>
-              <dd>{share(live?.thrust)}</dd>
+              <dd>{typeof live?.thrust === "number" ? percent(live.thrust) : NOTHING}</dd>
             </div>
           )}
         </dl>

@@ -137,7 +137,7 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
       </h3>
       <p className={`${classes["big"]} numbers`}>
         {record.of === 0 ? "None tested yet" : `${record.inside} of ${record.of}`}
-        {record.of > 0 && record.share !== null && <small>{percent(record.share)} inside the 90 % interval</small>}
+        {record.of > 0 && record.share !== null && <small>{percent(record.share)} inside the 90&nbsp;% interval</small>}
       </p>
       {!record.trustworthy && (
         <p className={classes["warning"]}>

@@ -5,7 +5,7 @@ import { Link } from "react-router";
 import { recordCsv, useCampaign, useStatistics } from "../api/queries";
 import type { Trial } from "../api/types";
 import type { Topic } from "../lib/explanations";
-import { percentChange, withUnit } from "../lib/format";
+import { percentChange, percentText, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { intervalText, plusMinus } from "../lib/uncertainty";
 import { askedFor, bestBeforeOf, sentenceOf, standingWithout } from "../lib/verdict";
@@ -38,11 +38,10 @@ function Change({ error, other, unit }: { error: number | null; other: number | 
   const percent = percentChange(error, other);
   if (percent === null) return null;
   if (withUnit(error, unit) === withUnit(other, unit)) return <small>the same</small>;
-  const size = Math.abs(percent).toFixed(0);
   const lower = percent < 0;
   return (
     <small data-better={lower || undefined}>
-      {size} % {lower ? "lower" : "higher"}
+      {percentText(Math.abs(percent))} {lower ? "lower" : "higher"}
     </small>
   );
 }

@@ -16,7 +16,7 @@ const summary = (
   }) as unknown as CampaignSummary;
 
 test("progress is told against the first flight", () => {
-  expect(progress(summary(0.0933, 0.3267, 5, "better"))).toBe("71 % below the first");
+  expect(progress(summary(0.0933, 0.3267, 5, "better"))).toBe("71\u00a0% below the first");
   expect(progress(summary(0.3267, 0.3267, 3))).toBe("none better yet");
 });
 

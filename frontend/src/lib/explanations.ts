@@ -108,7 +108,7 @@ export const EXPLANATIONS = explained({
   record: {
     question: "What is counted here?",
     answer: [
-      "How many flights ended inside the 90 % interval that was predicted for them, and how many changed the error in the direction that was predicted.",
+      "How many flights ended inside the 90\u00a0% interval that was predicted for them, and how many changed the error in the direction that was predicted.",
     ],
   },
   drift: {

@@ -19,8 +19,8 @@ test("an error is printed to the millimetre, with its unit", () => {
 });
 
 test("a change is told in words, and one too small to print is none", () => {
-  expect(against(-58.6, "the best")).toBe("59 % below the best");
-  expect(against(12.4, "flight 1")).toBe("12 % above flight 1");
+  expect(against(-58.6, "the best")).toBe("59\u00a0% below the best");
+  expect(against(12.4, "flight 1")).toBe("12\u00a0% above flight 1");
   expect(against(-0.3, "the best")).toBe("the same as the best");
 });
 

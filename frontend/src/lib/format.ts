@@ -14,11 +14,16 @@ export function percentChange(value: number | null | undefined, base: number | n
   return (100 * (value - base)) / base;
 }
 
+/** `90 %`, held together by a space that does not break. */
+export function percentText(percent: number, digits = 0): string {
+  return `${Number(percent.toFixed(digits))}\u00a0%`;
+}
+
 /** A change in percent as people say it: "59 % below the best". */
 export function against(percent: number, base: string): string {
-  const size = Math.abs(percent).toFixed(0);
-  if (size === "0") return `the same as ${base}`;
-  return `${size} % ${percent < 0 ? "below" : "above"} ${base}`;
+  const size = percentText(Math.abs(percent));
+  if (size === percentText(0)) return `the same as ${base}`;
+  return `${size} ${percent < 0 ? "below" : "above"} ${base}`;
 }
 
 /** A gain: whole numbers as they are, others in four digits, with a true minus. */

@@ -1,6 +1,7 @@
 /** A campaign's settings as title and value, for people. */
 
 import type { Campaign, Catalogue, Definition } from "../api/types";
+import { percentText } from "./format";
 import { gainsInBrackets } from "./gains";
 
 const STARTS = {
@@ -21,7 +22,7 @@ interface Described {
 }
 
 function percent(share: number): string {
-  return `${Number((100 * share).toFixed(1))} %`;
+  return percentText(100 * share, 1);
 }
 
 function said(value: unknown, unit = ""): string {

@@ -1,7 +1,7 @@
 /** Numbers with their uncertainty, in as many digits as it allows: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
 
 import type { Interval } from "../api/types";
-import { NOTHING, withUnit } from "./format";
+import { NOTHING, percentText, withUnit } from "./format";
 
 const MOST_DIGITS = 6;
 /** An uncertainty that begins with less than this carries a second digit: rounding 0.012 to 0.01 would cost too much. */
@@ -40,7 +40,7 @@ export function rangeText({ lower, upper }: Interval, unit: string): string {
 
 /** `0.093 … 0.118 m (90 %)`: ± is left to standard errors, an interval always shows both ends and its confidence. */
 export function intervalText(interval: Interval, unit: string): string {
-  return `${rangeText(interval, unit)} (${percent(interval.confidence).replace(" ", "\u00a0")})`;
+  return `${rangeText(interval, unit)} (${percent(interval.confidence)})`;
 }
 
 /** A prediction in a line: the number, then its interval. */
@@ -55,10 +55,10 @@ export function predictedText(
 
 /** `90 %`. */
 export function percent(share: number): string {
-  return `${Number((100 * share).toFixed(share > 0.99 && share < 1 ? 1 : 0))} %`;
+  return percentText(100 * share, share > 0.99 && share < 1 ? 1 : 0);
 }
 
 /** A confidence as people say it; one that rounds to certainty is not claimed. */
 export function confidenceText(confidence: number): string {
-  return confidence > 0.995 ? "more than 99 %" : percent(confidence);
+  return confidence > 0.995 ? `more than ${percent(0.99)}` : percent(confidence);
 }

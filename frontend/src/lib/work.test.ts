@@ -45,8 +45,8 @@ test("durations are as long as a person would say them", () => {
 });
 
 test("progress says how far, what at, and how long still", () => {
-  expect(progressText(JOB)).toBe("38 % · jsbsim: 285, 44, 82 flown · about 12 s left");
-  expect(progressText({ ...JOB, remaining_s: null, doing: "" })).toBe("38 %");
+  expect(progressText(JOB)).toBe("38\u00a0% · jsbsim: 285, 44, 82 flown · about 12 s left");
+  expect(progressText({ ...JOB, remaining_s: null, doing: "" })).toBe("38\u00a0%");
   expect(progressText({ ...JOB, state: "queued" })).toBe("Waiting for its turn");
 });
 

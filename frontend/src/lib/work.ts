@@ -1,7 +1,7 @@
 /** Numeric work in words: states, how long, how far, and how near the paper. */
 
 import type { Job, JobState, ReproductionRow } from "../api/work";
-import { NOTHING } from "./format";
+import { NOTHING, percentText } from "./format";
 import type { StateWords } from "./states";
 
 const JOB: Record<JobState, StateWords> = {
@@ -38,7 +38,7 @@ export function between(from: string | null, to: string | null): string {
 export function progressText({ state, done_share: share, doing, remaining_s: left }: Job): string {
   if (state === "queued") return "Waiting for its turn";
   if (share === null) return "Running";
-  const parts = [`${Math.floor(100 * share)} %`];
+  const parts = [percentText(Math.floor(100 * share))];
   if (doing !== "") parts.push(doing);
   if (left !== null) parts.push(`about ${duration(Math.max(1, Math.round(left)))} left`);
   return parts.join(" · ");

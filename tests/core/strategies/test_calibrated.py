@@ -74,7 +74,7 @@ def test_a_proposal_explains_itself() -> None:
     assert "calibrated on 1 flight" in why.summary
     assert first.error is not None
     assert proposal.predicted_error is not None
-    assert f"promises {1.0 - proposal.predicted_error / first.error:.0%} less error" in why.summary
+    assert f"promises {100.0 * (1.0 - proposal.predicted_error / first.error):.0f}\u00a0% less error" in why.summary
     assert [one.name for one in why.fitted] == [parameter.name for parameter in TAKEOFF.model_parameters]
     assert why.fitted[0].value == pytest.approx(0.61, abs=0.01)
     assert why.gradient["ki"] < 0.0
