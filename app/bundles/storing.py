@@ -8,7 +8,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from app.bundles.contents import CONTENTS, Campaign, Proposal, Record, Trial
+from app.bundles.contents import CONTENTS, Campaign, Photo, Proposal, Record, Trial
 from app.bundles.reading import Bundle
 from app.campaigns.definitions import core_definition
 from app.campaigns.proposing import is_stale, request_proposal
@@ -25,6 +25,7 @@ from app.trials.telemetry_logs import log_of_trial
 from app.vehicles.open import VEHICLE_KINDS, check_options
 
 JsonObject = dict[str, Any]
+_AT_ONCE_BYTES: Final = 16 * 2**20
 _HINT: Final = "Bring it in with the version of Gainline that wrote it, or update this one."
 
 
@@ -44,11 +45,10 @@ def store(session: Session, bundle: Bundle) -> Arrived:
         row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
         new_ids[campaign.id] = row.id
         proposals = [_proposal(session, bundle, row, each) for each in campaign.proposals]
-        for trial in campaign.trials:
-            made = _trial(session, bundle, row, trial, proposals)
-            if trial.telemetry is not None:
-                arrived.telemetry[made.id] = trial.telemetry
-        session.flush()
+        made = _trials(session, bundle, row, campaign.trials, proposals)
+        arrived.telemetry |= {
+            new.id: trial.telemetry for new, trial in zip(made, campaign.trials, strict=True) if trial.telemetry
+        }
         _propose(session, row, proposals)
         arrived.rows.append(row)
     return arrived
@@ -121,24 +121,49 @@ def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, said: Pro
     return row
 
 
-def _trial(
-    session: Session, bundle: Bundle, campaign: CampaignRow, said: Trial, proposals: Sequence[ProposalRow]
-) -> TrialRow:
+def _trials(
+    session: Session, bundle: Bundle, campaign: CampaignRow, said: Sequence[Trial], proposals: Sequence[ProposalRow]
+) -> list[TrialRow]:
+    """Many at a time, for everybody else waits meanwhile; but no more than the memory can hold."""
+    made: list[TrialRow] = []
+    waiting: list[TrajectoryRow | TrialPhotoRow] = []
+    size = 0
+    for each in said:
+        row = _trial(bundle, campaign, each, proposals)
+        photos = [_photo(bundle, row, photo) for photo in each.photos]
+        session.add_all((row, *photos))
+        made.append(row)
+        held: list[TrajectoryRow | TrialPhotoRow] = [*photos, *filter(None, (row.trajectory,))]
+        waiting += held
+        size += sum(len(one.data) for one in held)
+        if size > _AT_ONCE_BYTES:
+            _settle(session, waiting)
+            size = 0
+    _settle(session, waiting)
+    return made
+
+
+def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> None:
+    """Write what waits, and let go of its bytes."""
+    session.flush()
+    for one in waiting:
+        session.expire(one, ["data"])
+    waiting.clear()
+
+
+def _trial(bundle: Bundle, campaign: CampaignRow, said: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
     kept = _fields(said, {"proposal", "record", "photos", "telemetry", "curve"})
-    row = TrialRow(
+    return TrialRow(
         campaign_id=campaign.id,
         proposal_id=None if said.proposal is None else proposals[said.proposal].id,
         trajectory=_record(bundle, said.record),
         curve=None if said.curve is None else [list(point) for point in said.curve],
         **kept,
     )
-    session.add(row)
-    session.flush()
-    for photo in said.photos:
-        data = bundle.part(photo.part)
-        session.add(TrialPhotoRow(trial=row, media_type=photo.media_type, data=data, added_at=photo.added_at))
-    session.flush()
-    return row
+
+
+def _photo(bundle: Bundle, trial: TrialRow, said: Photo) -> TrialPhotoRow:
+    return TrialPhotoRow(trial=trial, media_type=said.media_type, data=bundle.part(said.part), added_at=said.added_at)
 
 
 def _record(bundle: Bundle, said: Record | None) -> TrajectoryRow | None:

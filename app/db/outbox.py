@@ -20,14 +20,15 @@ _PRUNE_EVERY: Final = 500
 def record_changes(session: Session, _context: UOWTransaction) -> None:
     """After-flush hook: one event row for each reported row that was added, changed or deleted."""
     changed = [row for row in (*session.new, *session.dirty, *session.deleted) if isinstance(row, Reported)]
-    for row in changed:
-        topic, entity_id, campaign_id = row.reported_as()
-        stored = session.connection().execute(
-            insert(EventRow).values(topic=topic, entity_id=entity_id, campaign_id=campaign_id, at=utc_now())
-        )
-        (event_id,) = stored.inserted_primary_key or (0,)
-        if event_id % _PRUNE_EVERY == 0:
-            session.connection().execute(delete(EventRow).where(EventRow.id <= event_id - KEPT_EVENTS))
+    if not changed:
+        return
+    at, said = utc_now(), [row.reported_as() for row in changed]
+    session.connection().execute(
+        insert(EventRow), [{"topic": topic, "entity_id": id_, "campaign_id": of, "at": at} for topic, id_, of in said]
+    )
+    latest = latest_event_id(session)
+    if latest % _PRUNE_EVERY < len(changed):
+        session.connection().execute(delete(EventRow).where(EventRow.id <= latest - KEPT_EVENTS))
 
 
 def latest_event_id(session: Session) -> int:
