@@ -273,7 +273,8 @@ def promote(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> None:
     dashboard.button("Make the best gains the safe ones").click()
     dashboard.page.get_by_label("Who decided that, and why").fill(DECIDED)
     dashboard.button("These are the safe gains").click()
-    expect(dashboard.page.get_by_text("The best gains are the safe ones of Number 1.")).to_be_visible()
+    told = dashboard.page.get_by_text("The best gains are the safe ones of Number 1.")
+    expect(told).to_contain_text("Number 1 itself still holds [283 13 82]")
     assert dashboard.get(f"/vehicles/{vehicle_id}")["safe_gains"] == campaign["best"]["gains"]
 
 

@@ -4,6 +4,7 @@ import {
   askedFor,
   bestBeforeOf,
   consequenceOf,
+  heldMeanwhile,
   keptPrediction,
   marksOf,
   otherClasses,
@@ -102,4 +103,14 @@ test("the best gains become the safe ones only once flights have shown that they
   expect(promotable({ best: { ...best, gains: { kp: 283 } }, verdict: "better" }, drone).why).toBe(
     "The best gains are the safe ones of Number 1.",
   );
+});
+
+test("after a change of the safe gains it is told what the vehicle holds until they are written to it", () => {
+  const vehicle = { name: "Bee", state: "ready", held: { kd: 82, kp: 283 }, safe_gains: { kp: 400, kd: 100 } } as const;
+  expect(heldMeanwhile(vehicle)).toBe(
+    "Bee itself still holds [283 82]: the safe ones are written to it with its next check, restore or flight.",
+  );
+  expect(heldMeanwhile({ ...vehicle, state: "disconnected" })).toContain("when it is next connected");
+  expect(heldMeanwhile({ ...vehicle, held: vehicle.safe_gains })).toBe("");
+  expect(heldMeanwhile({ ...vehicle, held: null })).toBe("");
 });
