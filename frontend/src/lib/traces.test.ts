@@ -65,6 +65,12 @@ test("a narrow screen gets a smaller legend of the same colours", () => {
   });
 });
 
+test("names in a narrow screen's legend stand two to a row, or in full where that would cut them short", () => {
+  const widthFor = (name: string) => narrowed({}, [{ name }])["legend"];
+  expect(widthFor("Noise of the best")).toMatchObject({ entrywidth: 92 });
+  expect(widthFor("A · flight 2 of On twin")).toMatchObject({ entrywidth: 5.8 * 23 });
+});
+
 test("the time axis can be cut without losing the rest of the layout", () => {
   const layout = { xaxis: { title: "Time", range: [0, 32.6] }, yaxis: { range: [0, 4] } };
   expect(withTimeRange(layout, [0, 10])).toMatchObject({

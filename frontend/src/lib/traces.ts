@@ -83,7 +83,14 @@ export function windowFrom(event: Record<string, unknown>, whole: Seconds): Seco
 }
 
 const LETTER_PX = 5.8;
-const WIDEST_PX = 92;
+const HALF_PX = 92;
+const WHOLE_PX = 220;
+
+/** The room for names of that length: two to a row, if at most a letter or two is lost, or one that is read whole. */
+function entryWidth(letters: number): number {
+  const wanted = LETTER_PX * letters;
+  return Math.min(wanted, wanted < 1.2 * HALF_PX ? HALF_PX : WHOLE_PX);
+}
 
 /** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
 export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {
@@ -95,7 +102,7 @@ export function narrowed(layout: Record<string, unknown>, traces: readonly Trace
     legend: {
       ...legend,
       font: { ...font, size: 11 },
-      entrywidth: Math.min(WIDEST_PX, LETTER_PX * longest),
+      entrywidth: entryWidth(longest),
       entrywidthmode: "pixels",
     },
   };
