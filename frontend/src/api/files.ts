@@ -1,6 +1,7 @@
 /** Files that the server makes or takes: reports, bundles, backups. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useNavigate } from "react-router";
 import { fileNameIn } from "../lib/files";
 import { randomKey } from "../lib/ids";
 import { ApiError, problemFrom } from "../lib/problems";
@@ -32,8 +33,11 @@ export function useDownload(path: string) {
   });
 }
 
+/** The page of the campaign opens then. Here and not where it was asked for: an empty list is another page as soon as
+ * the campaign is known, and would not hear of it. */
 export function useBringIn() {
   const queries = useQueryClient();
+  const navigate = useNavigate();
   return useMutation({
     mutationFn: async (file: File) => {
       const body = new FormData();
@@ -41,6 +45,9 @@ export function useBringIn() {
       const headers = { "Idempotency-Key": randomKey() };
       return (await (await asked("/api/bundles", { method: "POST", body, headers })).json()) as Campaign;
     },
-    onSuccess: () => queries.invalidateQueries({ queryKey: ["campaigns"] }),
+    onSuccess: ({ id }) => {
+      void navigate(`/campaigns/${id}`);
+      return queries.invalidateQueries({ queryKey: ["campaigns"] });
+    },
   });
 }
