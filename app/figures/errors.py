@@ -51,7 +51,7 @@ class ErrorsFigure:
             *self._predicted(palette),
             *self._repeats(palette),
             *self._measured(palette),
-            *self._not_counted(palette, FOOT * span.high),
+            *self._without_error(palette, FOOT * span.high),
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
         outside = [scored[index] for index in span.outside]
@@ -230,24 +230,30 @@ class ErrorsFigure:
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _not_counted(self, palette: Palette, height: float) -> list[dict[str, object]]:
-        """A cross at the foot, clear of the axis' numbers: these flights have no error that would mean anything."""
-        flights = [flight for flight in self.history.flights if flight.outcome != "valid"]
-        if not flights:
-            return []
+    def _without_error(self, palette: Palette, height: float) -> list[dict[str, object]]:
+        """Marks at the foot, clear of the axis' numbers: these flights have no error that would mean anything, or none
+        that anybody vouches for yet."""
+        uncounted = [flight for flight in self.history.flights if flight.outcome != "valid"]
+        unjudged = [flight for flight in uncounted if flight.outcome == "not yet judged"]
+        marked = {
+            "not counted": ([flight for flight in uncounted if flight not in unjudged], "x-thin", palette.bad),
+            "not yet judged": (unjudged, "circle-open", palette.dim),
+        }
         return [
             {
                 "type": "scatter",
                 "mode": "markers",
-                "name": "Not counted",
+                "name": role.capitalize(),
                 "x": [flight.number for flight in flights],
                 "y": [round(height, 6)] * len(flights),
                 "text": [flight.outcome for flight in flights],
-                "marker": {"size": 10, "symbol": "x-thin", "line": {"width": 2, "color": palette.bad}},
-                "meta": {"role": "not counted"},
+                "marker": {"size": 10, "symbol": symbol, "color": colour, "line": {"width": 2, "color": colour}},
+                "meta": {"role": role},
                 "cliponaxis": False,
                 "hovertemplate": "<b>Flight %{x}, %{text}</b><extra></extra>",
             }
+            for role, (flights, symbol, colour) in marked.items()
+            if flights
         ]
 
     def _best_so_far(self, palette: Palette) -> dict[str, object]:

@@ -50,6 +50,13 @@ def test_an_invalid_flight_is_a_cross_and_never_the_best() -> None:
     assert card.summary == "Best error 0.200 m in flight 3, 33 % below flight 1."
 
 
+def test_a_flight_that_nobody_has_judged_is_no_flight_that_does_not_count() -> None:
+    flights = (flight(1, 0.3), flight(2, None, outcome="lost"), flight(3, None, outcome="not yet judged"))
+    card = ErrorsFigure(history(*flights)).compute()
+    assert (trace(card, "not counted")["x"], trace(card, "not yet judged")["x"]) == ([2], [3])
+    assert trace(card, "not yet judged")["name"] == "Not yet judged"
+
+
 def test_a_flight_with_a_huge_error_is_marked_at_the_edge_with_its_value() -> None:
     card = ErrorsFigure(history(*TABLE_1, flight(6, 4.2))).compute()
     assert layout(card)["yaxis"]["range"][1] < 1.0

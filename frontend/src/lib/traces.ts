@@ -51,7 +51,8 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
 }
 
 /** Roles of marks that stand over the number of their flight. */
-const NUMBERED = new Set(["measured", "not counted", "flown", "off scale", "best", "predicted"]);
+const FLOWN = new Set(["measured", "not counted", "not yet judged", "flown"]);
+const NUMBERED = new Set([...FLOWN, "off scale", "best", "predicted"]);
 
 /** The flight that a point of a chart belongs to, from Plotly's event; the prediction's flight is none yet. */
 export function flightAt(traces: readonly Trace[], curveNumber: number, x: unknown): number | null {
@@ -64,8 +65,7 @@ export function flightAt(traces: readonly Trace[], curveNumber: number, x: unkno
 /** The points that stand over a flight's number: one for each trace of marks that has it. */
 export function marksOver(traces: readonly Trace[], flight: number): { curveNumber: number; pointNumber: number }[] {
   return traces.flatMap((trace, curveNumber) => {
-    const role = trace.meta?.role;
-    if (role !== "measured" && role !== "flown" && role !== "not counted") return [];
+    if (!FLOWN.has(trace.meta?.role ?? "")) return [];
     const pointNumber = trace.x?.indexOf(flight) ?? -1;
     return pointNumber < 0 ? [] : [{ curveNumber, pointNumber }];
   });
