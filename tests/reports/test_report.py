@@ -62,7 +62,7 @@ class Page(HTMLParser):
 
     @property
     def said(self) -> str:
-        return " ".join(self.text.split())
+        return re.sub(r"[ \t\n]+", " ", self.text).strip()
 
 
 def read(client: TestClient, campaign: Json) -> Page:
