@@ -11,8 +11,7 @@ GainlineError                 (app.core.errors)
 ├── NotAllowedError           not from there, or not by them: a real vehicle's safety forbids it
 ├── NotFoundError             there is no such thing
 ├── ConflictError             it is not possible now: the state or the version forbids it
-│   ├── BusyError             the vehicle is flying for somebody else
-│   └── OvertakenError        what a job was to compute is no longer wanted
+│   └── BusyError             the vehicle is flying for somebody else
 ├── UnavailableError          this installation lacks what is needed, or it is in use; all else works
 ├── StorageError              the database cannot take or give what it should; nothing was changed
 ├── SchemaError               the database belongs to another version of the program
@@ -34,7 +33,6 @@ __all__ = [
     "MediaTypeError",
     "NotAllowedError",
     "NotFoundError",
-    "OvertakenError",
     "Problem",
     "SchemaError",
     "StorageError",
@@ -81,10 +79,6 @@ class ConflictError(GainlineError):
 
 class BusyError(ConflictError):
     """The vehicle has a flight already."""
-
-
-class OvertakenError(ConflictError):
-    """What a job was to compute, a newer state has overtaken: nothing failed, and nobody wants it any more."""
 
 
 class UnavailableError(GainlineError):

@@ -17,7 +17,7 @@ from app.campaigns.proposing import History, is_stale, read_history
 from app.core.experiments import experiment_of
 from app.core.landscape import Landscape, Plan, free_gains, space_of
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
-from app.errors import GainlineError, OvertakenError
+from app.errors import GainlineError
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
 from app.figures.theme import ThemeName
@@ -73,7 +73,7 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Plan:
     if proposal is None:
         raise GainlineError("The order names no proposal.", hint="Open the campaign to have it computed anew.")
     if proposal.history_digest != past.digest:
-        raise OvertakenError(
+        raise jobs.OvertakenError(
             "The campaign's flights have changed since these gains were proposed.",
             hint="Nothing is to be done: the landscape of the next proposal takes its place.",
         )

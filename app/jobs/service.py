@@ -16,7 +16,6 @@ from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
 from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import OvertakenError
 from app.jobs import repository
 from app.jobs.logs import lines_of_job
 from app.jobs.schemas import Job, JobLog
@@ -30,6 +29,10 @@ LEAST_PACE_SHARE: Final = 0.1
 
 MAX_ATTEMPTS: Final = 3
 """A job that lost its worker so many times probably killed it, and is failed."""
+
+
+class OvertakenError(GainlineError):
+    """What a job was to compute, a newer state has overtaken: nothing failed, and nobody wants it any more."""
 
 
 def enqueue_job(

@@ -10,7 +10,7 @@ import structlog
 from sqlalchemy.orm import Session
 
 from app.db.session import Database
-from app.errors import GainlineError, OvertakenError, StorageError
+from app.errors import GainlineError, StorageError
 from app.jobs import service as jobs
 
 BEATS_PER_LEASE: Final = 3
@@ -103,7 +103,7 @@ class Desk:
                 _log.info("job dropped, because the worker ends; it runs again with the next one")
             except StorageError as error:
                 _log.error("job given up; it runs again when its lease is over", why=str(error))
-            except OvertakenError as error:
+            except jobs.OvertakenError as error:
                 self._withdraw(job, error)
             except GainlineError as error:
                 self._fail(job, error)
@@ -117,7 +117,7 @@ class Desk:
         _log.warning("job failed", why=str(error))
         self._end(lambda session: jobs.fail_job(session, job.id, error, worker=self._worker))
 
-    def _withdraw(self, job: Claimed, error: OvertakenError) -> None:
+    def _withdraw(self, job: Claimed, error: jobs.OvertakenError) -> None:
         _log.info("job withdrawn", why=str(error))
         self._end(lambda session: jobs.withdraw_job(session, job.id, error, worker=self._worker))
 

@@ -57,6 +57,12 @@ def chosen(page: Page) -> list[int]:
     return [int(one) for one in parse_qs(urlsplit(page.url).query).get("trial", [])]
 
 
+def pick(flight: Locator) -> None:
+    """What is chosen stands in the address, and is drawn from there."""
+    flight.click()
+    expect(flight).to_be_checked()
+
+
 def row(page: Page, number: int) -> Locator:
     return page.get_by_role("region", name="Flights compared").locator("tbody tr").nth(number)
 
@@ -76,9 +82,9 @@ def test_flights_are_picked_from_their_campaigns_and_drawn_as_they_are_stored(
     dashboard.open(f"/campaigns/{flown.morning}")
     page.get_by_role("link", name="Compare flight 3").click()
     expect(page.get_by_text("Flight 3 is chosen.")).to_be_visible()
-    page.get_by_role("checkbox", name=re.compile("^Flight 1 ")).check()
+    pick(page.get_by_role("checkbox", name=re.compile("^Flight 1 ")))
     page.get_by_text(re.compile("^Compared in the evening")).click()
-    page.get_by_role("checkbox", name=re.compile("^Flight 2 .*400 60 100")).last.check()
+    pick(page.get_by_role("checkbox", name=re.compile("^Flight 2 .*400 60 100")).last)
     wanted = [flown.early[2], flown.early[0], flown.late[1]]
     expect(dashboard.plot(CURVES)).to_be_visible()
     dashboard.until(lambda: dashboard.trace(CURVES, "flight", trial=wanted[2]) is not None)
