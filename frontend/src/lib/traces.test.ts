@@ -58,7 +58,8 @@ test("an axis grows with a live curve that leaves it, and only then", () => {
 });
 
 test("a narrow screen gets a smaller legend of the same colours", () => {
-  const named = [{ name: "Predicted" }, { name: "To beat: 0.155" }, {}];
+  const unseen = { name: "Likely, lower edge", showlegend: false };
+  const named = [{ name: "Predicted" }, { name: "To beat: 0.155" }, {}, unseen];
   expect(narrowed({ legend: { font: { color: "red", size: 12 } }, xaxis: {} }, named)).toEqual({
     legend: { font: { color: "red", size: 11 }, entrywidth: 5.8 * 14, entrywidthmode: "pixels" },
     xaxis: {},

@@ -94,7 +94,8 @@ function entryWidth(letters: number): number {
 
 /** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
 export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {
-  const longest = Math.max(0, ...traces.map(({ name }) => (typeof name === "string" ? name.length : 0)));
+  const named = traces.filter(({ showlegend }) => showlegend !== false);
+  const longest = Math.max(0, ...named.map(({ name }) => (typeof name === "string" ? name.length : 0)));
   const legend = typeof layout["legend"] === "object" && layout["legend"] !== null ? layout["legend"] : {};
   const font = "font" in legend && typeof legend.font === "object" ? legend.font : {};
   return {
