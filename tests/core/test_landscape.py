@@ -47,6 +47,7 @@ def error_by_hand(gains: Gains, by: Flight) -> float:
     return float(np.trapezoid([*off[inside], end], [*times[inside], WINDOW_S]) / WINDOW_S)
 
 
+@compiled_only
 def test_the_grid_holds_what_the_model_corrected_by_the_best_flight_predicts() -> None:
     first = flight()
     land = surveyed(Definition(strategy="gradient"), [first], START, {"kp": 518, "ki": 438, "kd": 82})
@@ -56,6 +57,7 @@ def test_the_grid_holds_what_the_model_corrected_by_the_best_flight_predicts() -
         assert one.errors[i][j] == pytest.approx(error_by_hand(gains, first), abs=1e-6)
 
 
+@compiled_only
 def test_a_slice_holds_every_flown_and_proposed_gain_set_and_stays_within_the_bounds() -> None:
     proposed: Gains = {"kp": 518, "ki": 438, "kd": 82}
     land = surveyed(Definition(strategy="gradient", bounds={"ki": (0, 450)}), [flight()], START, START, proposed)
@@ -82,6 +84,7 @@ def test_the_grid_holds_what_the_calibrated_model_foretells() -> None:
         assert one.errors[i][j] == pytest.approx(foretell(fitted, flights[1], gains).error, abs=1e-9)
 
 
+@compiled_only
 def test_before_the_first_flight_the_landscape_is_the_nominal_models() -> None:
     proposal = next_proposal(Definition(), ())
     land = surveyed(Definition(), [], proposal.gains)
@@ -92,6 +95,7 @@ def test_before_the_first_flight_the_landscape_is_the_nominal_models() -> None:
     assert one.errors[9][4] == pytest.approx(takeoff.error(flown), abs=1e-9)
 
 
+@compiled_only
 def test_of_six_gains_those_are_varied_that_the_error_hangs_on() -> None:
     definition = Definition(experiment="pitch-tracking")
     experiment = PitchTracking()
