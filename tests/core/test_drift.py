@@ -38,3 +38,9 @@ def test_parameters_that_only_one_fit_has_are_not_compared() -> None:
     found = drift(hover(0.6, 0.001), lag(0.2, 0.001))
     assert not found.due
     assert "no parameter in common" in found.sentence
+
+
+def test_what_is_known_exactly_is_told_without_an_uncertainty() -> None:
+    found = drift(hover(0.6, 0.0), hover(0.61, 0.0))
+    assert found.due
+    assert "hover throttle from 0.6 to 0.61 of full" in found.sentence

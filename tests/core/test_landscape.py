@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.core.calibration import calibrate
-from app.core.definition import Definition, Flight
+from app.core.definition import Definition, Donor, Flight, Start
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.landscape import Landscape, Plan, foreseen, plan_survey
@@ -93,6 +93,18 @@ def test_before_the_first_flight_the_landscape_is_the_nominal_models() -> None:
     takeoff = Takeoff()
     flown = takeoff.simulate(takeoff.space.vector(gains), takeoff.nominal_model)
     assert one.errors[9][4] == pytest.approx(takeoff.error(flown), abs=1e-9)
+
+
+@compiled_only
+def test_a_warm_start_s_landscape_is_that_of_the_vehicle_it_starts_from() -> None:
+    tuned: Gains = {"kp": 1600, "ki": 900, "kd": 150}
+    donor = flight(5, tuned)
+    definition = Definition(
+        start=Start(kind="campaign", gains=tuned, donor=Donor(campaign_id=1, trial_number=5, checksum="0"))
+    )
+    survey = plan_survey(Plan(definition=definition, flights=(), donor=donor, centre=tuned, marks=()))
+    assert survey is not None
+    assert foreseen(survey.foresee, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
 
 
 @compiled_only

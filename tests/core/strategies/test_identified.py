@@ -6,6 +6,8 @@ import pytest
 from app.core.definition import Definition, Flight, OptionValue, Start
 from app.core.proposing import next_proposal
 from app.core.strategies.base import Proposal
+from app.core.strategies.bias import nominal
+from app.core.strategies.identified import foresee
 from app.core.trajectory import Trajectory
 from app.vehicles.lti import LOG_NOISE
 from tests.core.flying import compiled_only
@@ -92,3 +94,19 @@ def test_without_recorded_states_the_best_stays_and_it_is_said_why() -> None:
     assert proposal.kind == "none"
     assert proposal.gains == flown.gains
     assert "cannot be identified" in proposal.explanation.summary
+
+
+def test_its_landscape_is_the_identified_models_and_holds_for_the_truth() -> None:
+    campaign, first = definition(1, fit="least-squares"), flight(1, HAND)
+    errors = foresee(campaign, MODEL, [first])
+    for number, gains in enumerate((HAND, TRACKING), start=1):
+        truth = flight(number, gains).error
+        assert errors(MODEL.space.vector(gains)[np.newaxis])[0] == pytest.approx(truth, rel=0.02)
+
+
+def test_without_recorded_states_its_landscape_is_the_nominal_models() -> None:
+    first = flight(1, HAND)
+    bare = Trajectory(first.trajectory.time_s, {"pitch_error_rad": first.trajectory["pitch_error_rad"]}, "csv", "x")
+    points = MODEL.space.vector(TRACKING)[np.newaxis]
+    unseen = foresee(definition(), MODEL, [replace(first, trajectory=bare)])
+    assert unseen(points) == pytest.approx(nominal(MODEL).errors(points))

@@ -3,7 +3,7 @@ import pytest
 
 from app.core.definition import Definition
 from app.core.experiments.takeoff import Takeoff
-from app.core.strategies.simplex import model_optimum, propose
+from app.core.strategies.simplex import foresee, model_optimum, propose
 from tests.core.bowl import Bowl, fly
 from tests.core.flying import compiled_only
 
@@ -50,3 +50,9 @@ def test_the_search_leaves_a_pinned_gain_where_it_is() -> None:
     pinned = Bowl.space.narrowed({"b": (70, 70)})
     optimum = model_optimum(BOWL, pinned, np.array([90.0, 70.0]))
     assert optimum.gains == pytest.approx([30.0, 70.0], abs=1e-3)
+
+
+def test_its_landscape_is_the_nominal_models_whatever_flew() -> None:
+    errors = foresee(Definition(), BOWL, [fly(1, 90.0, 90)])(np.array([[30.0, 40.0], [90.0, 90.0]]))
+    assert errors[0] == pytest.approx(1.0, abs=1e-6)
+    assert errors[1] > errors[0]
