@@ -100,7 +100,7 @@ def test_a_warm_start_s_landscape_is_that_of_the_vehicle_it_starts_from() -> Non
     tuned: Gains = {"kp": 1600, "ki": 900, "kd": 150}
     donor = flight(5, tuned)
     definition = Definition(
-        start=Start(kind="campaign", gains=tuned, donor=Donor(campaign_id=1, trial_number=5, checksum="0"))
+        start=Start(kind="campaign", gains=dict(tuned), donor=Donor(campaign_id=1, trial_number=5, checksum="0"))
     )
     survey = plan_survey(Plan(definition=definition, flights=(), donor=donor, centre=tuned, marks=()))
     assert survey is not None
