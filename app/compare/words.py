@@ -1,26 +1,17 @@
 """Numbers and flights in sentences."""
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from app.core.statistics import Group
 from app.core.strategies.history import describe
+from app.core.wording import plus_minus
 from app.db.models import CampaignRow, TrialRow
-
-_MOST_DIGITS = 6
-_TWO_DIGITS_BELOW = 3.55
-"""An uncertainty that begins with less carries a second digit: rounding 0.012 to 0.01 would cost too much."""
 
 
 def measured(value: float, standard_error: float, unit: str) -> str:
-    """`0.105 ± 0.012 m`, in as many digits as the uncertainty allows."""
-    if standard_error <= 0.0:
-        return f"{value:.3f} {unit}"
-    power = math.floor(math.log10(standard_error))
-    two = standard_error / 10.0**power < _TWO_DIGITS_BELOW
-    digits = min(_MOST_DIGITS, max(0, 1 - power if two else -power))
-    return f"{value:.{digits}f} ± {standard_error:.{digits}f} {unit}"
+    """`0.105 ± 0.012 m`, in as many digits as the uncertainty allows; the value alone where there is none."""
+    return plus_minus(value, standard_error, unit) if standard_error > 0.0 else f"{value:.3f} {unit}"
 
 
 def percent(confidence: float) -> str:

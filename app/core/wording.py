@@ -9,11 +9,18 @@ _TWO_DIGITS_BELOW: Final = 3.55
 """An uncertainty that begins with less carries a second digit: rounding 0.012 to 0.01 would cost too much."""
 
 
+def decimals(uncertainty: float | None) -> int:
+    """Digits after the point that an uncertainty of this size allows; three where it is not known."""
+    if uncertainty is None or not math.isfinite(uncertainty) or uncertainty <= 0.0:
+        return 3
+    power = math.floor(math.log10(uncertainty))
+    digits = 1 - power if uncertainty / 10.0**power < _TWO_DIGITS_BELOW else -power
+    return min(_MOST_DIGITS, max(0, digits))
+
+
 def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal["-", "+"] = "-") -> str:
     """`0.105 ± 0.012 m`, in as many digits as the uncertainty allows; `+` as the sign is printed always."""
-    power = math.floor(math.log10(standard_error)) if standard_error > 0.0 else -3
-    two = standard_error / 10.0**power < _TWO_DIGITS_BELOW if standard_error > 0.0 else False
-    digits = min(_MOST_DIGITS, max(0, 1 - power if two else -power))
+    digits = decimals(standard_error)
     return f"{value:{sign}.{digits}f} ± {standard_error:.{digits}f} {unit}"
 
 

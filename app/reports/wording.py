@@ -1,26 +1,14 @@
 """Numbers, gains and times as a report prints them: no more digits than the measurement carries, always with a unit."""
 
-import math
 from collections.abc import Mapping
 from datetime import UTC, datetime, tzinfo
 from typing import Final
 
 from app.core.definition import OptionValue
+from app.core.wording import decimals
 from app.schemas import Interval
 
 NOTHING: Final = "–"
-_MOST_DIGITS: Final = 6
-_TWO_DIGITS_BELOW: Final = 3.55
-"""An uncertainty that begins with less than this carries a second digit: 0.012, not 0.01."""
-
-
-def decimals(uncertainty: float | None) -> int:
-    """Digits after the point that an uncertainty of this size allows; three where it is not known."""
-    if uncertainty is None or not math.isfinite(uncertainty) or uncertainty <= 0:
-        return 3
-    power = math.floor(math.log10(uncertainty))
-    digits = 1 - power if uncertainty / 10**power < _TWO_DIGITS_BELOW else -power
-    return min(_MOST_DIGITS, max(0, digits))
 
 
 def number(value: float | None, digits: int = 3) -> str:
