@@ -233,10 +233,11 @@ class ErrorsFigure:
     def _without_error(self, palette: Palette, height: float) -> list[dict[str, object]]:
         """Marks at the foot, clear of the axis' numbers: these flights have no error that would mean anything, or none
         that anybody vouches for yet."""
-        uncounted = [flight for flight in self.history.flights if flight.outcome != "valid"]
-        unjudged = [flight for flight in uncounted if flight.outcome == "not yet judged"]
+        flights = self.history.flights
+        uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet judged"}]
+        unjudged = [flight for flight in flights if flight.outcome == "not yet judged"]
         marked = {
-            "not counted": ([flight for flight in uncounted if flight not in unjudged], "x-thin", palette.bad),
+            "not counted": (uncounted, "x-thin", palette.bad),
             "not yet judged": (unjudged, "circle-open", palette.dim),
         }
         return [
@@ -244,16 +245,16 @@ class ErrorsFigure:
                 "type": "scatter",
                 "mode": "markers",
                 "name": role.capitalize(),
-                "x": [flight.number for flight in flights],
-                "y": [round(height, 6)] * len(flights),
-                "text": [flight.outcome for flight in flights],
+                "x": [flight.number for flight in marks],
+                "y": [round(height, 6)] * len(marks),
+                "text": [flight.outcome for flight in marks],
                 "marker": {"size": 10, "symbol": symbol, "color": colour, "line": {"width": 2, "color": colour}},
                 "meta": {"role": role},
                 "cliponaxis": False,
                 "hovertemplate": "<b>Flight %{x}, %{text}</b><extra></extra>",
             }
-            for role, (flights, symbol, colour) in marked.items()
-            if flights
+            for role, (marks, symbol, colour) in marked.items()
+            if marks
         ]
 
     def _best_so_far(self, palette: Palette) -> dict[str, object]:
