@@ -16,10 +16,32 @@ const chartsForReports: Plugin = {
   },
 };
 
+const CHARTS = "plotly-cartesian";
+
+/** Tells `early.js` where the chart library is. */
+const chartsEarly: Plugin = {
+  name: "charts-early",
+  transformIndexHtml: {
+    order: "post",
+    handler: (html, { bundle }) => {
+      const charts = Object.keys(bundle ?? {}).find((name) => name.startsWith(`assets/${CHARTS}`));
+      return charts ? html.replace('src="/early.js"', `src="/early.js" data-charts="/${charts}"`) : html;
+    },
+  },
+};
+
+/** Drawing needs the most of the chart library: the browser compiles it whole and beside the page's own work. */
+const compiledWhole = (chunk: { name: string }) =>
+  chunk.name.startsWith(CHARTS) ? "//# allFunctionsCalledOnLoad" : "";
+
 export default defineConfig({
-  plugins: [react(), chartsForReports],
+  plugins: [react(), chartsForReports, chartsEarly],
   // The name that the browser asked for is passed on: the API refuses acts from pages of another origin.
   server: { host: "127.0.0.1", proxy: { "/api": { target: api, changeOrigin: false } } },
-  build: { target: "es2023", sourcemap: false },
+  build: {
+    target: "es2023",
+    sourcemap: false,
+    rolldownOptions: { output: { postBanner: compiledWhole } },
+  },
   test: { environment: "jsdom", include: ["src/**/*.test.{ts,tsx}"], restoreMocks: true },
 });

@@ -42,6 +42,17 @@ def test_built_assets_are_kept_for_ever_and_sent_compressed(dashboard: TestClien
     assert "immutable" not in missing.headers["cache-control"]
 
 
+def test_built_assets_come_as_they_are_to_who_does_not_take_them_compressed(dashboard: TestClient) -> None:
+    with dashboard as client:
+        compressed = client.get("/assets/index-abc123.js")
+        plain = client.get("/assets/index-abc123.js", headers={"Accept-Encoding": "identity"})
+        part = client.get("/assets/index-abc123.js", headers={"Range": "bytes=0-6", "Accept-Encoding": "identity"})
+    assert plain.text == compressed.text == "console.log(1);\n" * 200
+    assert "content-encoding" not in plain.headers
+    assert compressed.headers["content-type"] == plain.headers["content-type"]
+    assert (part.status_code, part.text) == (206, "console")
+
+
 @pytest.mark.parametrize("headers", [PAGE, {}])
 def test_an_unknown_api_path_is_a_problem_and_not_a_page(dashboard: TestClient, headers: dict[str, str]) -> None:
     with dashboard as client:
