@@ -1,6 +1,7 @@
 """`gainline serve`: the web process, with a worker beside it."""
 
 import errno
+import gc
 import signal
 import socket
 import sys
@@ -27,6 +28,8 @@ from app.worker import run_supervised_worker
 STREAMS_END_WITHIN_S: Final = 3
 SWITCH_EVERY_S: Final = 0.001
 """How long a thread that draws may keep the one that answers waiting for the interpreter."""
+COLLECT_EVERY: Final = 50_000
+"""New objects between two searches for garbage in cycles: a large answer is made of several such portions."""
 
 _log = structlog.get_logger(__name__)
 
@@ -94,6 +97,7 @@ def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], 
     address = web_address(settings.host, listener.getsockname()[1])
 
     def ready() -> None:
+        _spare_what_stays()
         _log.info("ready", address=address)
         announce(f"Gainline is ready at {address}")
         _announce_elsewhere(settings.host, listener.getsockname()[1], announce)
@@ -109,6 +113,13 @@ def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], 
         timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
     )
     _Server(config, ready=ready, closing=closing).run(sockets=[listener])
+
+
+def _spare_what_stays() -> None:
+    """The loaded program is never garbage: the collector need not go through all of it while an answer is made."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(COLLECT_EVERY)
 
 
 def _announce_elsewhere(host: str, port: int, announce: Callable[[str], None]) -> None:
