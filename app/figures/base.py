@@ -4,13 +4,16 @@ import html
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Final, Literal, Protocol
 
 import plotly.graph_objects as go
 
 Cell = str | int | float | None
 PlotlyJson = Mapping[str, object]
 CardState = Literal["ready", "waiting", "failed"]
+
+CHECKED_ITEMS: Final = 20
+"""Of a list in a trace: each is as long as there are flights or samples, and made of one kind."""
 
 logger = logging.getLogger(__name__)
 
@@ -87,6 +90,18 @@ def literal(text: str) -> str:
 
 
 def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:
-    """Traces and layout as Plotly's own JSON, every property checked. Raises ValueError on one that does not exist."""
-    go.Figure(data=list(traces), layout=dict(layout))
+    """Traces and layout as Plotly's own JSON, every property checked, of long lists their first items. Raises
+    ValueError on one that does not exist."""
+    go.Figure(data=[_shortened(trace) for trace in traces], layout=dict(layout))
     return {"data": list(traces), "layout": dict(layout)}
+
+
+def _shortened(properties: Mapping[str, object]) -> dict[str, object]:
+    """The same properties, of lists the first items only: Plotly takes its time over each."""
+    return {name: _head(value) for name, value in properties.items()}
+
+
+def _head(value: object) -> object:
+    if isinstance(value, Mapping):
+        return _shortened(value)
+    return value[:CHECKED_ITEMS] if isinstance(value, list) else value

@@ -96,4 +96,7 @@ def _instants(until_s: float) -> Samples:
 
 
 def _points(curve: Curve) -> dict[str, object]:
-    return {"x": [round(float(at), 3) for at in curve.time_s], "y": [round(float(value), 4) for value in curve.values]}
+    return {
+        "x": [round(at, 3) for at in curve.time_s.tolist()],
+        "y": [round(value, 4) for value in curve.values.tolist()],
+    }

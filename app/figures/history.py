@@ -1,6 +1,7 @@
 """What the figures draw: a campaign's flights as plain data."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -97,7 +98,7 @@ class Noise:
     around_best: Range | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class History:
     """A campaign as its figures see it.
 
@@ -121,12 +122,12 @@ class History:
     window: Range | None = None
     chosen: int | None = None
 
-    @property
+    @cached_property
     def valid(self) -> tuple[FlightData, ...]:
         """Valid flights with an error, the only ones that compete."""
         return tuple(flight for flight in self.flights if flight.outcome == "valid" and flight.error is not None)
 
-    @property
+    @cached_property
     def best(self) -> FlightData | None:
         """The valid flight with the lowest error, the earlier one of equals."""
         return min(self.valid, key=_error, default=None)

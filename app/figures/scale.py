@@ -58,4 +58,4 @@ def thinned(
         chosen = np.concatenate([chosen[chosen < first], inside.astype(np.uint64), chosen[chosen >= end]])
     time_s, values = time_s[chosen], values[chosen]
     digits = 4 if len(values) == 0 or float(np.abs(values).max()) >= 1.0 else 5
-    return [round(float(t), 4) for t in time_s], [round(float(v), digits) for v in values]
+    return [round(t, 4) for t in time_s.tolist()], [round(v, digits) for v in values.tolist()]
