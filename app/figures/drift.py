@@ -50,7 +50,7 @@ class CalibrationFigure:
             palette,
             showlegend=False,
             uirevision="calibration",
-            margin={"l": 8, "r": 14, "t": 24, "b": 8},
+            margin={**theme.MARGIN_PX, "t": 24},
             annotations=[self._title(palette, index, name, len(names)) for index, name in enumerate(names, start=1)],
             shapes=self._tuned(palette, len(names)),
             **axes,

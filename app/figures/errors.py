@@ -62,6 +62,7 @@ class ErrorsFigure:
                 palette, "Flight", range=[0.5, last + 0.95], dtick=max(1, -(-last // 12)), showgrid=False
             ),
             yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, 1.08 * span.high], nticks=6),
+            margin={**theme.MARGIN_PX, "l": 60},
             annotations=self._labels(palette, span.high),
             uirevision="errors",
         )

@@ -40,7 +40,7 @@ class GainsFigure:
             palette,
             showlegend=False,
             uirevision="gains",
-            margin={"l": 8, "r": 14, "t": 24, "b": 8},
+            margin={**theme.MARGIN_PX, "t": 24},
             annotations=self._names(palette),
             **axes,
         )

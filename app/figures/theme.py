@@ -9,6 +9,10 @@ ThemeName = Literal["light", "dark"]
 FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 'DejaVu Sans', sans-serif"
 
 
+MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({"l": 48, "r": 14, "t": 12, "b": 48})
+"""Room for an axis with its title: where a margin grows while it is drawn, the whole chart is drawn a second time."""
+
+
 @dataclass(frozen=True, slots=True)
 class Palette:
     """Colours by role. Lines keep 3:1 against the surface, text 4.5:1."""
@@ -77,7 +81,7 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
         "font": {"family": FONT, "size": 13, "color": palette.ink},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "margin": {"l": 8, "r": 14, "t": 12, "b": 8},
+        "margin": dict(MARGIN_PX),
         "hovermode": "closest",
         "hoverlabel": {
             "bgcolor": palette.surface,

@@ -79,6 +79,13 @@ def test_a_thousand_flights_are_drawn_as_an_envelope_with_those_that_matter(page
     expect(row(page_of_many, FLIGHTS - 249)).to_be_attached()
 
 
+def test_a_chart_finds_room_for_its_axes_and_is_drawn_once(page_of_many: Dashboard) -> None:
+    """Where a label does not fit its margin, Plotly makes room, draws all of it again, and counts that."""
+    for chart in ("takeoffs", "errors", "gains"):
+        again = page_of_many.plot(chart).evaluate("chart => chart._fullLayout._redrawFromAutoMarginCount ?? null")
+        assert again is None, chart
+
+
 def test_a_flight_that_is_pointed_at_stands_out_as_curve_mark_and_row(page_of_many: Dashboard) -> None:
     number = best_of(page_of_many)["trial_number"]
     row(page_of_many, number).hover()
