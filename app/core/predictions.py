@@ -62,20 +62,20 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
     """
     inside = of = agreeing = disagreeing = 0
     best: float | None = None
-    seen: list[dict[str, float]] = []
+    seen: set[frozenset[tuple[str, float]]] = set()
     for flight in flights:
         if flight.outcome != "valid" or flight.error is None:
             continue
-        told = flight.predicted
+        told, gains = flight.predicted, frozenset(flight.gains.items())
         if told is not None and told.lower is not None and told.upper is not None:
             of += 1
             inside += told.lower <= flight.error <= told.upper
-        if told is not None and best is not None and dict(flight.gains) not in seen:
+        if told is not None and best is not None and gains not in seen:
             agreed = (told.error - best) * (flight.error - best)
             agreeing += agreed > 0.0
             disagreeing += agreed < 0.0
         best = flight.error if best is None else min(best, flight.error)
-        seen.append(dict(flight.gains))
+        seen.add(gains)
     trustworthy = not (disagreeing >= _DISAGREEMENTS and disagreeing > agreeing)
     return TrackRecord(
         inside=inside,

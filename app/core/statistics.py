@@ -13,6 +13,7 @@ error σ̂ √(1/n₁ + 1/n₂): the pooled t test where ν₀ = 0.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import sqrt
 from typing import Final, Literal
 
 import numpy as np
@@ -56,7 +57,7 @@ class Group:
 
     @cached_property
     def mean(self) -> float:
-        return float(np.mean(self.errors))
+        return self.errors[0] if self.size == 1 else float(np.mean(self.errors))
 
     @property
     def squares(self) -> float:
@@ -66,7 +67,7 @@ class Group:
         return float(np.sum((np.array(self.errors) - self.mean) ** 2))
 
     def standard_error(self, scatter: Pooled) -> float:
-        return scatter.sigma / float(np.sqrt(self.size))
+        return scatter.sigma / sqrt(self.size)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +88,7 @@ class Comparison:
 
     `difference` is first − second. `confidence` is that of the likelier of the two directions, with the allowance for
     having chosen and for having looked before; `further` is None for a decided comparison, and for one that
-    100 flights would not decide.
+    100 flights would not decide, or where nobody asked.
     """
 
     verdict: Word
@@ -154,14 +155,22 @@ def winner_of(groups: Sequence[Group], scatter: Pooled) -> Group:
 
 
 def compare(
-    first: Group, second: Group, scatter: Pooled, confidence: float, *, candidates: int = 1, looks: int = 0
+    first: Group,
+    second: Group,
+    scatter: Pooled,
+    confidence: float,
+    *,
+    candidates: int = 1,
+    looks: int = 0,
+    foresee: bool = True,
 ) -> Comparison:
     """Judge the difference of two means by Student's t.
 
     `candidates`: among how many policies `first` was chosen for its low error; the chance of a mistake counts that many
     times (Bonferroni), so that the best of N gets no credit for having been chosen. `looks`: at the k-th of several
     looks at growing data the chance of a mistake counts k(k + 1) times; as Σ 1/(k(k + 1)) = 1, however often one looks
-    the chance of ever being misled stays below 1 − confidence.
+    the chance of ever being misled stays below 1 − confidence. `foresee`: say too how many `further` flights would
+    decide, which takes most of the time.
     """
     allowance = candidates * max(looks * (looks + 1), 1)
     difference = first.mean - second.mean
@@ -172,7 +181,9 @@ def compare(
         confidence=certainty,
         difference=difference,
         standard_error=_standard_error(scatter, (first.size, second.size)),
-        further=_further(first, second, scatter, confidence, candidates, looks) if verdict == "unresolved" else None,
+        further=_further(first, second, scatter, confidence, candidates, looks)
+        if foresee and verdict == "unresolved"
+        else None,
     )
 
 

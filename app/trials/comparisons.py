@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from typing import Final, Literal
 
-from app.core.confirming import Standing
+from app.core.definition import Flight
+from app.core.experiments.base import Scatter
 from app.core.policy import Gains
-from app.core.statistics import Group, Pooled, compare
+from app.core.statistics import Group, Pooled, compare, groups_of, pooled
 from app.db.models import TrialRow
 from app.trials.schemas import TrialComparison
 
@@ -17,16 +18,17 @@ CONFIDENCE: Final = 0.9
 class Field:
     """The valid flights that a campaign's trials are held against, each found without a search however many there are.
 
-    `scored` holds their numbers and errors, in their order.
+    `valid` holds them in their order, `prior` is the experiment's scatter.
     """
 
-    def __init__(self, scored: Sequence[tuple[int, float]], now: Standing | None) -> None:
-        groups = () if now is None else now.groups
-        self._numbers = [number for number, _ in scored]
-        self._best_so_far = list(accumulate(((error, number) for number, error in scored), min))
+    def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
+        groups = groups_of(valid)
+        scored = [(flight.error, flight.number) for flight in valid if flight.error is not None]
+        self._numbers = [number for _, number in scored]
+        self._best_so_far = list(accumulate(scored, min))
         self._by_number: Mapping[int, Group] = {number: group for group in groups for number in group.numbers}
         self._by_gains: Mapping[object, Group] = {_key(group.gains): group for group in groups}
-        self.scatter: Final[Pooled | None] = None if now is None else now.scatter
+        self.scatter: Final[Pooled | None] = pooled(groups, prior) if groups else None
 
     def best_before(self, number: int) -> tuple[float, int] | None:
         """Error and number of the best flight before that one."""
@@ -57,7 +59,7 @@ def comparisons(row: TrialRow, field: Field) -> list[TrialComparison]:
         other = field.group_of(number)
         if other is None or other.gains == own.gains:
             continue
-        said = compare(own, other, field.scatter, CONFIDENCE)
+        said = compare(own, other, field.scatter, CONFIDENCE, foresee=False)
         found.append(
             TrialComparison(
                 against=against,

@@ -70,6 +70,14 @@ def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
     return tuple(_flight(row, _NOTHING) for row in counted(trials))
 
 
+def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
+    """The scored ones in their order, with nothing but their gains and errors: quickly read, however many."""
+    return tuple(
+        Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
+        for number, gains, error in repository.scored(session, campaign_id)
+    )
+
+
 def counted(trials: Sequence[TrialRow]) -> list[TrialRow]:
     """The trials that are history: valid and aborted."""
     return [row for row in trials if row.state in HISTORY]

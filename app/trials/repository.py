@@ -6,7 +6,7 @@ from typing import Final
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, defer, joinedload, undefer
 
-from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, GainsJson, TrajectoryRow, TrialPhotoRow, TrialRow
 from app.errors import NotFoundError
 from app.trials.states import UNDER_WAY, FlightState, TrialState
 
@@ -66,12 +66,13 @@ def page(session: Session, campaign_id: int, *, after_number: int, limit: int) -
     return rows, total
 
 
-def scored(session: Session, campaign_id: int) -> Sequence[tuple[int, float]]:
-    """Number and error of every valid trial, in their order."""
-    wanted = select(TrialRow.number, TrialRow.error).where(
+def scored(session: Session, campaign_id: int) -> Sequence[tuple[int, GainsJson, float]]:
+    """Number, gains and error of every valid trial, in their order."""
+    wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
         TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
     )
-    return [(number, error) for number, error in session.execute(wanted.order_by(TrialRow.number)) if error is not None]
+    found = session.execute(wanted.order_by(TrialRow.number))
+    return [(number, gains, error) for number, gains, error in found if error is not None]
 
 
 def has_claimed_flight(session: Session, campaign_id: int) -> bool:

@@ -6,7 +6,6 @@ from sqlalchemy.orm import Session
 
 from app.campaigns.rehearsals import is_free_to_fly, rehearsal_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
-from app.campaigns.statistics import standing_of
 from app.core.experiments import get_experiment
 from app.core.thinning import kept
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
@@ -15,7 +14,7 @@ from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.moves import allowed
 from app.schemas import Gate, Interval
-from app.trials import repository
+from app.trials import history, repository
 from app.trials.comparisons import Field, comparisons
 from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
@@ -31,8 +30,7 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     """Some trials of a campaign."""
     session.flush()
     flights = repository.latest_flights(session, [row.id for row in rows])
-    now = standing_of(campaign, repository.of_campaigns(session, (campaign.id,)))
-    field = Field(repository.scored(session, campaign.id), now)
+    field = Field(history.valid_flights(session, campaign.id), get_experiment(campaign.experiment).scatter)
     rehearsed = is_free_to_fly(rehearsal_of(session, campaign))
     return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
 
