@@ -145,7 +145,11 @@ def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: i
         predicted = history.store_trajectory(session, Trajectory(modelled.time_s, band, "model", "simulation"))
         row = ProposalRow(
             campaign_id=campaign_id,
-            history_digest=history.history_digest(definition_of(campaign), history.trials_of(session, campaign_id)),
+            history_digest=history.history_digest(
+                definition_of(campaign),
+                history.trials_of(session, campaign_id),
+                history.checksums_of(session, campaign_id),
+            ),
             kind="step",
             gains=gains,
             predicted_error=0.21,

@@ -173,7 +173,7 @@ def _record(bundle: Bundle, said: Record | None) -> TrajectoryRow | None:
 def _propose(session: Session, campaign: CampaignRow, proposals: Sequence[ProposalRow]) -> None:
     """Where the last proposal does not hold any more under the new ids, it is computed again, to the same gains."""
     trials = history.trials_of(session, campaign.id)
-    if not proposals or is_stale(campaign, proposals[-1], trials):
+    if not proposals or is_stale(session, campaign, proposals[-1], trials):
         request_proposal(session, campaign)
 
 

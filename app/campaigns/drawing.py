@@ -3,6 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Final, Literal, TypedDict, cast
 
 import numpy as np
@@ -160,7 +161,7 @@ def _curve(trajectory: Trajectory, channel: str) -> Curve:
 
 
 def _coarse(curves: Mapping[int, list[list[float]]], row: TrialRow) -> Curve:
-    points = np.array(curves.get(row.id, []), dtype=np.float64).reshape(-1, 2)
+    points = np.fromiter(chain.from_iterable(curves.get(row.id, [])), dtype=np.float64).reshape(-1, 2)
     return Curve(points[:, 0], points[:, 1])
 
 
@@ -189,7 +190,7 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
             **_predicted(session, _proposal_of(session, planned), output),
         )
     proposal = repository.latest_proposal(session, campaign.id)
-    if proposal is None or campaign.outcome is not None or is_stale(campaign, proposal, rows):
+    if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
         return None
     return NextFlight(
         number=max((row.number for row in rows), default=0) + 1,

@@ -101,7 +101,7 @@ def _impossible(campaign: CampaignRow) -> str | None:
 
 
 def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> Asked:
-    if is_stale(campaign, proposal, history.trials_of(session, campaign.id)):
+    if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed; the landscape that they lie in follows.")
     job = _job(session, campaign.id, proposal.id)
     wanted = _is_wanted(job)

@@ -82,7 +82,7 @@ def read_history(session: Session, campaign_id: int) -> History:
         campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
-        digest=history.history_digest(definition, trials),
+        digest=history.history_digest(definition, trials, history.checksums_of(session, campaign_id)),
         donor=_donor(session, definition),
         battery_v=history.last_battery_v(trials),
     )
@@ -155,7 +155,7 @@ def store_proposal(session: Session, campaign_id: int, computed: Computed) -> Pr
     session.add(row)
     session.flush()
     trials = history.trials_of(session, campaign_id)
-    if not is_stale(campaign, row, trials) and history.unclassed(trials) is None:
+    if not is_stale(session, campaign, row, trials) and history.unclassed(trials) is None:
         _let_count(session, campaign, computed.stop_verdict)
     return row
 
@@ -182,7 +182,7 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     row = repository.get_proposal_or_none(session, proposal_id)
     if row is None or row.campaign_id != campaign.id:
         raise NotFoundError("proposal", proposal_id, hint="Ask for the campaign's proposal and use its id.")
-    if is_stale(campaign, row, history.trials_of(session, campaign.id)):
+    if is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
             hint="Ask for the campaign's proposal again and decide on the new one.",
@@ -193,7 +193,7 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
 def latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow:
     """The present proposal. Raises ConflictError while there is none for the present flights."""
     row = repository.latest_proposal(session, campaign.id)
-    if row is None or is_stale(campaign, row, history.trials_of(session, campaign.id)):
+    if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"The next gains of campaign {campaign.id} are not computed yet.",
             hint="Try again in a moment; ask for the campaign's proposal to see when they are there.",
@@ -201,9 +201,10 @@ def latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow:
     return row
 
 
-def is_stale(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
+def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the campaign's history is no longer the one that the proposal was computed from."""
-    return row.history_digest != history.history_digest(definition_of(campaign), trials)
+    checksums = history.checksums_of(session, campaign.id)
+    return row.history_digest != history.history_digest(definition_of(campaign), trials, checksums)
 
 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
@@ -211,7 +212,9 @@ def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
     trials = history.trials_of(session, campaign.id)
     waiting = [row for row in trials if row.state in UNFLOWN and row.proposal_id is not None]
     proposals = repository.proposals_by_id(session, {row.proposal_id for row in waiting if row.proposal_id})
-    outdated = [row for row in waiting if row.proposal_id and is_stale(campaign, proposals[row.proposal_id], trials)]
+    outdated = [
+        row for row in waiting if row.proposal_id and is_stale(session, campaign, proposals[row.proposal_id], trials)
+    ]
     reason = "its proposal is outdated: the campaign's flights have changed since"
     cancel_unflown(outdated, history.flight_under_way(session, campaign.id), reason)
 
@@ -222,7 +225,11 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
     Raises ConflictError while they are not known.
     """
     latest = repository.latest_proposal(session, campaign.id)
-    if latest is None or latest.kind != "start" or is_stale(campaign, latest, history.trials_of(session, campaign.id)):
+    if (
+        latest is None
+        or latest.kind != "start"
+        or is_stale(session, campaign, latest, history.trials_of(session, campaign.id))
+    ):
         raise ConflictError(
             f"The start gains of campaign {campaign.id} are not computed yet, and gains of your own are held to them.",
             hint="Try again in a moment; ask for the campaign's proposal to see when they are there.",

@@ -117,7 +117,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
     session.flush()
     trials = history.trials_of(session, row.id)
     latest = repository.latest_proposal(session, row.id)
-    shown = None if latest is None else proposal_view(row, latest, trials)
+    shown = None if latest is None else proposal_view(session, row, latest, trials)
     if (waiting := history.unclassed(trials)) is not None:
         return NextFlight(
             state="none",
@@ -147,7 +147,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
     )
 
 
-def proposal_view(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> Proposal:
+def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> Proposal:
     best = history.best_of(trials)
     now = best.gains if best is not None else campaign.vehicle.safe_gains
     said = row.stop_verdict
@@ -169,7 +169,7 @@ def proposal_view(campaign: CampaignRow, row: ProposalRow, trials: Sequence[Tria
         gate=Gate.model_validate(row.gate),
         stop_verdict=verdict,
         history_digest=row.history_digest,
-        stale=is_stale(campaign, row, trials),
+        stale=is_stale(session, campaign, row, trials),
         computed_at=row.computed_at,
     )
 

@@ -30,7 +30,7 @@ BEST_ERROR: Final = repository.BEST_ERROR
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
-    """The trials of one or more campaigns, by campaign and number, with the checksums of their records."""
+    """The trials of one or more campaigns, by campaign and number."""
     return repository.of_campaigns(session, campaign_ids)
 
 
@@ -92,15 +92,21 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
     return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
 
 
-def history_digest(definition: Definition, trials: Sequence[TrialRow]) -> str:
-    """SHA-256 over everything that a proposal is computed from; differs as soon as any of it does."""
+def checksums_of(session: Session, campaign_id: int) -> Mapping[int, str]:
+    """Of those trials that left a record its checksum, by trial."""
+    return repository.checksums(session, campaign_id)
+
+
+def history_digest(definition: Definition, trials: Sequence[TrialRow], checksums: Mapping[int, str]) -> str:
+    """SHA-256 over everything that a proposal is computed from, with the `checksums` of the trials' records; differs as
+    soon as any of it does."""
     flights = [
         [
             row.number,
             row.gains,
             row.state,
             row.error,
-            row.trajectory.checksum if row.trajectory is not None else None,
+            checksums.get(row.id),
             row.predicted_error,
             row.predicted_interval,
         ]

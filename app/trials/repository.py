@@ -27,17 +27,20 @@ def get_one(session: Session, trial_id: int) -> TrialRow:
 
 
 def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[TrialRow]:
-    """Their trials in the order of their numbers, with the checksums of their records. What is large and seldom wanted
-    of all of them (the gate's word, curves, settings, the records' descriptions) is read when it is asked for."""
+    """Their trials in the order of their numbers. What is large and seldom wanted of all of them (the gate's word,
+    curves, settings, the records' descriptions) is read when it is asked for."""
     return session.scalars(
         select(TrialRow)
         .where(TrialRow.campaign_id.in_(campaign_ids))
-        .options(
-            joinedload(TrialRow.trajectory).load_only(TrajectoryRow.checksum),
-            *(defer(column) for column in (TrialRow.gate, TrialRow.curve, TrialRow.settings, TrialRow.read_back)),
-        )
+        .options(*(defer(column) for column in (TrialRow.gate, TrialRow.curve, TrialRow.settings, TrialRow.read_back)))
         .order_by(TrialRow.campaign_id, TrialRow.number)
     ).all()
+
+
+def checksums(session: Session, campaign_id: int) -> Mapping[int, str]:
+    """Of those trials that left a record its checksum, by trial."""
+    wanted = select(TrialRow.id, TrajectoryRow.checksum).join(TrialRow.trajectory)
+    return dict(session.execute(wanted.where(TrialRow.campaign_id == campaign_id)).all())
 
 
 def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
