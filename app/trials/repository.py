@@ -62,7 +62,11 @@ def page(session: Session, campaign_id: int, *, after_number: int, limit: int) -
     rows = session.scalars(
         select(TrialRow)
         .where(TrialRow.campaign_id == campaign_id, TrialRow.number > after_number)
-        .options(joinedload(TrialRow.trajectory))
+        .options(
+            defer(TrialRow.curve),
+            # It is stored behind the samples: SQLite would walk through all their pages to it.
+            joinedload(TrialRow.trajectory).defer(TrajectoryRow.created_at),
+        )
         .order_by(TrialRow.number)
         .limit(limit + 1)
     ).all()
