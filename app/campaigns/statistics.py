@@ -39,7 +39,7 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     trials = history.trials_of(session, campaign_id)
     definition, experiment = definition_of(row), get_experiment(row.experiment)
     flights = history.flown_gains(trials)
-    now = standing_of(row, trials)
+    now = standing(definition, experiment, flights)
     scatter = pooled((), experiment.scatter) if now is None else now.scatter
     expected = 0.0 if now is None else _optimism(now)
     record = track_record(flights)
