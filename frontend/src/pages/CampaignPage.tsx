@@ -1,5 +1,5 @@
 import { Skeleton, useComputedColorScheme } from "@mantine/core";
-import { memo, startTransition, useCallback, useDeferredValue, useEffect, useState } from "react";
+import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
 import { useCampaign, useCampaignFigure, useProposal, useStanding, useTrials } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
@@ -69,8 +69,6 @@ interface View {
 
 function CampaignView({ campaign, trials: read, trouble }: View) {
   const trials = read ?? NONE;
-  // A table of many rows: whatever else is to be drawn or clicked comes between.
-  const rows = useDeferredValue(read, null);
   const [chosen, setChosen] = useState<number | null>(null);
   const standing = useStanding(campaign.id);
   const unproposed = useProposal(campaign.id).error;
@@ -112,7 +110,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       </div>
       <Landscape campaignId={campaign.id} />
       <div className={classes["row"]}>{read !== null && <Statistics campaignId={campaign.id} />}</div>
-      <FlightsPanel campaign={campaign} trials={rows} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
+      <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
     </>
   );
 }
