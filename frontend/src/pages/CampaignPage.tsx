@@ -1,7 +1,7 @@
 import { Skeleton, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
-import { useCampaign, useCampaignFigure, useProposal, useStanding, useTrials } from "../api/queries";
+import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useStanding, useTrials } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
 import { ByFlightPanels, CurvesPanel } from "../components/CampaignCharts";
 import { CampaignHeader } from "../components/CampaignHeader";
@@ -39,6 +39,7 @@ function CampaignById({ campaignId }: { campaignId: number }) {
 /** What the page will want is asked for at once, not only when there is a place for it. */
 function Coming({ campaignId }: { campaignId: number }) {
   const theme = useComputedColorScheme("light");
+  useCatalogue();
   useProposal(campaignId);
   useCampaignFigure(campaignId, "takeoffs", theme);
   useCampaignFigure(campaignId, "errors", theme);
