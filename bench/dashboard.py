@@ -192,7 +192,7 @@ def weight_kb(page: Page, path: str, ready: str) -> float:
     page.on("requestfinished", lambda request: _keep(request, bodies))
     page.goto(path)
     page.locator(ready).first.wait_for()
-    page.wait_for_timeout(500)
+    page.wait_for_timeout(3000)
     return sum(len(gzip.compress(body, 6)) for body in bodies) / 1e3
 
 
