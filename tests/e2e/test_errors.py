@@ -7,7 +7,7 @@ import signal
 import sqlite3
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -44,7 +44,9 @@ FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unforeseen")
 RETRIED_MS: Final = 40_000
 """A read that failed at the server is tried three times more before the page says so."""
 
-Provoke = Callable[[Dashboard, Server], None]
+Undo = Callable[[], None]
+Provoke = Callable[[Dashboard, Server], Undo | None]
+"""What it returns is called once the page has been read: until then the error has to last."""
 PROVOKED: Final[dict[type[GainlineError] | str, Provoke]] = {}
 
 
@@ -256,16 +258,18 @@ def _a_database_that_somebody_else_holds(dashboard: Dashboard, server: Server) -
 
 
 @provokes(LinkDownError)
-def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server) -> None:
+def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server) -> Undo:
     campaign_id = dashboard.create("twin")
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("1×")
     dashboard.fly()
     abort = dashboard.page.get_by_role("button", name=re.compile("^ABORT")).first
     expect(abort).to_be_visible()
-    with stopped_worker(server):
+    with ExitStack() as stack:
+        stack.enter_context(stopped_worker(server))
         abort.click()
         expect(dashboard.page.get_by_role("alert")).to_contain_text("remote control")
+        return stack.pop_all().close
 
 
 @provokes(GainlineError)
@@ -356,8 +360,16 @@ def test_an_error_says_what_happened_and_what_to_do(
             told.append(answer.json())
 
     dashboard.page.on("response", note)
-    PROVOKED[kind](dashboard, server)
-    title = TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1]
+    undo = PROVOKED[kind](dashboard, server)
+    try:
+        _is_told(dashboard, told, TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1])
+    finally:
+        if undo is not None:
+            undo()
+
+
+def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
+    """One of the refusals of that title stands on the page, with what to do and where."""
     expect(dashboard.page.get_by_role("alert").first).to_be_visible(timeout=RETRIED_MS)
     dashboard.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
 

@@ -113,6 +113,7 @@ def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_w
     dashboard.until(lambda: [one["state"] for one in dashboard.trials(campaign_id)] in (["valid"], ["captured"]))
     [trial] = dashboard.trials(campaign_id)
     assert (trial["gains"]["ki"], trial["overrule_reason"]) == (1356, "the paper flew these gains")
+    expect(dashboard.panel("Flight 1, gains of your own")).to_have_count(0)
     verdict = dashboard.panel("Flight 1")
     expect(verdict.get_by_text("Overruled", exact=True)).to_be_visible()
     expect(verdict).to_contain_text("the paper flew these gains")
