@@ -82,7 +82,7 @@ def read_history(session: Session, campaign_id: int) -> History:
         campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
-        digest=history.history_digest(definition, trials, history.checksums_of(session, campaign_id)),
+        digest=history.history_digest(session, campaign_id, definition, trials),
         donor=_donor(session, definition),
         battery_v=history.last_battery_v(trials),
     )
@@ -203,8 +203,7 @@ def latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow:
 
 def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the campaign's history is no longer the one that the proposal was computed from."""
-    checksums = history.checksums_of(session, campaign.id)
-    return row.history_digest != history.history_digest(definition_of(campaign), trials, checksums)
+    return row.history_digest != history.history_digest(session, campaign.id, definition_of(campaign), trials)
 
 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:

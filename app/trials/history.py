@@ -92,14 +92,10 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
     return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
 
 
-def checksums_of(session: Session, campaign_id: int) -> Mapping[int, str]:
-    """Of those trials that left a record its checksum, by trial."""
-    return repository.checksums(session, campaign_id)
-
-
-def history_digest(definition: Definition, trials: Sequence[TrialRow], checksums: Mapping[int, str]) -> str:
-    """SHA-256 over everything that a proposal is computed from, with the `checksums` of the trials' records; differs as
-    soon as any of it does."""
+def history_digest(session: Session, campaign_id: int, definition: Definition, trials: Sequence[TrialRow]) -> str:
+    """SHA-256 over everything that a proposal is computed from, the checksums of the trials' records among it; differs
+    as soon as any of it does."""
+    checksums = repository.checksums(session, campaign_id)
     flights = [
         [
             row.number,
