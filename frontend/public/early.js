@@ -15,7 +15,7 @@
 // So that a page of charts has their library when it has their figures.
 (() => {
   const { charts } = document.currentScript.dataset;
-  if (!charts || !/^\/(campaigns|compare|controller|fly)\//.test(location.pathname)) return;
+  if (!charts || !/^\/(campaigns|compare|controller|fly)(\/|$)/.test(location.pathname)) return;
   const link = Object.assign(document.createElement("link"), { rel: "modulepreload", href: charts, crossOrigin: "" });
   document.head.append(link);
 })();
