@@ -1,14 +1,20 @@
 """The processes that compute: pure functions go in, results come out, and a process that dies is replaced."""
 
 import os
+import queue
 import signal
 import threading
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from traceback import format_exc
 from types import TracebackType
-from typing import Final, ParamSpec, Self, TypeVar
+from typing import Final, Generic, ParamSpec, Self, TypeVar
 
 import structlog
 
@@ -27,77 +33,148 @@ class CrashedError(GainlineError):
 
 
 class Pool:
-    """A `concurrent.futures` pool of spawned processes between enter and exit. Thread-safe.
+    """Spawned processes between enter and exit, each started when it is first needed. Thread-safe.
 
-    Its processes hold one end of a lifeline: they end at once, in the middle of a task, when this process closes the
-    other end or dies. Tasks are pure, so nothing is lost by that.
+    They end at once, in the middle of a task, when the pool is closed or this process dies. Tasks are pure, so nothing
+    is lost by that. Each has a pipe to itself: one that dies in the middle of a result is noticed by its end, which a
+    `concurrent.futures.ProcessPoolExecutor` waits for in vain (docs/decisions/0014).
     """
 
-    def __init__(self, processes: int, *, prepare: Callable[[], object]) -> None:
-        """`prepare()` runs in every new process before its first task, to load and compile what tasks need."""
-        self._processes = processes
-        self._prepare = prepare
-        self._lock = threading.Lock()
-        self._closed = False
-        self._held, self._lifeline = get_context("spawn").Pipe(duplex=False)
+    def __init__(self, processes: int, *, prepare: Callable[[], object], niceness: int = 0) -> None:
+        """`prepare()` runs in every new process before its first task, to load and compile what tasks need; `niceness`,
+        from 0 to 19, is how far they give way to other processes of the machine."""
+        self._computers = [_Computer(prepare, niceness) for _ in range(processes)]
+        self._free: queue.LifoQueue[_Computer] = queue.LifoQueue()
+        for computer in self._computers:
+            self._free.put(computer)
 
     def __enter__(self) -> Self:
-        self._executor = self._start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with self._lock:
-            self._closed = True
-            self._lifeline.close()
-        self._executor.shutdown(wait=True, cancel_futures=True)
-        self._held.close()
+        for computer in self._computers:
+            computer.close()
 
     def run(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Call a pure, picklable function in the pool and wait.
 
-        Raises CrashedError when its process dies twice, CancelledError when the pool is closed meanwhile.
+        Raises what it raises, CrashedError when its process dies twice, CancelledError when the pool is closed
+        meanwhile.
         """
+        task = partial(function, *args, **kwargs)
         for _ in range(ATTEMPTS):
-            with self._lock:
-                if self._closed:
-                    raise CancelledError
-                executor = self._executor
+            computer = self._free.get()
             try:
-                return executor.submit(function, *args, **kwargs).result()
-            except BrokenExecutor:
-                self._replace(executor, function.__qualname__)
+                return computer.perform(task)
+            except _DiedError:
+                _log.warning("computing process died", task=function.__qualname__)
+            finally:
+                self._free.put(computer)
         raise CrashedError(
             f"The process that computed {function.__qualname__} died {ATTEMPTS} times.",
             hint="It may have run out of memory. Free some and retry the job; the log says more.",
         )
 
-    def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(
-            self._processes,
-            mp_context=get_context("spawn"),
-            initializer=_settle_in,
-            initargs=(self._held, self._prepare),
-        )
 
-    def _replace(self, broken: ProcessPoolExecutor, task: str) -> None:
+@dataclass(frozen=True, slots=True)
+class _Done(Generic[T]):
+    result: T
+
+
+@dataclass(frozen=True, slots=True)
+class _Refused:
+    """By the task; the error's note says where."""
+
+    error: Exception
+
+
+class _DiedError(Exception):
+    """The process is gone without a result."""
+
+
+class _Computer:
+    """A process, started when it is needed, and the pipe to it. It performs for one thread at a time; any may close
+    it."""
+
+    def __init__(self, prepare: Callable[[], object], niceness: int) -> None:
+        self._prepare = prepare
+        self._niceness = niceness
+        self._lock = threading.Lock()
+        self._closed = False
+        self._running: tuple[BaseProcess, Connection] | None = None
+
+    def perform(self, task: Callable[[], T]) -> T:
+        """Raises what the task raises, _DiedError, and CancelledError once it is closed."""
+        pipe = self._pipe()
+        try:
+            pipe.send(task)
+            outcome: _Done[T] | _Refused = pipe.recv()
+        except (EOFError, OSError) as error:
+            self._bury()
+            raise _DiedError from error
+        if isinstance(outcome, _Refused):
+            raise outcome.error
+        return outcome.result
+
+    def close(self) -> None:
+        with self._lock:
+            self._closed = True
+            self._kill()
+
+    def _pipe(self) -> Connection:
         with self._lock:
             if self._closed:
                 raise CancelledError
-            if self._executor is broken:
-                _log.warning("computing process died", task=task)
-                broken.shutdown(wait=False, cancel_futures=True)
-                self._executor = self._start()
+            if self._running is None:
+                self._running = self._start()
+            return self._running[1]
+
+    def _start(self) -> tuple[BaseProcess, Connection]:
+        context = get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(
+            target=_compute, args=(theirs, self._prepare, self._niceness), name="computing", daemon=True
+        )
+        process.start()
+        theirs.close()
+        return process, ours
+
+    def _bury(self) -> None:
+        with self._lock:
+            if self._closed:
+                raise CancelledError
+            self._kill()
+            self._running = None
+
+    def _kill(self) -> None:
+        if self._running is not None:
+            process, _ = self._running
+            process.kill()
+            process.join()
 
 
-def _settle_in(lifeline: Connection, prepare: Callable[[], object]) -> None:
-    """In the new process: leave Ctrl-C to the parent, hold on to the lifeline, and get ready."""
+def _compute(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
+    """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
+    os.nice(niceness)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
+    with suppress(EOFError, OSError):  # the parent is gone
+        while True:
+            pipe.send(_outcome(pipe.recv()))
 
 
-def _end_with(lifeline: Connection) -> None:
-    lifeline.poll(None)
-    os._exit(0)
+def _outcome(task: Callable[[], T]) -> _Done[T] | _Refused:
+    try:
+        return _Done(task())
+    except Exception as error:  # noqa: BLE001 - the edge of the process
+        error.add_note(format_exc())
+        return _Refused(error)
+
+
+def _end_with_parent() -> None:
+    if (parent := parent_process()) is not None:
+        parent.join()
+        os._exit(0)

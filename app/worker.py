@@ -2,8 +2,8 @@
 
 Flights, connected vehicles and computations have processes of their own, each watched by a thread of this one, which
 keeps the books. The live socket has a thread of its own too, so that an abort is heard whatever the others do.
-Proposals have the pool to themselves; a reproduction, which takes minutes, has a process apart that yields to
-everything else.
+Proposals have a pool to themselves. What nobody waits for with a drone in hand gives way to all else, in processes
+apart: error landscapes, and reproductions, which take minutes.
 """
 
 import os
@@ -49,6 +49,7 @@ ACTS_AT_ONCE: Final = 8
 SPARE_PROCESSORS: Final = max(1, (os.cpu_count() or 2) - 1)
 REPRODUCTIONS_AT_ONCE: Final = 1
 LANDSCAPES_AT_ONCE: Final = 1
+LANDSCAPE_NICENESS: Final = 5
 LOOK_ANYWAY_S: Final = 1.0
 SWITCH_EVERY_S: Final = 0.001
 """How long a thread that keeps books may make the one that passes aborts on wait for the interpreter; Python's own 5 ms
@@ -157,7 +158,8 @@ class Worker:
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
             pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
-            desks = self._desks(database, pool)
+            surveying = stack.enter_context(Pool(LANDSCAPES_AT_ONCE, prepare=prepare, niceness=LANDSCAPE_NICENESS))
+            desks = self._desks(database, pool, surveying)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self._ending.ask, "the worker failed; its log says why")
             self._until_stored(lambda: recover(database))
@@ -192,13 +194,13 @@ class Worker:
         )
         return sessions, deck, live
 
-    def _desks(self, database: Database, pool: Pool) -> tuple[Desk, ...]:
+    def _desks(self, database: Database, pool: Pool, surveying: Pool) -> tuple[Desk, ...]:
         proposer = Proposer(database, pool, worker=self._name)
         reproducer = Reproducer(database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event)
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
-            (LANDSCAPE_JOB, Surveyor(database, pool, worker=self._name), LANDSCAPES_AT_ONCE),
+            (LANDSCAPE_JOB, Surveyor(database, surveying, worker=self._name), LANDSCAPES_AT_ONCE),
         )
         return tuple(
             Desk(database, kind, perform, room=room, worker=self._name, lease_s=self._settings.lease_s)

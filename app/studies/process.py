@@ -1,7 +1,7 @@
 """A process that computes one reproduction, with less priority than everything else, and says how far it is.
 
-It holds one end of a lifeline as the pool's processes do: when its parent lets go or dies, it ends at once. A
-reproduction is pure, so nothing is lost by that.
+It holds one end of a lifeline: when its parent lets go or dies, it ends at once. A reproduction is pure, so nothing is
+lost by that.
 """
 
 import os

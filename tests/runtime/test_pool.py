@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -28,6 +29,25 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+def niceness() -> int:
+    return os.getpriority(os.PRIO_PROCESS, 0)
+
+
+def die_in_the_middle_of_the_result(flag: Path) -> bytes:
+    """The first time only; the result is larger than any pipe."""
+    if flag.exists():
+        return b"whole"
+    flag.touch()
+    threading.Thread(target=die_while_sending, args=(threading.get_ident(),), daemon=True).start()
+    return bytes(50_000_000)
+
+
+def die_while_sending(thread: int) -> None:
+    while sys._current_frames()[thread].f_code.co_name != "_send":
+        pass
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def sleep_long(mine: Path) -> None:
     mine.write_text(str(os.getpid()))
     time.sleep(60)
@@ -50,11 +70,22 @@ def test_a_killed_process_is_replaced_and_the_task_tried_again(tmp_path: Path) -
         assert pool.run(die_once, tmp_path / "flag") == 7
 
 
+def test_a_process_killed_while_it_tells_its_result_is_replaced_too(tmp_path: Path) -> None:
+    with Pool(1, prepare=time.time) as pool:
+        assert pool.run(die_in_the_middle_of_the_result, tmp_path / "flag") == b"whole"
+
+
 def test_a_task_that_always_kills_its_process_fails_and_the_next_one_works() -> None:
     with Pool(1, prepare=time.time) as pool:
         with pytest.raises(CrashedError, match="died 2 times"):
             pool.run(die)
         assert pool.run(double, 3) == 6
+
+
+def test_processes_give_way_to_others_as_far_as_they_are_told() -> None:
+    with Pool(1, prepare=time.time) as even, Pool(1, prepare=time.time, niceness=3) as nice:
+        assert even.run(niceness) == niceness()
+        assert nice.run(niceness) == niceness() + 3
 
 
 def test_closing_the_pool_ends_a_long_task_at_once(tmp_path: Path) -> None:
