@@ -1,4 +1,5 @@
-"""Fewer samples that look the same: MinMaxLTTB (Van Der Donckt et al., 2023) keeps a curve's peaks and its shape."""
+"""Fewer samples that look the same: of a record so many that keep its peaks and its shape (MinMaxLTTB, Van Der Donckt
+et al., 2023), of a smooth curve those at which it bends (Ramer, 1972; Douglas and Peucker, 1973)."""
 
 from typing import Final
 
@@ -19,3 +20,21 @@ def kept(time_s: Samples, values: Samples, points: int) -> Indices:
         return np.arange(len(time_s), dtype=np.uint64)
     chosen: Indices = _DOWNSAMPLER.downsample(np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
     return chosen
+
+
+def bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
+    """Indices of samples, shape (k,), in their order, whose polyline passes every other sample within `tolerance`, in
+    the unit of the values; the first and the last among them. The times ascend."""
+    if len(time_s) < 3:
+        return np.arange(len(time_s), dtype=np.uint64)
+    needed = {0, len(time_s) - 1}
+    spans = [(0, len(time_s) - 1)]
+    while spans:
+        first, last = spans.pop()
+        ends = [first, last]
+        off = np.abs(values[first:last] - np.interp(time_s[first:last], time_s[ends], values[ends]))
+        furthest = first + int(np.argmax(off))
+        if off[furthest - first] > tolerance:
+            needed.add(furthest)
+            spans += [(first, furthest), (furthest, last)]
+    return np.array(sorted(needed), dtype=np.uint64)

@@ -8,7 +8,7 @@ import numpy as np
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, literal, plotly_json
 from app.figures.history import Curve
-from app.figures.scale import robust_span, thinned
+from app.figures.scale import outlined, robust_span, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 600
@@ -119,7 +119,7 @@ class ComparingFigure:
         )
 
     def _set_point(self, palette: Palette) -> dict[str, object]:
-        x, y = thinned(self.data.set_point.time_s, self.data.set_point.values, POINTS)
+        x, y = outlined(self.data.set_point.time_s, self.data.set_point.values)
         return {
             "type": "scatter",
             "mode": "lines",

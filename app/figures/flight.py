@@ -10,7 +10,7 @@ from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
 from app.figures.history import Band, Curve, Range
 from app.figures.marks import band_traces, glitch_traces
-from app.figures.scale import robust_span, thinned
+from app.figures.scale import outlined, robust_span, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 1200
@@ -68,7 +68,7 @@ class FlightFigure:
         """The flight among what it is seen with, its glitches above all."""
         record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
         return [
-            *band_traces(palette, record.band, POINTS),
+            *band_traces(palette, record.band),
             *self._context(palette),
             _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", reading),
             *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
@@ -144,7 +144,7 @@ class FlightFigure:
 def _line(
     name: str, curve: Curve, colour: str, width: float, role: str, hover: str | None, dash: str = "solid"
 ) -> dict[str, object]:
-    x, y = thinned(curve.time_s, curve.values, POINTS)
+    x, y = outlined(curve.time_s, curve.values) if hover is None else thinned(curve.time_s, curve.values, POINTS)
     reading: dict[str, object] = (
         {"hoverinfo": "skip"} if hover is None else {"hovertemplate": f"<b>{name}</b><br>{hover}<extra></extra>"}
     )

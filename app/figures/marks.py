@@ -5,15 +5,13 @@ from typing import Final
 
 from app.figures import theme
 from app.figures.history import Band, Curve, Range
-from app.figures.scale import thinned
+from app.figures.scale import outlined, thinned
 from app.figures.theme import Palette
 
 GLITCH_POINTS: Final = 60
 
 
-def band_traces(
-    palette: Palette, band: Band | None, points: int, window: Range | None = None
-) -> list[dict[str, object]]:
+def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
     """Between which curves a flight is expected: two traces (`meta` role band, edge lower and upper), none without."""
     if band is None:
         return []
@@ -25,7 +23,7 @@ def band_traces(
         "legendgroup": "band",
         "legendrank": 900,
     }
-    lower, upper = (thinned(curve.time_s, curve.values, points, window) for curve in (band.lower, band.upper))
+    lower, upper = (outlined(curve.time_s, curve.values) for curve in (band.lower, band.upper))
     return [
         {
             **quiet,

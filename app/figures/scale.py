@@ -3,14 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median_low
+from typing import Final
 
 import numpy as np
 
-from app.core.thinning import kept
+from app.core.thinning import bends, kept
 from app.core.trajectory import Samples
 from app.figures.history import Range
 
 MARGIN = 0.06
+SMOOTH: Final = 1e-3
+"""How far a drawn line may pass beside a smooth curve, as a share of its span: a third of a pixel or so."""
+SMOOTH_POINTS: Final = 1000
+"""Among which the bends of a smooth curve are looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,17 @@ def thinned(
         first, end = window.slice_of(time_s)
         inside = first + kept(time_s[first:end], values[first:end], points).astype(np.int64)
         chosen = np.concatenate([chosen[chosen < first], inside.astype(np.uint64), chosen[chosen >= end]])
-    time_s, values = time_s[chosen], values[chosen]
+    return _short(time_s[chosen], values[chosen])
+
+
+def outlined(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
+    """The samples at which a smooth curve bends, for a line that nobody points at."""
+    near = kept(time_s, values, SMOOTH_POINTS)
+    time_s, values = time_s[near], values[near]
+    chosen = bends(time_s, values, SMOOTH * float(np.ptp(values)) if len(values) else 0.0)
+    return _short(time_s[chosen], values[chosen])
+
+
+def _short(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
     digits = 4 if len(values) == 0 or float(np.abs(values).max()) >= 1.0 else 5
     return [round(t, 4) for t in time_s.tolist()], [round(v, digits) for v in values.tolist()]

@@ -8,7 +8,7 @@ from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.crowd import PERCENTILES, Envelope, apart, envelope_of, envelope_traces
 from app.figures.history import Curve, FlightData, History
 from app.figures.marks import band_traces, glitch_traces
-from app.figures.scale import robust_span, thinned
+from app.figures.scale import outlined, robust_span, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 CURVE_POINTS: Final = 500
@@ -54,7 +54,7 @@ class TakeoffsFigure:
         band = None if history.proposal is None else history.proposal.band
         traces = [
             *envelope_traces(palette, envelope, history.output_unit),
-            *band_traces(palette, band, CURVE_POINTS, history.window),
+            *band_traces(palette, band),
             self._set_point(palette),
             *self._reference(palette),
         ]
@@ -158,30 +158,14 @@ class TakeoffsFigure:
         ]
 
     def _set_point(self, palette: Palette) -> dict[str, object]:
-        return self._trace(
-            "Set point",
-            self.history.set_point,
-            CURVE_POINTS,
-            line=theme.line(palette.dim, 1.5, "dot"),
-            meta={"role": "set point"},
-            hoverinfo="skip",
-            legendrank=900,
-        )
+        style = theme.line(palette.dim, 1.5, "dot")
+        return _goal("Set point", self.history.set_point, line=style, meta={"role": "set point"}, legendrank=900)
 
     def _reference(self, palette: Palette) -> list[dict[str, object]]:
         if self.history.reference is None:
             return []
-        return [
-            self._trace(
-                "Reference",
-                self.history.reference,
-                CURVE_POINTS,
-                line=theme.line(palette.dim, 1.5, "dashdot"),
-                meta={"role": "reference"},
-                hoverinfo="skip",
-                legendrank=901,
-            )
-        ]
+        style = theme.line(palette.dim, 1.5, "dashdot")
+        return [_goal("Reference", self.history.reference, line=style, meta={"role": "reference"}, legendrank=901)]
 
     def _prediction(self, palette: Palette) -> list[dict[str, object]]:
         proposal = self.history.proposal
@@ -268,6 +252,11 @@ class TakeoffsFigure:
 def _rounded(time_s: float, curves: list[Curve]) -> list[Cell]:
     values = [curve.at(time_s) for curve in curves]
     return [None if value is None else round(value, 4) for value in values]
+
+
+def _goal(name: str, curve: Curve, **style: object) -> dict[str, object]:
+    x, y = outlined(curve.time_s, curve.values)
+    return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "hoverinfo": "skip", **style}
 
 
 def _style(palette: Palette, standing: str) -> dict[str, object]:

@@ -64,6 +64,7 @@ def axis(palette: Palette, **more: object) -> dict[str, object]:
         "zeroline": False,
         "ticks": "",
         "automargin": True,
+        "ticklabeloverflow": "allow",
         "title": {"font": {"size": 13, "color": palette.dim}, "standoff": 8},
         "tickfont": {"size": 12, "color": palette.dim},
         **more,
