@@ -55,7 +55,7 @@ class ErrorsFigure:
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
         outside = [scored[index] for index in span.outside]
-        traces += off_scale_traces(palette, outside, span.high, history.error_unit, crowded=self._is_crowded)
+        traces += off_scale_traces(palette, outside, span.high, history.error_unit, last=last, crowded=self._is_crowded)
         layout = theme.layout(
             palette,
             xaxis=theme.titled(
@@ -137,7 +137,7 @@ class ErrorsFigure:
             {
                 "type": "scatter",
                 "mode": "lines",
-                "name": "Noise of the best",
+                "name": "Noise of best",
                 "x": [0.5, right, right, 0.5, 0.5],
                 "y": [low, low, high, high, low],
                 "line": theme.line(theme.faint(palette.best, 0.3), 0.75),

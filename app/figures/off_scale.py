@@ -1,29 +1,44 @@
 """Flights whose error lies beyond the scale: triangles at the upper edge, so that one wild flight flattens no other."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Final
 
 from app.figures.history import FlightData
 from app.figures.theme import Palette
 
+PRINT: Final = 0.18
+"""Share of the axis that an error in print takes on a phone."""
+
 
 def off_scale_traces(
-    palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, crowded: bool
+    palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
 ) -> list[dict[str, object]]:
-    """At height `top`, of few flights each with its error in print."""
+    """At height `top` of an axis that ends with flight `last`; of few flights each with its error in print, where the
+    one before leaves room for it."""
     if crowded:
         return [_together(palette, flights, top, unit)] if flights else []
-    return [_alone(palette, flight, top, unit) for flight in flights]
+    printed = set(_with_room([flight.number for flight in flights], PRINT * last))
+    return [_alone(palette, flight, top, unit, in_print=flight.number in printed) for flight in flights]
 
 
-def _alone(palette: Palette, flight: FlightData, top: float, unit: str) -> dict[str, object]:
+def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
+    """Of ascending numbers those that are that far from the last one that is taken."""
+    free = 0.0
+    for number in numbers:
+        if number >= free:
+            free = number + room
+            yield number
+
+
+def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> dict[str, object]:
     text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
     return {
         "type": "scatter",
-        "mode": "markers+text",
+        "mode": "markers+text" if in_print else "markers",
         "name": text,
         "x": [flight.number],
         "y": [top],
-        "text": [f"↑ {flight.error:.2f}"],
+        "text": [f"↑ {flight.error:.2f}" if in_print else ""],
         "textposition": "bottom center",
         "showlegend": False,
         "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},

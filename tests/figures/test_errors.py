@@ -63,6 +63,17 @@ def test_a_flight_with_a_huge_error_is_marked_at_the_edge_with_its_value() -> No
     assert trace(card, "off scale", trial=6)["text"] == ["↑ 4.20"]
 
 
+def test_of_huge_errors_side_by_side_only_those_with_room_for_their_value_have_it_in_print() -> None:
+    wild = [flight(number, 4.0 + number / 100) for number in (16, 17, 20)]
+    card = ErrorsFigure(
+        history(*TABLE_1, *(flight(number, 0.2) for number in (*range(6, 16), 18, 19)), *wild)
+    ).compute()
+    assert trace(card, "off scale", trial=16)["text"] == ["↑ 4.16"]
+    assert (trace(card, "off scale", trial=17)["text"], trace(card, "off scale", trial=17)["mode"]) == ([""], "markers")
+    assert trace(card, "off scale", trial=17)["hovertemplate"] == "Flight 17: 4.17 m<extra></extra>"
+    assert trace(card, "off scale", trial=20)["text"] == ["↑ 4.20"]
+
+
 def test_each_flight_stands_over_the_interval_it_was_expected_in() -> None:
     flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Range(0.18, 0.22)))
     card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Range(-0.01, 0.15)))).compute()
