@@ -16,7 +16,7 @@ const chartsForReports: Plugin = {
   },
 };
 
-const CHARTS = "plotly-cartesian";
+const CHARTS = "plotly-basic";
 
 /** Tells `early.js` where the chart library is. */
 const chartsEarly: Plugin = {

@@ -1,5 +1,5 @@
-declare module "plotly.js-cartesian-dist-min" {
-  interface Plotly {
+declare module "plotly.js-basic-dist-min" {
+  export interface Plotly {
     react(element: HTMLElement, data: unknown[], layout: Record<string, unknown>, config: unknown): Promise<unknown>;
     update(
       element: HTMLElement,
@@ -17,4 +17,8 @@ declare module "plotly.js-cartesian-dist-min" {
   }
   const plotly: Plotly;
   export default plotly;
+}
+
+declare module "plotly.js-cartesian-dist-min" {
+  export { default } from "plotly.js-basic-dist-min";
 }

@@ -1,9 +1,19 @@
+import type { Plotly } from "plotly.js-basic-dist-min";
 import { useEffect, useRef, useState } from "react";
 import { painted } from "../lib/pace";
 import { narrowed, type PlotlyFigure, type Seconds, traceWithRole, withLive } from "../lib/traces";
 import { liveNow } from "../live/store";
 import classes from "./Chart.module.css";
-import { CONFIG, type CurveOf, drawLive, followPointing, listen, loadPlotly, type PlotlyElement } from "./plotly";
+import {
+  type Build,
+  CONFIG,
+  type CurveOf,
+  drawLive,
+  followPointing,
+  listen,
+  loadPlotly,
+  type PlotlyElement,
+} from "./plotly";
 
 interface Props {
   figure: PlotlyFigure;
@@ -16,6 +26,8 @@ interface Props {
   /** The seconds that a zoom leaves in sight, null for all. */
   onWindow?: ((window: Seconds | null) => void) | undefined;
   curveOf?: CurveOf | undefined;
+  /** Of the chart library; the same for as long as the chart is there. */
+  build?: Build | undefined;
 }
 
 const NARROW_PX = 420;
@@ -23,7 +35,7 @@ const coarse = window.matchMedia("(pointer: coarse)");
 
 /** Brushing zooms with a mouse; a finger has to be able to scroll the page. */
 function layoutFor({ data, layout }: PlotlyFigure, width: number): Record<string, unknown> {
-  const fitting = width < NARROW_PX ? narrowed(layout, data) : layout;
+  const fitting = width < NARROW_PX ? narrowed(layout, data, width) : layout;
   // A copy: Plotly writes a zoom into the layout that it is given, and the figure has to stay what it was.
   return { ...structuredClone(fitting), autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
 }
@@ -33,9 +45,9 @@ function wholeOf({ layout }: PlotlyFigure): Seconds | null {
   return xaxis?.range ?? null;
 }
 
-export function Chart({ figure, label, height, liveTrial = null, onChoose, onWindow, curveOf }: Props) {
+export function Chart({ figure, label, height, liveTrial = null, onChoose, onWindow, curveOf, build }: Props) {
   const element = useRef<HTMLDivElement & PlotlyElement>(null);
-  const [drawn, setDrawn] = useState(false);
+  const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
   const queue = useRef<Promise<unknown>>(Promise.resolve());
 
@@ -45,17 +57,17 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
     let wanted = true;
     queue.current = queue.current.then(async () => {
       try {
-        const plotly = await loadPlotly();
+        const library = await loadPlotly(build);
         await painted();
         if (!wanted) return;
-        await plotly.react(
+        await library.react(
           target,
           withLive(figure.data, liveNow(liveTrial)),
           layoutFor(figure, target.clientWidth),
           CONFIG,
         );
         listen(target, figure.data, { whole: wholeOf(figure), onChoose, onWindow });
-        setDrawn(true);
+        setPlotly(library);
         setBroken(null);
       } catch (error) {
         setBroken(error instanceof Error ? error.message : String(error));
@@ -64,36 +76,32 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
     return () => {
       wanted = false;
     };
-  }, [figure, liveTrial, onChoose, onWindow]);
+  }, [figure, liveTrial, onChoose, onWindow, build]);
 
   useEffect(() => {
     const target = element.current;
     const trace = traceWithRole(figure.data, "live");
-    if (target === null || !drawn || liveTrial === null || trace < 0) return;
-    return drawLive(target, trace, liveTrial);
-  }, [drawn, liveTrial, figure]);
+    if (target === null || plotly === null || liveTrial === null || trace < 0) return;
+    return drawLive(plotly, target, trace, liveTrial);
+  }, [plotly, liveTrial, figure]);
 
   useEffect(() => {
     const target = element.current;
-    if (target === null || !drawn) return;
-    return followPointing(target, figure.data, curveOf);
-  }, [drawn, figure, curveOf]);
+    if (target === null || plotly === null) return;
+    return followPointing(plotly, target, figure.data, curveOf);
+  }, [plotly, figure, curveOf]);
 
   useEffect(() => {
     const target = element.current;
-    if (target === null || !drawn) return;
+    if (target === null || plotly === null) return;
     // A page that was left resizes its charts to nothing, and by then there may be none to resize.
-    const observer = new ResizeObserver(
-      () => void loadPlotly().then((plotly) => target.offsetParent !== null && plotly.Plots.resize(target)),
-    );
+    const observer = new ResizeObserver(() => void (target.offsetParent !== null && plotly.Plots.resize(target)));
     observer.observe(target);
-    return () => observer.disconnect();
-  }, [drawn]);
-
-  useEffect(() => {
-    const target = element.current;
-    return () => void loadPlotly().then((plotly) => target && plotly.purge(target));
-  }, []);
+    return () => {
+      observer.disconnect();
+      plotly.purge(target);
+    };
+  }, [plotly]);
 
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset is for forms; this groups a drawing's parts under one name
@@ -106,8 +114,8 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
       {broken !== null && (
         <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table still works.</p>
       )}
-      {!drawn && broken === null && <div className={classes["waiting"]} aria-hidden />}
-      <div ref={element} className={classes["plot"]} data-drawn={drawn || undefined} />
+      {plotly === null && broken === null && <div className={classes["waiting"]} aria-hidden />}
+      <div ref={element} className={classes["plot"]} data-drawn={plotly !== null || undefined} />
     </div>
   );
 }

@@ -9,7 +9,7 @@ import { DataTable } from "./DataTable";
 import { Help } from "./Help";
 import { Panel } from "./Panel";
 import classes from "./Panel.module.css";
-import type { CurveOf } from "./plotly";
+import type { Build, CurveOf } from "./plotly";
 import { Trouble } from "./Trouble";
 
 interface Props {
@@ -25,6 +25,7 @@ interface Props {
   onChoose?: (trial: number) => void;
   onWindow?: (window: Seconds | null) => void;
   curveOf?: CurveOf;
+  build?: Build;
   tools?: ReactNode;
   /** What a newcomer asks of it. */
   topic?: Topic;
@@ -45,6 +46,7 @@ export function FigurePanel({
   onChoose,
   onWindow,
   curveOf,
+  build,
   tools,
   topic,
   note,
@@ -97,6 +99,7 @@ export function FigurePanel({
           onChoose={onChoose}
           onWindow={onWindow}
           curveOf={curveOf}
+          build={build}
         />
       )}
       {note && <p className={classes["note"]}>{note}</p>}

@@ -1,5 +1,5 @@
 import { useComputedColorScheme } from "@mantine/core";
-import { useMediaQuery } from "@mantine/hooks";
+import { useIdle, useMediaQuery } from "@mantine/hooks";
 import { useEffect, useRef, useState } from "react";
 import { useLandscape } from "../api/landscape";
 import type { FigureCard } from "../api/types";
@@ -9,6 +9,7 @@ import classes from "./LandscapePanel.module.css";
 const BESIDE_PX = 420;
 const STACKED_PX = 330;
 const WAITING_PX = 160;
+const IDLE_MS = 1500;
 
 function heightOf(card: FigureCard | undefined, stacked: boolean): number {
   if (card?.state !== "ready") return WAITING_PX;
@@ -16,28 +17,37 @@ function heightOf(card: FigureCard | undefined, stacked: boolean): number {
   return stacked ? STACKED_PX * axes.length + 60 : BESIDE_PX;
 }
 
-/** The gains as a path over the model's error. */
+/**
+ * The gains as a path over the model's error. It takes longer to draw than other charts, so it is drawn in the midst of
+ * what somebody does elsewhere only when it is in view; else once they pause.
+ */
 export function LandscapePanel({ campaignId }: { campaignId: number }) {
   const place = useRef<HTMLDivElement>(null);
+  const [inView, setInView] = useState(false);
   const [seen, setSeen] = useState(false);
+  const [shown, setShown] = useState<FigureCard | undefined>(undefined);
+  const idle = useIdle(IDLE_MS);
   const theme = useComputedColorScheme("light");
   const stacked = useMediaQuery("(max-width: 820px)", false, { getInitialValueInEffect: false });
   const landscape = useLandscape(campaignId, theme, stacked, seen);
   useEffect(() => {
     const target = place.current;
-    if (target === null || seen) return;
-    const observer = new IntersectionObserver((entries) => entries.some((one) => one.isIntersecting) && setSeen(true));
+    if (target === null) return;
+    const observer = new IntersectionObserver((entries) => setInView(entries.at(-1)?.isIntersecting ?? false));
     observer.observe(target);
     return () => observer.disconnect();
-  }, [seen]);
+  }, []);
+  if (inView && !seen) setSeen(true);
+  if ((inView || (seen && idle)) && shown !== landscape.data) setShown(landscape.data);
   return (
     <div ref={place} className={classes["place"]}>
       <FigurePanel
         title="Error landscape of the model"
-        card={landscape.data}
+        card={shown}
         error={landscape.error}
         wanted={seen}
-        height={heightOf(landscape.data, stacked)}
+        height={heightOf(shown, stacked)}
+        build="contours"
       />
     </div>
   );

@@ -24,7 +24,7 @@ const SOON_MS = 2500;
 /** Fetch the code of every page and of the charts, so that none is missing once the server or the Wi-Fi is lost. */
 export function fetchEveryPage(): void {
   // What cannot be had now is asked for again by the page that needs it, which then says what is wrong.
-  setTimeout(() => void Promise.allSettled([fetchLater(), loadPlotly()]), SOON_MS);
+  setTimeout(() => void Promise.allSettled([fetchLater(), loadPlotly(), loadPlotly("contours")]), SOON_MS);
 }
 
 interface GuardProps {

@@ -1,23 +1,34 @@
-/** The chart library as a chunk of its own, fetched when the first chart is drawn. */
+/** The chart library, fetched when the first chart is drawn. */
 
-import type Plotly from "plotly.js-cartesian-dist-min";
+import type { Plotly } from "plotly.js-basic-dist-min";
 import type { LiveFlight } from "../lib/live";
 import { paced } from "../lib/pace";
 import { onPointed, pointAt } from "../lib/pointing";
 import { flightAt, marksOver, roomFor, type Seconds, type Trace, traceWithRole, windowFrom } from "../lib/traces";
 import { onLive } from "../live/store";
 
-let loading: Promise<typeof Plotly> | undefined;
+const BUILDS = {
+  /** Lines and marks: what nearly every chart is made of, and a fifth less to load than the build with all. */
+  lines: () => import("plotly.js-basic-dist-min"),
+  contours: () => import("plotly.js-cartesian-dist-min"),
+} as const;
 
-export function loadPlotly(): Promise<typeof Plotly> {
-  loading ??= import("plotly.js-cartesian-dist-min").then(
+export type Build = keyof typeof BUILDS;
+
+const loading = new Map<Build, Promise<Plotly>>();
+
+export function loadPlotly(build: Build = "lines"): Promise<Plotly> {
+  const known = loading.get(build);
+  if (known !== undefined) return known;
+  const asked = BUILDS[build]().then(
     (module) => module.default,
     (error: unknown) => {
-      loading = undefined;
+      loading.delete(build);
       throw error;
     },
   );
-  return loading;
+  loading.set(build, asked);
+  return asked;
 }
 
 /** Nothing leaves this machine: Plotly's own upload and edit buttons stay out. */
@@ -81,7 +92,12 @@ export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, 
 const DWELL_MS = 150;
 
 /** Let a flight that is pointed at elsewhere stand out: its curve by style alone, its marks by their labels. */
-export function followPointing(chart: PlotlyElement, traces: readonly Trace[], curveOf?: CurveOf): () => void {
+export function followPointing(
+  plotly: Plotly,
+  chart: PlotlyElement,
+  traces: readonly Trace[],
+  curveOf?: CurveOf,
+): () => void {
   const spare = traceWithRole(traces, "pointed");
   let dwelling: ReturnType<typeof setTimeout> | undefined;
   let wanted: number | null = null;
@@ -93,7 +109,7 @@ export function followPointing(chart: PlotlyElement, traces: readonly Trace[], c
     lent = Boolean(curve);
     chart.toggleAttribute("data-pointing", lent);
     const change = { x: [curve?.x ?? []], y: [curve?.y ?? []], name: `Flight ${flight}` };
-    await (await loadPlotly()).update(chart, change, {}, [spare]);
+    await plotly.update(chart, change, {}, [spare]);
   }
 
   const unfollow = onPointed((flight) => {
@@ -106,18 +122,20 @@ export function followPointing(chart: PlotlyElement, traces: readonly Trace[], c
     if (spare >= 0 && (lent || (flight !== null && group === null))) {
       dwelling = setTimeout(() => void lend(group === null ? flight : null), DWELL_MS);
     }
-    if (!chart.matches(":hover")) void label(flight === null ? [] : marksOver(traces, flight));
+    if (!chart.matches(":hover")) label(flight === null ? [] : marksOver(traces, flight));
   });
 
-  async function label(marks: { curveNumber: number; pointNumber: number }[]): Promise<void> {
+  function label(marks: { curveNumber: number; pointNumber: number }[]): void {
     if (spare >= 0) return;
-    const { Fx } = await loadPlotly();
-    if (marks.length === 0) return Fx.unhover(chart);
+    if (marks.length === 0) {
+      plotly.Fx.unhover(chart);
+      return;
+    }
     const subplots = marks.map(({ curveNumber }) => {
       const { xaxis, yaxis } = traces[curveNumber] ?? {};
       return `${xaxis ?? "x"}${yaxis ?? "y"}`;
     });
-    Fx.hover(chart, marks, subplots);
+    plotly.Fx.hover(chart, marks, subplots);
   }
 
   return () => {
@@ -127,11 +145,10 @@ export function followPointing(chart: PlotlyElement, traces: readonly Trace[], c
 }
 
 /** Grow the chart's live trace as telemetry of a trial comes; returns the function that ends it. */
-export function drawLive(chart: HTMLElement, trace: number, trialId: number): () => void {
+export function drawLive(plotly: Plotly, chart: HTMLElement, trace: number, trialId: number): () => void {
   let latest: LiveFlight | null = null;
   const drawing = paced(async () => {
     if (latest === null || latest.timeS.length === 0) return;
-    const plotly = await loadPlotly();
     const change = { x: [latest.timeS], y: [latest.measured], showlegend: true };
     const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.measured);
     await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, [trace]);
