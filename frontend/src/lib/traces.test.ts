@@ -60,15 +60,16 @@ test("an axis grows with a live curve that leaves it, and only then", () => {
 test("a narrow screen gets a smaller legend of the same colours", () => {
   const unseen = { name: "Likely, lower edge", showlegend: false };
   const named = [{ name: "Predicted" }, { name: "To beat: 0.155" }, {}, unseen];
-  expect(narrowed({ legend: { font: { color: "red", size: 12 } }, xaxis: {} }, named)).toEqual({
+  expect(narrowed({ legend: { font: { color: "red", size: 12 } }, xaxis: {} }, named, 328)).toEqual({
     legend: { font: { color: "red", size: 11 }, entrywidth: 5.8 * 14, entrywidthmode: "pixels" },
     xaxis: {},
   });
 });
 
 test("names in a narrow screen's legend stand two to a row, or in full where that would cut them short", () => {
-  const widthFor = (name: string) => narrowed({}, [{ name }])["legend"];
-  expect(widthFor("Noise of the best")).toMatchObject({ entrywidth: 92 });
+  const margin = { l: 48, r: 14 };
+  const widthFor = (name: string) => narrowed({ margin }, [{ name }], 328)["legend"];
+  expect(widthFor("80 % of 9 flights")).toMatchObject({ entrywidth: (328 - 48 - 14) / 2 - 45 });
   expect(widthFor("A · flight 2 of On twin")).toMatchObject({ entrywidth: 5.8 * 23 });
 });
 

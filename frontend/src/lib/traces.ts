@@ -83,27 +83,32 @@ export function windowFrom(event: Record<string, unknown>, whole: Seconds): Seco
 }
 
 const LETTER_PX = 5.8;
-const HALF_PX = 92;
+/** What Plotly draws before a name, and leaves free after it. */
+const SYMBOL_PX = 45;
 const WHOLE_PX = 220;
 
 /** The room for names of that length: two to a row, if at most a letter or two is lost, or one that is read whole. */
-function entryWidth(letters: number): number {
+function entryWidth(letters: number, half: number): number {
   const wanted = LETTER_PX * letters;
-  return Math.min(wanted, wanted < 1.2 * HALF_PX ? HALF_PX : WHOLE_PX);
+  return Math.min(wanted, wanted < 1.2 * half ? half : WHOLE_PX);
 }
 
 /** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
-export function narrowed(layout: Record<string, unknown>, traces: readonly Trace[]): Record<string, unknown> {
+export function narrowed(
+  layout: Record<string, unknown>,
+  traces: readonly Trace[],
+  width: number,
+): Record<string, unknown> {
   const named = traces.filter(({ showlegend }) => showlegend !== false);
   const longest = Math.max(0, ...named.map(({ name }) => (typeof name === "string" ? name.length : 0)));
-  const legend = typeof layout["legend"] === "object" && layout["legend"] !== null ? layout["legend"] : {};
-  const font = "font" in legend && typeof legend.font === "object" ? legend.font : {};
+  const { legend = {}, margin = {} } = layout as { legend?: { font?: object }; margin?: { l?: number; r?: number } };
+  const half = (width - (margin.l ?? 0) - (margin.r ?? 0)) / 2 - SYMBOL_PX;
   return {
     ...layout,
     legend: {
       ...legend,
-      font: { ...font, size: 11 },
-      entrywidth: entryWidth(longest),
+      font: { ...legend.font, size: 11 },
+      entrywidth: entryWidth(longest, half),
       entrywidthmode: "pixels",
     },
   };
