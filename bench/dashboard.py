@@ -201,8 +201,9 @@ def weight_kb(page: Page, path: str, ready: str) -> float:
 
 
 def _keep(request: Request, bodies: list[bytes]) -> None:
-    answer = request.response()
-    if answer is not None and request.resource_type in {"script", "stylesheet"} and "plotly" not in request.url:
+    if request.resource_type not in {"script", "stylesheet"} or "plotly" in request.url:
+        return
+    if (answer := request.response()) is not None:
         bodies.append(answer.body())
 
 
