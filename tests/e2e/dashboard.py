@@ -104,7 +104,8 @@ class Dashboard:
     # ---- the API's own word
 
     def get(self, path: str) -> Any:
-        answer = self.page.request.get(f"{self.url}/api{path}")
+        # Again where the server had just closed the connection for having been idle.
+        answer = self.page.request.get(f"{self.url}/api{path}", max_retries=2)
         assert answer.ok, answer.text()
         return answer.json()
 

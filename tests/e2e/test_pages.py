@@ -2,7 +2,8 @@
 
 import gzip
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,15 @@ SIZES = {"desk": DESK, "tablet": TABLET, "phone": PHONE}
 THEMES: tuple[Theme, ...] = ("light", "dark")
 UI_BYTES_GZIPPED = 250_000
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+
+SCROLL_THROUGH = """async () => {
+  for (let top = 0; top < document.documentElement.scrollHeight; top += innerHeight) {
+    scrollTo(0, top);
+    await new Promise(done => setTimeout(done, 100));
+  }
+  scrollTo(0, 0);
+}"""
+TOO_WIDE = "all => all.filter(one => one.scrollWidth > one.clientWidth + 1).map(one => one.innerText)"
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +68,7 @@ def states(shared_server: Server, browser: Browser) -> dict[str, str]:
         "settings": "/settings",
         "missing": "/no/such/page",
     }
+    with_landscapes(dashboard, paths.values())
     context.close()
     return paths
 
@@ -94,11 +105,15 @@ def create_pitch(dashboard: Dashboard) -> int:
     return dashboard.when_ready(campaign_id)
 
 
+def with_landscapes(dashboard: Dashboard, pages: Iterable[str]) -> None:
+    """Campaigns' pages show them from now on."""
+    figures = [f"{page}/figures/landscape" for page in pages if re.fullmatch(r"/campaigns/\d+", page)]
+    dashboard.until(lambda: {dashboard.get(figure)["state"] for figure in figures} == {"ready"}, within_s=180)
+
+
 def when_drawn(dashboard: Dashboard) -> None:
     """Wait until nothing on the page is still being fetched or drawn, what is drawn once it is seen included."""
-    dashboard.page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
-    dashboard.page.wait_for_timeout(200)
-    dashboard.page.evaluate("scrollTo(0, 0)")
+    dashboard.page.evaluate(SCROLL_THROUGH)
     expect(dashboard.page.locator("[aria-busy=true]")).to_have_count(0)
     for plot in dashboard.page.locator("[role=group] > div:last-child").all():
         expect(plot).to_have_attribute("data-drawn", "true")
@@ -106,9 +121,10 @@ def when_drawn(dashboard: Dashboard) -> None:
 
 
 def overflow(dashboard: Dashboard, page: str) -> list[str]:
-    """What to say of a page that is wider than its screen; nothing of any other."""
+    """What to say of a page that is wider than its screen, or of figures that reach into each other."""
     wide = dashboard.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-    return [f"{page} scrolls sideways by {wide} px"] if wide else []
+    figures = dashboard.page.locator("dd:visible").evaluate_all(TOO_WIDE)
+    return ([f"{page} scrolls sideways by {wide} px"] if wide else []) + [f"{page}: no room for {it}" for it in figures]
 
 
 def open_everything(dashboard: Dashboard) -> None:

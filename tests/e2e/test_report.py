@@ -8,7 +8,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport
+from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Viewport
 from tests.e2e.test_pages import RULES, SCREENSHOTS
 
 NAME = "<script>document.title = 'taken'</script> & <b>wing</b>"
@@ -59,7 +59,7 @@ def opened(browser: Browser, file: Path, viewport: Viewport) -> tuple[Page, list
     return page, noted
 
 
-@pytest.mark.parametrize("viewport", [TABLET, PHONE], ids=["tablet", "phone"])
+@pytest.mark.parametrize("viewport", [DESK, TABLET, PHONE], ids=["desk", "tablet", "phone"])
 def test_the_file_draws_its_charts_with_no_network_and_can_be_read_by_everybody(
     browser: Browser, file: Path, viewport: Viewport
 ) -> None:
