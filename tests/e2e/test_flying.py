@@ -55,6 +55,19 @@ def test_what_is_drawn_live_is_what_was_measured(dashboard: Dashboard, campaign_
     np.testing.assert_allclose(live["y"], np.interp(live["x"], time_s, altitude_m), atol=5e-3)
 
 
+def test_a_flight_that_has_landed_is_not_shown_flying_while_what_comes_next_is_awaited(
+    dashboard: Dashboard, campaign_id: int
+) -> None:
+    dashboard.fly()
+    expect(dashboard.panel("Flight 1: flying")).to_be_visible()
+    dashboard.page.route(f"**/api/campaigns/{campaign_id}/proposal", lambda _: None)
+    expect(dashboard.panel("Flight 1 · best so far")).to_be_visible()
+    expect(dashboard.panel("Flight 1: flying")).to_have_count(0)
+    expect(dashboard.page.get_by_text("Finding the next gains")).to_be_visible()
+    dashboard.page.unroute(f"**/api/campaigns/{campaign_id}/proposal")
+    expect(dashboard.fly_button).to_be_visible()
+
+
 def test_the_button_aborts_at_once(dashboard: Dashboard, campaign_id: int) -> None:
     dashboard.choose_speed("1×")
     dashboard.fly()

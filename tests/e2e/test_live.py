@@ -14,6 +14,7 @@ from tests.e2e.wifi import Wifi
 
 LOST_MS = 40_000
 """A line that looks open counts as dead after eight seconds of silence."""
+CHARTS_FETCHED = "performance.getEntriesByType('resource').some(one => one.name.includes('plotly'))"
 
 
 @contextmanager
@@ -175,7 +176,7 @@ def test_pages_open_though_the_server_was_lost_before_they_were(open_dashboard: 
     dashboard = open_dashboard(own_server.url)
     with dashboard.page.expect_response(re.compile(r"/assets/later-.*\.js")):
         dashboard.open("/")
-    dashboard.page.wait_for_function("performance.getEntriesByType('resource').some(r => r.name.includes('plotly'))")
+    dashboard.until(lambda: bool(dashboard.page.evaluate(CHARTS_FETCHED)))
     own_server.stop()
     dashboard.page.get_by_role("button", name="More pages").click()
     dashboard.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()

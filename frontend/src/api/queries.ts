@@ -2,6 +2,7 @@
 
 import { keepPreviousData, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useCallback, useState } from "react";
+import { hasLanded } from "../lib/nextStep";
 import type { Seconds } from "../lib/traces";
 import { answer } from "./client";
 import {
@@ -112,6 +113,10 @@ export function useStanding(campaignId: number): Standing | null {
   const areNew = [campaign, trials, next].every(({ isStale, error }) => !isStale || error !== null);
   const areOther = parts.campaign !== held?.campaign || parts.trials !== held?.trials || parts.next !== held?.next;
   if (areNew && areOther && isKnown(parts)) setHeld(parts);
+  // A landing is told at once: nothing is shown in the air that is known to be down.
+  if (held !== null && parts.trials !== undefined && hasLanded(held.campaign, parts.trials)) {
+    return { ...held, trials: parts.trials };
+  }
   return held;
 }
 

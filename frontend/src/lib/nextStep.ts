@@ -14,9 +14,14 @@ export type NextStep =
   | { kind: "failed"; problem: Trouble | null }
   | { kind: "finished" };
 
+/** Whether what the campaign knows as flying is down by its list of flights. */
+export function hasLanded({ flying }: Campaign, trials: readonly Trial[]): boolean {
+  return flying !== null && trials.some(({ id, state }) => id === flying.trial_id && wasFlown(state));
+}
+
 export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly Trial[]): NextStep {
   const { flying } = campaign;
-  const landed = flying !== null && trials.some(({ id, state }) => id === flying.trial_id && wasFlown(state));
+  const landed = hasLanded(campaign, trials);
   if (flying !== null && !landed) {
     return { kind: "flying", trialId: flying.trial_id, trialNumber: flying.trial_number };
   }
