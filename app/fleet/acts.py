@@ -34,6 +34,10 @@ BEGINS_WITHIN: Final = timedelta(seconds=10)
 """How old a request may be when a worker takes it."""
 BY_WORKER: Final = "the worker"
 
+_WITHDRAWN: Final = {
+    ActState.REQUESTED: "It was not begun: the worker was away when it was asked for.",
+    ActState.RUNNING: "It was not finished: the worker ended.",
+}
 _LOOKS_ONLY: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
 """Acts that change nothing on the vehicle, and so are open to everybody."""
 
@@ -143,12 +147,12 @@ def finish_act(
     _end(act, problem=problem)
 
 
-def withdraw_acts(session: Session, reason: str) -> list[int]:
+def withdraw_acts(session: Session) -> list[int]:
     """At a worker's start: what was asked for or under way before is over, and not done by itself later. Gives their
     ids."""
     found = repository.acts_under_way(session)
     for act in found:
-        _end(act, problem=f"It was not finished: {reason}. Ask again if it is still wanted.")
+        _end(act, problem=f"{_WITHDRAWN[act.state]} Ask again if it is still wanted.")
     return [act.id for act in found]
 
 

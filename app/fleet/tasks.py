@@ -85,7 +85,7 @@ class SessionDeck:
     def recover(self) -> None:
         """After a start, and after the flights' own recovery: nobody has a link to any vehicle. Raises StorageError."""
         with self._database.write() as transaction:
-            acts.withdraw_acts(transaction, "the worker ended")
+            acts.withdraw_acts(transaction)
             acts.forget_connections(transaction)
             acts.request_reconnections(transaction, real=self._real)
 

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -84,6 +85,13 @@ class Server:
             time.sleep(0.05)
         self.url = found.group()
         self._port = urlsplit(self.url).port or 0
+        while not self._works():  # what is asked for before is withdrawn
+            time.sleep(0.05)
+
+    def _works(self) -> bool:
+        with urllib.request.urlopen(f"{self.url}/api/health") as answer:
+            health: dict[str, str] = json.load(answer)
+        return health["worker"] == "running"
 
     @property
     def pid(self) -> int:

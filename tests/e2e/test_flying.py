@@ -34,7 +34,7 @@ def test_the_live_curve_grows_while_it_flies_and_becomes_the_record(dashboard: D
         lengths.append(dashboard.live_points())
         dashboard.page.wait_for_timeout(50)
     growing = [length for length in lengths if length > 0]
-    assert len(set(growing)) >= 4, lengths
+    assert len(set(growing)) >= 3, lengths
     assert growing == sorted(growing)
     dashboard.wait_for_flight(1)
     [trial] = dashboard.trials(campaign_id)

@@ -46,7 +46,8 @@ def worn(tab: Dashboard) -> int:
 def sagging(tab: Dashboard) -> int:
     """A simulation that has flown twice."""
     vehicle = {"kind": "twin", "options": {"battery_sag": 0.08}}
-    order = {"name": "Sagging", "vehicle": vehicle, "definition": {"strategy": "calibrated"}}
+    definition = {"strategy": "calibrated", "stop": {"kind": "budget", "max_flights": 4}}
+    order = {"name": "Sagging", "vehicle": vehicle, "definition": definition}
     campaign_id: int = tab.post("/campaigns", order)["id"]
     tab.fly_headless(campaign_id, 2)
     return vehicle_of(tab, campaign_id)

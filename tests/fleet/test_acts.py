@@ -228,13 +228,9 @@ def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else
         acts.quarantine_vehicle(session, doubted["id"], "not verified")
     ask(client, wanted, "restore")
     with database.write() as session:
-        assert len(acts.withdraw_acts(session, "the worker ended")) == 1
+        assert len(acts.withdraw_acts(session)) == 1
         acts.forget_connections(session)
         acts.request_reconnections(session)
-    assert (
-        "It was not finished: the worker ended."
-        in get(client, f"/api/vehicles/{wanted['id']}/acts")["items"][1]["problem"]
-    )
     states = [seen(client, vehicle)["state"] for vehicle in (wanted, closed, doubted)]
     assert states == ["disconnected", "disconnected", "quarantined"]
     tasks = [finish_act(database, problem="nobody answers") for _ in range(2)]
@@ -243,6 +239,23 @@ def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else
     with database.write() as session:
         assert acts.claim_act(session, WORKER) is None
         assert len(acts.request_reconnections(session)) == 2  # wanted still: a person asked for it
+
+
+def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: TestClient, database: Database) -> None:
+    begun, waiting = (create_connected(client, database, name) for name in ("A", "B"))
+    ask(client, begun, "restore")
+    with database.write() as session:
+        acts.claim_act(session, WORKER)
+    ask(client, waiting, "restore")
+    with database.write() as session:
+        acts.withdraw_acts(session)
+    assert [(newest(client, vehicle)["state"], newest(client, vehicle)["problem"]) for vehicle in (begun, waiting)] == [
+        ("failed", "It was not finished: the worker ended. Ask again if it is still wanted."),
+        (
+            "failed",
+            "It was not begun: the worker was away when it was asked for. Ask again if it is still wanted.",
+        ),
+    ]
 
 
 def test_a_connection_that_a_person_asked_for_and_that_failed_is_not_tried_again_by_itself(
