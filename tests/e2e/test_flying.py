@@ -27,6 +27,7 @@ def aborted(dashboard: Dashboard, campaign_id: int) -> bool:
 
 
 def test_the_live_curve_grows_while_it_flies_and_becomes_the_record(dashboard: Dashboard, campaign_id: int) -> None:
+    dashboard.choose_speed("1×")
     dashboard.fly()
     lengths = []
     wait_for_live(dashboard, 1)
@@ -34,11 +35,11 @@ def test_the_live_curve_grows_while_it_flies_and_becomes_the_record(dashboard: D
         lengths.append(dashboard.live_points())
         dashboard.page.wait_for_timeout(50)
     growing = [length for length in lengths if length > 0]
-    assert len(set(growing)) >= 3, lengths
+    assert len(set(growing)) >= 20, lengths
     assert growing == sorted(growing)
     dashboard.wait_for_flight(1)
     [trial] = dashboard.trials(campaign_id)
-    assert trial["speed"] == 10
+    assert trial["speed"] == 1
     drawn = dashboard.trace("takeoffs", "flight", trial=1)
     assert drawn is not None
     time_s, altitude_m = dashboard.record(trial["id"])
@@ -51,20 +52,25 @@ def test_what_is_drawn_live_is_what_was_measured(dashboard: Dashboard, campaign_
     live = dashboard.trace("takeoffs", "live")
     assert live is not None
     dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "valid")
-    time_s, altitude_m = dashboard.record(dashboard.trials(campaign_id)[0]["id"])
+    [trial] = dashboard.trials(campaign_id)
+    assert trial["speed"] == 10
+    time_s, altitude_m = dashboard.record(trial["id"])
     np.testing.assert_allclose(live["y"], np.interp(live["x"], time_s, altitude_m), atol=5e-3)
 
 
-def test_a_flight_that_has_landed_is_not_shown_flying_while_what_comes_next_is_awaited(
+def test_a_flight_that_is_down_is_not_shown_flying_while_what_comes_next_is_awaited(
     dashboard: Dashboard, campaign_id: int
 ) -> None:
+    dashboard.choose_speed("1×")
     dashboard.fly()
     expect(dashboard.panel("Flight 1: flying")).to_be_visible()
-    dashboard.page.route(f"**/api/campaigns/{campaign_id}/proposal", lambda _: None)
-    expect(dashboard.panel("Flight 1 · best so far")).to_be_visible()
+    proposal = f"**/api/campaigns/{campaign_id}/proposal"
+    dashboard.page.route(proposal, lambda _: None)
+    dashboard.page.get_by_role("button", name=re.compile("^ABORT")).click()
+    expect(dashboard.panel("Flight 1").get_by_text("Aborted", exact=True)).to_be_visible()
     expect(dashboard.panel("Flight 1: flying")).to_have_count(0)
     expect(dashboard.page.get_by_text("Finding the next gains")).to_be_visible()
-    dashboard.page.unroute(f"**/api/campaigns/{campaign_id}/proposal")
+    dashboard.page.unroute(proposal)
     expect(dashboard.fly_button).to_be_visible()
 
 

@@ -144,6 +144,7 @@ def test_a_campaign_travels_as_a_file(
     coming.value.save_as(bundle)
     there = open_dashboard(own_server.url)
     there.open()
+    expect(there.page.get_by_role("heading", name="Tune a takeoff in a handful of flights")).to_be_visible()
     there.page.locator("input[type=file]").set_input_files(bundle)
     expect(there.page).to_have_url(re.compile(r"/campaigns/\d+$"))
     expect(there.page.get_by_role("heading", level=1)).to_have_text(NAME)
