@@ -9,16 +9,17 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
 
 from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport
+from tests.runtime.processes import wait_for
 
 HERE = Path(__file__).parent
 BUILT = HERE.parents[1] / "frontend" / "dist" / "index.html"
@@ -85,13 +86,10 @@ class Server:
             time.sleep(0.05)
         self.url = found.group()
         self._port = urlsplit(self.url).port or 0
-        while not self._works():  # what is asked for before is withdrawn
-            time.sleep(0.05)
+        wait_for("the worker", self._works)  # what is asked for before is withdrawn
 
     def _works(self) -> bool:
-        with urllib.request.urlopen(f"{self.url}/api/health") as answer:
-            health: dict[str, str] = json.load(answer)
-        return health["worker"] == "running"
+        return bool(httpx2.get(f"{self.url}/api/health").json()["worker"] == "running")
 
     @property
     def pid(self) -> int:
