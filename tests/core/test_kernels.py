@@ -43,11 +43,11 @@ def test_where_nothing_can_be_kept_kernels_are_compiled_for_each_process(tmp_pat
 
 
 def test_a_user_without_a_home_gets_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
-    def homeless() -> Path:
+    def homeless(_chosen: str) -> Path:
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setattr(kernels, "_cache_folder", homeless)
-    assert not kernels._use_cache()
+    assert not kernels._use_cache.__wrapped__()
 
 
 def test_each_state_of_the_sources_has_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,5 +58,33 @@ def test_each_state_of_the_sources_has_its_own_folder(tmp_path: Path, monkeypatc
     names = []
     for text in ("one", "two", "one"):
         source.write_text(text)
-        names.append(kernels._cache_folder().name)
+        names.append(kernels._cache_folder("").name)
     assert names[0] == names[2] != names[1]
+
+
+NUMBA_FREE = """
+import sys
+from app.core.experiments import EXPERIMENTS
+assert "numba" not in sys.modules
+"""
+
+
+def test_importing_the_kernels_does_not_import_numba() -> None:
+    subprocess.run([sys.executable, "-c", NUMBA_FREE], check=True)
+
+
+def test_a_kernel_compiles_those_it_calls_and_looks_like_its_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "_use_cache", lambda: False)
+
+    @kernels.kernel
+    def doubled(value: int) -> int:
+        """Twice the value."""
+        return 2 * value
+
+    @kernels.kernel
+    def doubled_twice(value: int) -> int:
+        return doubled(doubled(value))
+
+    assert doubled_twice(3) == 12
+    assert doubled(value=2) == 4
+    assert (doubled.__name__, doubled.__doc__) == ("doubled", "Twice the value.")

@@ -28,9 +28,8 @@ def limit(value: int, low: int, high: int) -> int:
     return low if value < low else min(value, high)
 
 
-@kernel
 def fix(value: float, fraction_bits: int) -> int:
-    """`value`·2ⁿ truncated toward zero."""
+    """`value`·2ⁿ truncated toward zero: how a constant enters the loop. Not for kernels: it is called on import."""
     return int(value * (1 << fraction_bits))
 
 
