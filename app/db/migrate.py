@@ -1,17 +1,22 @@
-"""Bringing a database to the program's revision, and refusing one that is not there."""
+"""Bringing a database to the program's revision, and refusing one that is not there.
+
+Alembic is imported when there is something to migrate: most starts find the database up to date.
+"""
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from alembic import command
-from alembic.config import Config
-from alembic.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import text
+from sqlalchemy import inspect, text
 
 from app.data_dir import prepare_data_dir
 from app.db.session import open_engine, translated
 from app.errors import SchemaError
+
+if TYPE_CHECKING:
+    from alembic.config import Config
+
+REVISION: Final = "0004"
+"""The newest of the migrations, which this program works with."""
 
 _APP: Final = Path(__file__).resolve().parent.parent
 _COMMAND: Final = "gainline serve"
@@ -24,10 +29,12 @@ def migrate(database_file: Path) -> None:
     """
     prepare_data_dir(database_file.parent)
     held = revision_of(database_file)
-    if held == newest_revision():
+    if held == REVISION:
         return
     if held is not None and held not in _known_revisions():
         raise _newer(database_file, held)
+    from alembic import command
+
     engine = open_engine(database_file, foreign_keys=False)
     config = _config()
     try:
@@ -48,12 +55,12 @@ def migrate(database_file: Path) -> None:
 def require_current(database_file: Path) -> None:
     """Raises SchemaError, with the command to run, unless the database is at the program's revision."""
     held = revision_of(database_file) if database_file.exists() else None
-    if held == newest_revision():
+    if held == REVISION:
         return
     if held is not None and held not in _known_revisions():
         raise _newer(database_file, held)
     raise SchemaError(
-        f"The database {database_file} is at revision {held or 'none'}, not {newest_revision()}.",
+        f"The database {database_file} is at revision {held or 'none'}, not {REVISION}.",
         hint=f"Run `{_COMMAND}`, which brings it up to date, or `alembic upgrade head` in a checkout.",
     )
 
@@ -63,24 +70,24 @@ def revision_of(database_file: Path) -> str | None:
     engine = open_engine(database_file)
     try:
         with translated(database_file), engine.connect() as connection:
-            return MigrationContext.configure(connection).get_current_revision()
+            if not inspect(connection).has_table("alembic_version"):
+                return None
+            revision: str | None = connection.scalar(text("SELECT version_num FROM alembic_version"))
+            return revision
     finally:
         engine.dispose()
 
 
-def newest_revision() -> str:
-    """The revision that this program works with."""
-    revision = ScriptDirectory.from_config(_config()).get_current_head()
-    assert revision is not None
-    return revision
-
-
 def _known_revisions() -> set[str]:
+    from alembic.script import ScriptDirectory
+
     return {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
 
 
-def _config() -> Config:
+def _config() -> "Config":
     """The migrations lie inside an installed package, and beside `app` in a checkout."""
+    from alembic.config import Config
+
     packaged = _APP / "migrations"
     config = Config()
     config.set_main_option("script_location", str(packaged if packaged.is_dir() else _APP.parent / "migrations"))

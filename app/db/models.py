@@ -136,7 +136,6 @@ class VehicleActRow(Base, Reported):
             "vehicle_id",
             unique=True,
             sqlite_where=text(_ACT_UNDER_WAY_SQL),
-            postgresql_where=text(_ACT_UNDER_WAY_SQL),
         ),
         _NEVER_REUSE_IDS,
     )
@@ -328,7 +327,6 @@ class FlightRow(Base, Reported):
             "vehicle_id",
             unique=True,
             sqlite_where=text(_UNDER_WAY_SQL),
-            postgresql_where=text(_UNDER_WAY_SQL),
         ),
         _NEVER_REUSE_IDS,
     )

@@ -8,15 +8,22 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from fastapi.testclient import TestClient
 from sqlalchemy import CheckConstraint
 
-from app.db.migrate import migrate, newest_revision, require_current, revision_of
+from app.db.migrate import REVISION, migrate, require_current, revision_of
 from app.db.models import Base
 from app.db.session import open_engine
 from app.errors import SchemaError, StorageError
 from app.main import create_app
 from app.settings import Settings
+
+
+def test_the_newest_migration_is_the_one_that_the_program_works_with() -> None:
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parents[2] / "migrations"))
+    assert ScriptDirectory.from_config(config).get_current_head() == REVISION
 
 
 def test_the_migrations_make_exactly_the_tables_of_the_models(migrated_file: Path) -> None:
@@ -40,7 +47,7 @@ def test_migrating_again_changes_nothing(tmp_path: Path) -> None:
     before = file.read_bytes()
     migrate(file)
     assert file.read_bytes() == before
-    assert revision_of(file) == newest_revision()
+    assert revision_of(file) == REVISION
 
 
 def set_revision(file: Path, revision: str) -> None:
