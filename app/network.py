@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import ifaddr
-
 from app.settings import is_loopback
 
 EXPOSES: Final = (
@@ -60,6 +58,8 @@ def is_in_container() -> bool:
 
 
 def _own_addresses(version: int) -> Iterator[tuple[ipaddress.IPv4Address | ipaddress.IPv6Address, str]]:
+    import ifaddr
+
     for adapter in ifaddr.get_adapters():
         if adapter.nice_name.startswith(_INTERNAL):
             continue

@@ -2,12 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
@@ -18,6 +15,9 @@ from app.core.policy import shortened
 from app.core.strategies.manual import MANUAL
 from app.errors import InputError, NotFoundError, Problem
 from app.schemas import Number, Text
+
+if TYPE_CHECKING:
+    from ruamel.yaml.comments import CommentedMap
 
 PRESETS_DIR: Final = Path(__file__).parent / "presets"
 MAX_FILE_BYTES: Final = 2**20
@@ -87,7 +87,11 @@ def _no_campaign(path: Path, problems: tuple[Problem, ...]) -> InputError:
     )
 
 
-def _load(path: Path) -> CommentedMap:
+def _load(path: Path) -> "CommentedMap":
+    from ruamel.yaml import YAML
+    from ruamel.yaml.comments import CommentedMap
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise InputError(f"{path.name} is larger than 1 MiB.", hint="Give a campaign file, not a flight record.")
@@ -120,12 +124,14 @@ def _steps(field: str) -> list[str | int]:
     return [int(part) if part.isdecimal() else part for part in field.split(".")]
 
 
-def _located(document: CommentedMap, where: Sequence[str | int], reason: str) -> Problem:
+def _located(document: "CommentedMap", where: Sequence[str | int], reason: str) -> Problem:
     return Problem(f"line {_line(document, where)}, {'.'.join(str(part) for part in where)}", reason)
 
 
-def _line(document: CommentedMap, where: Sequence[str | int]) -> int:
+def _line(document: "CommentedMap", where: Sequence[str | int]) -> int:
     """The line of the deepest part of `where` that the file holds, counted from 1."""
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
     node: object = document
     line = 1
     for part in where:

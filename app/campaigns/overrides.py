@@ -2,9 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from app.campaigns.files import CampaignFile, with_settings
 from app.core.experiments import get_experiment
 from app.core.strategies import STRATEGIES
@@ -114,6 +111,9 @@ def _known(file: CampaignFile) -> dict[str, Path]:
 
 def _value(text: str) -> object:
     """A YAML scalar: number, true/false, or text."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
     try:
         value: object = YAML(typ="safe", pure=True).load(text)
     except YAMLError:

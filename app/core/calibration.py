@@ -18,8 +18,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.linalg import hadamard, solve_toeplitz
-from scipy.optimize import lsq_linear
 
 from app.core.definition import Flight
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, fitted_parameters
@@ -81,6 +79,8 @@ class Calibration:
         """So many models (a power of two), `width` standard deviations about the fitted one in orthogonal directions:
         shape (runs, m). With fewer runs than parameters + 1 the last parameters stay as fitted. `next_flight`: with
         what differs between flights."""
+        from scipy.linalg import hadamard
+
         covariance = self.covariance
         if next_flight:
             covariance = covariance + np.diag(_flight_sd(self.experiment) ** 2)
@@ -240,6 +240,8 @@ class _Fit:
 
     def learn_noise(self, unknowns: Vector) -> None:
         """Fit the autoregression to what is left over (Yule–Walker), white noise of the assumed floor added."""
+        from scipy.linalg import solve_toeplitz
+
         left = self.outputs(unknowns) - self.measured
         samples = left.shape[1]
         lags = [float(np.sum(left[:, lag:] * left[:, : samples - lag])) / left.size for lag in range(_ORDER + 1)]
@@ -270,6 +272,8 @@ def _bounded_step(
 ) -> tuple[Vector, float]:
     """Where the linearised misses are smallest within the bounds, each change held back by its `damping`, all of shape
     (n,); and by how much half their sum of squares is less there."""
+    from scipy.optimize import lsq_linear
+
     q, r = np.linalg.qr(np.vstack((slopes, np.diag(damping))))
     aim = -q[: len(misses)].T @ misses
     step = lsq_linear(r, aim, (lower - at, upper - at), method="bvls").x

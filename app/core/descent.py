@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize
 
 from app.core.policy import Vector
 
@@ -20,6 +19,8 @@ def descend(
 ) -> Vector:
     """Where the search ends, shape (n,): from `start`, its first steps of `steps` (positive) away from the nearer side,
     until the simplex is `tolerance` wide and differs by 1e-6 in its errors, or `evaluations` are spent."""
+    from scipy.optimize import minimize
+
     inward = np.where(start > (low + high) / 2.0, -steps, steps)
     found = minimize(
         error,

@@ -14,8 +14,6 @@ from math import floor, hypot, log10
 from types import MappingProxyType
 from typing import Final
 
-from scipy.special import ndtri
-
 FALSE_ALARMS: Final = 0.05
 WATCHED: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -49,6 +47,8 @@ class Drift:
 
 def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
     """`before` is the fit with which the vehicle was tuned last, `now` the newest, both by the parameters' names."""
+    from scipy.special import ndtri
+
     names = [name for name in WATCHED if name in before and name in now]
     reach = float(ndtri(1.0 - FALSE_ALARMS / (2.0 * max(len(names), 1))))
     moved = {name: now[name].value - before[name].value for name in names}

@@ -13,7 +13,6 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from app.core.experiments.base import Experiment
 from app.core.metrics import MAX_GAP_S
@@ -157,6 +156,8 @@ def _excess(time_s: Samples, values: Samples, physics: _Physics) -> Samples:
     The speed is the median of the steps within 0.15 s (of two on either side, where samples are rarer), and may change
     by the largest acceleration meanwhile. In a noisy record a jump has to stand out of the noise of the steps.
     """
+    from scipy.ndimage import median_filter
+
     duration_s, step = np.diff(time_s), np.diff(values)
     reach = max(2, round(_AROUND_S / float(np.median(duration_s))))
     beyond = step - median_filter(step / duration_s, size=2 * reach + 1, mode="nearest") * duration_s

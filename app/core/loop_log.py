@@ -13,8 +13,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from app.core.control import vertical_loop as loop
 from app.core.policy import Gains
@@ -331,6 +329,8 @@ def _aligned(part: LoopLog, reference: Counts) -> tuple[NDArray[np.int64], float
 
 def _outside(logged: Counts, simulated: Counts, steps: NDArray[np.int64]) -> Counts:
     """How far the samples after the command lie outside what was simulated within 20 ms of them, shape (n − 1,)."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     window = 2 * round(TIME_TOLERANCE_S * loop.RATE_HZ) + 1
     low = minimum_filter1d(simulated, window, mode="nearest")[steps]
     high = maximum_filter1d(simulated, window, mode="nearest")[steps]
@@ -342,6 +342,8 @@ def _simulated_integrator(part: LoopLog, z_ref: Counts, steps: NDArray[np.int64]
     """The summed error of the samples after the command, shape (n − 1,), from the first one on where it works, NaN
     before and where it never does; the position between the samples follows from their positions and speeds. Of
     samples in the same step the first one counts, and the others are NaN."""
+    from scipy.interpolate import CubicHermiteSpline
+
     summed = np.full(len(steps), np.nan)
     working = np.flatnonzero(part["z_sum_err"][1:])
     begin = int(working[0]) if working.size else len(steps)

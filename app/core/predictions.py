@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from app.core.definition import Flight, Prediction
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
@@ -112,6 +111,8 @@ def expected(
 
     `base` is the flight whose bias the prediction carries, None for the bare model.
     """
+    from scipy.special import stdtrit
+
     if proposal.interval is not None or proposal.predicted is None or proposal.predicted_error is None:
         return proposal
     outputs = _likely(experiment, space, space.vector(proposal.gains), base)
@@ -154,8 +155,11 @@ def expected_again(
 
 def experience(flights: Sequence[Flight]) -> float:
     """f: above 1 where earlier flights missed their predictions by more than their intervals, below where by less."""
+    from scipy.special import ndtri
+
+    half_width = float(ndtri(0.5 + CONFIDENCE / 2))
     squares = [
-        ((2.0 * flight.error - told.lower - told.upper) / max(told.upper - told.lower, _TINY) * _NORMAL) ** 2
+        ((2.0 * flight.error - told.lower - told.upper) / max(told.upper - told.lower, _TINY) * half_width) ** 2
         for flight in flights
         if flight.error is not None
         and (told := flight.predicted) is not None
@@ -169,9 +173,6 @@ def _with_band(curve: Trajectory, output: str, lower: Samples, upper: Samples) -
     """A predicted curve with the two edges of its band as further channels."""
     edges = dict(zip(band_channels(output), (lower, upper), strict=True))
     return replace(curve, channels={**curve.channels, **edges})
-
-
-_NORMAL: Final = float(ndtri(0.5 + CONFIDENCE / 2))
 
 
 def _interval(lower: float, upper: float) -> Interval:

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 from app.core.policy import Vector
 
@@ -27,6 +25,8 @@ class Spread:
 
     def samples(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
         """The mean, then `count` − 1 quasi-random models, shape (count, m); the same every time."""
+        from scipy.stats import qmc
+
         unit = qmc.Halton(len(self.mean), scramble=False).random(count)[1:]
         return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
 
@@ -36,6 +36,8 @@ class Spread:
 
     def _models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
         """Models from numbers evenly spread over 0 … 1, shape (k, m)."""
+        from scipy.special import ndtri
+
         variances, axes = np.linalg.eigh(np.array(self.covariance))
         sd = np.sqrt(np.maximum(variances, 0.0))
         edge = 0.5 - 0.5 * _PROBABILITY_WITHIN

@@ -17,8 +17,6 @@ from math import sqrt
 from typing import Final, Literal
 
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.special import ndtr, stdtr, stdtrit
 
 from app.core.definition import Flight
 from app.core.experiments.base import Matrix, Scatter
@@ -40,6 +38,8 @@ class Pooled:
 
     def half_width(self, variance: float, confidence: float) -> float:
         """Half of the two-sided interval of a number whose variance is `variance`·σ²."""
+        from scipy.special import stdtrit
+
         return float(stdtrit(self.degrees_of_freedom, 0.5 + confidence / 2)) * self.sigma * float(np.sqrt(variance))
 
 
@@ -194,6 +194,9 @@ def optimism(means: Sequence[float], standard_errors: Sequence[float]) -> float:
     For N equal means it is the expected minimum of N normal errors, 0.56 σ for two and 1.16 σ for five; means far above
     the lowest add nothing. Numerical integral, to 1e-6 of the largest standard error.
     """
+    from scipy.integrate import trapezoid
+    from scipy.special import ndtr
+
     centre, sd = np.array(means), np.array(standard_errors)
     if not (sd > 0.0).all():
         return 0.0
@@ -232,6 +235,8 @@ def drift_of(group: Group, scatter: Pooled) -> Drift | None:
 def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.9) -> Trend | None:
     """Least squares line through at least three points with the t interval of its slope, n − 2 degrees of freedom (the
     paper's Fig. 12: error against battery voltage). None when there are fewer, or x does not vary."""
+    from scipy.special import stdtrit
+
     along, measured = np.array(x, dtype=np.float64), np.array(errors, dtype=np.float64)
     if len(along) < 3 or np.ptp(along) == 0.0:
         return None
@@ -250,6 +255,8 @@ def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.
 def smallest_difference(scatter: Pooled, flown: int, left: int, confidence: float) -> float:
     """The least difference that `left` flights, split at best between a policy flown `flown` times already and a new
     one, tell from noise with `confidence`. Infinite without a flight left."""
+    from scipy.special import stdtrit
+
     freedom = scatter.degrees_of_freedom + max(left - 1, 0)
     errors = [np.sqrt(1.0 / (flown + left - new) + 1.0 / new) for new in range(1, left + 1)]
     return float(stdtrit(freedom, confidence)) * scatter.sigma * float(min(errors, default=np.inf))
@@ -261,6 +268,8 @@ def _standard_error(scatter: Pooled, sizes: tuple[int, int]) -> float:
 
 def _certainty(difference: float, scatter: Pooled, sizes: tuple[int, int], allowance: float) -> float:
     """1 − allowance·P(t ≥ |difference|/standard error), not below zero."""
+    from scipy.special import stdtr
+
     standard_error = _standard_error(scatter, sizes)
     if standard_error == 0.0:
         return 1.0 if difference else 0.0

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final, Literal, Protocol
 
-import plotly.graph_objects as go
-
 Cell = str | int | float | None
 PlotlyJson = Mapping[str, object]
 CardState = Literal["ready", "waiting", "failed"]
@@ -92,6 +90,8 @@ def literal(text: str) -> str:
 def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:
     """Traces and layout as Plotly's own JSON, every property checked, of long lists their first items. Raises
     ValueError on one that does not exist."""
+    import plotly.graph_objects as go
+
     go.Figure(data=[_shortened(trace) for trace in traces], layout=dict(layout))
     return {"data": list(traces), "layout": dict(layout)}
 

@@ -4,6 +4,7 @@ Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock; the 
 station sent (a block named so, NAV_TAKEOFF, the takeoff mode), the gains from what the vehicle answered.
 """
 
+import importlib
 import re
 import struct
 from array import array
@@ -13,8 +14,6 @@ from types import MappingProxyType, ModuleType
 from typing import BinaryIO, Final, Protocol
 
 import numpy as np
-from pymavlink.dialects.v10 import paparazzi
-from pymavlink.dialects.v20 import ardupilotmega, common
 
 from app.core.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
@@ -53,12 +52,17 @@ class _Autopilot:
     numbers only; some have a mode that takes off."""
 
     title: str
-    dialect: ModuleType
+    dialect_module: str
     gain_sets: Sequence[Sequence[str]]
     parameters: Mapping[str, str]
     from_ground: bool
     keeps_whole_numbers: bool = False
     has_takeoff_mode: bool = False
+
+    @property
+    def dialect(self) -> ModuleType:
+        """Loaded when the first log of such a vehicle is read: a dialect is a thousand classes."""
+        return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
 
 
 def _own_names(sets: Sequence[Sequence[str]]) -> Mapping[str, str]:
@@ -67,9 +71,11 @@ def _own_names(sets: Sequence[Sequence[str]]) -> Mapping[str, str]:
 
 _AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
     {
-        9: _Autopilot("Paparazzi", paparazzi, PAPARAZZI_SETS, PAPARAZZI, from_ground=False, keeps_whole_numbers=True),
-        3: _Autopilot("ArduPilot", ardupilotmega, ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
-        12: _Autopilot("PX4", common, PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
+        9: _Autopilot(
+            "Paparazzi", "v10.paparazzi", PAPARAZZI_SETS, PAPARAZZI, from_ground=False, keeps_whole_numbers=True
+        ),
+        3: _Autopilot("ArduPilot", "v20.ardupilotmega", ARDUPILOT_SETS, _own_names(ARDUPILOT_SETS), from_ground=True),
+        12: _Autopilot("PX4", "v20.common", PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
     }
 )
 """By the number in their heartbeat. Paparazzi flies to altitudes above its local origin, others above the ground."""
@@ -103,16 +109,17 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
     data = contents(stream)
     system, autopilot = _vehicle(data)
     conversation = _Conversation(autopilot, system)
-    decoder = autopilot.dialect.MAVLink(None)
-    extra = bytes([autopilot.dialect.MAVLink_local_position_ned_message.crc_extra])
+    dialect = autopilot.dialect
+    decoder = dialect.MAVLink(None)
+    extra = bytes([dialect.MAVLink_local_position_ned_message.crc_extra])
     for frame in _frames(data):
-        if frame.message == autopilot.dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
-            if frame.system == system and _is_whole(autopilot.dialect, data, frame, extra):
+        if frame.message == dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
+            if frame.system == system and _is_whole(dialect, data, frame, extra):
                 conversation.position(_payload(data, frame, _POSITION.size), frame.stamp_s(data))
         elif frame.message in conversation.heard:
             try:
                 message: _Message = decoder.decode(bytearray(data[frame.start : frame.end]))
-            except autopilot.dialect.MAVError:
+            except dialect.MAVError:
                 continue
             conversation.heard[frame.message](message)
     return conversation.log()
@@ -220,7 +227,8 @@ class _Conversation:
             "COMMAND_ACK": self._answer,
             "SCRIPT_ITEM": self._block,
         }
-        numbers = {name: getattr(self.autopilot.dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
+        dialect = self.autopilot.dialect
+        numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
         self.heard = {number: by_name[name] for name, number in numbers.items() if number is not None}
 
     def position(self, payload: bytes, stamp_s: float) -> None:

@@ -8,17 +8,18 @@ import io
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import BinaryIO, Final
+from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pyulog import ULog
-from pyulog.exceptions import ULogException
 
 from app.core.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
 from app.logs.gains import PX4_SETS, names_in
 from app.logs.takeoffs import FlightLog, Moment, Setting
+
+if TYPE_CHECKING:
+    from pyulog import ULog
 
 _MAGIC: Final = b"ULog\x01\x12\x35"
 _HEADER_BYTES: Final = 16
@@ -53,6 +54,9 @@ def is_ulog(head: bytes) -> bool:
 
 def read_ulog(stream: BinaryIO) -> FlightLog:
     """Read a whole log. Raises TrajectoryError when there is no altitude in it."""
+    from pyulog import ULog
+    from pyulog.exceptions import ULogException
+
     data = contents(stream)
     if not is_ulog(data[:_HEADER_BYTES]) or len(data) < _HEADER_BYTES:
         raise refused("is no ULog", _HINT)
@@ -172,7 +176,7 @@ def _is_gain(body: bytes) -> bool:
     return kind == "float" and name in names_in(PX4_SETS) and len(body) == 1 + body[0] + 4
 
 
-def _settings(log: ULog) -> Iterator[Setting]:
+def _settings(log: "ULog") -> Iterator[Setting]:
     for name, value in log.initial_parameters.items():
         if np.isfinite(value):
             yield Setting(-np.inf, name, float(value))
@@ -226,7 +230,7 @@ def _moments(topics: Mapping[str, Topic]) -> tuple[list[Moment], list[Moment], l
     return starts, ends, landings
 
 
-def _notes(sieve: _Sieve, log: ULog) -> Iterator[str]:
+def _notes(sieve: _Sieve, log: "ULog") -> Iterator[str]:
     if sieve.damages:
         yield f"{sieve.damages} damaged stretches passed over"
     if log.dropouts:

@@ -8,15 +8,17 @@ from dataclasses import dataclass
 from datetime import datetime, tzinfo
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from app.campaigns.schemas import Campaign
 from app.figures.base import Card, Cell, Column
 from app.reports import wording
 from app.reports.content import Photo, Report
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 _BUNDLE: Final = "report/plotly-cartesian.min.js"
@@ -74,7 +76,7 @@ def chart_library(ui_dir: Path) -> str:
     shipped = ui_dir / _BUNDLE
     if shipped.is_file():
         return shipped.read_text(encoding="utf-8")
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415  # five megabytes, wanted only without a dashboard
+    from plotly.offline import get_plotlyjs  # five megabytes, wanted only without a dashboard
 
     source: str = get_plotlyjs()
     return source
@@ -115,7 +117,9 @@ def _policy(*scripts: Markup) -> str:
     )
 
 
-def _environment(zone: tzinfo | None) -> Environment:
+def _environment(zone: tzinfo | None) -> "Environment":
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )

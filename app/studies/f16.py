@@ -12,7 +12,6 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize
 
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule, flight_seed
 from app.core.experiments.pitch_tracking import PitchTracking
@@ -272,6 +271,8 @@ class _NearError(Exception):
 
 def _searched(case: _Case) -> tuple[float, ...]:
     """Nelder–Mead on the truth from the same start, every evaluation a flight."""
+    from scipy.optimize import minimize
+
     space, first = PitchTracking.space, start(case.perturbation, case.seed).gains
     errors: list[float] = []
 

@@ -6,7 +6,6 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from scipy.stats import qmc
 
 from app.core.control.fixed_point import fix
 from app.core.control.vertical_loop import ALT, POSITION_BITS
@@ -199,6 +198,8 @@ def _model_of(vehicle: SampledVehicle) -> Vector:
 
 def _model_optimum(model: Vector) -> Vector:
     """The model's best gains: Nelder–Mead from two known valleys and the best six of 128 Sobol points."""
+    from scipy.stats import qmc
+
     space = _TAKEOFF.space
 
     def errors(gains: Matrix) -> Vector:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.special import ndtri
 
 from app.core.calibration import Calibration
 from app.core.definition import Flight
@@ -28,7 +27,6 @@ _MISFIT: Final = 0.02
 """Share of the error that even the best simple model is off."""
 _WEATHER: Final = 0.5
 """Share by which the next flight's gusts cost more or less than the last one's did."""
-_REACH: Final = float(ndtri(0.5 + CONFIDENCE / 2.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +43,8 @@ class Foretold:
 
 def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
     """A flight of `gains`, shape (n,); `base` is the best of the calibrated flights."""
+    from scipy.special import ndtri
+
     experiment = calibration.experiment
     bias = remaining_bias(calibration, base, gains)
     models = calibration.plausible(runs=_MODELS, next_flight=True)
@@ -56,13 +56,14 @@ def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
     sd = float(np.sqrt(np.var(errors) + weather**2 + (_MISFIT * error) ** 2))
     curve = outputs.mean(axis=0)
     noise = float(np.sqrt(np.mean(bias**2)))
-    half = _REACH * np.sqrt(outputs.var(axis=0) + noise**2)
+    reach = float(ndtri(0.5 + CONFIDENCE / 2.0))
+    half = reach * np.sqrt(outputs.var(axis=0) + noise**2)
     lower, upper = band_channels(experiment.output)
     channels = {experiment.output: curve, lower: curve - half, upper: curve + half}
     return Foretold(
         trajectory=Trajectory(experiment.grid_s, channels, "model", "simulation"),
         error=error,
-        interval=Interval(lower=max(error - _REACH * sd, 0.0), upper=error + _REACH * sd, confidence=CONFIDENCE),
+        interval=Interval(lower=max(error - reach * sd, 0.0), upper=error + reach * sd, confidence=CONFIDENCE),
         models=models,
         errors=errors,
     )

@@ -10,7 +10,6 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-from scipy.stats import qmc
 
 from app.core.descent import descend
 from app.core.experiments.base import Matrix
@@ -49,6 +48,8 @@ def merit(takeoff: Takeoff, gains: Matrix, models: Matrix, until_s: float = _FIN
 
 def best_in(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
     """The best gains found in the box, shape (n,); `known` (c, n) are tried among the first points."""
+    from scipy.stats import qmc
+
     spread = box.low + qmc.Halton(len(box.low), scramble=False).random(_POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))
     first = merit(takeoff, points, models[::2], _COARSE_S)

@@ -6,8 +6,6 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-from scipy.special import erf
-from scipy.stats import qmc
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Matrix, ModelledExperiment, fitted_parameters
@@ -85,6 +83,8 @@ def _fit_of(definition: Definition) -> Fit:
 def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vector, base: Vector) -> Optimum:
     """Nelder–Mead on the identified model from the best of 256 spread over the bounds and from the flown gains, started
     again from its end until that gains nothing."""
+    from scipy.stats import qmc
+
     reach = PolicySpace(
         tuple(
             replace(gain, lower=float(lower), upper=float(upper))
@@ -121,6 +121,8 @@ def _expected_errors(aircraft: PitchTracking, found: Identified, gains: Matrix) 
 
 def _folded(outputs: Matrix, noise: float) -> Matrix:
     """The mean of |output + normal noise|, whose standard deviation is above zero."""
+    from scipy.special import erf
+
     apart = outputs / (noise * np.sqrt(2.0))
     return np.asarray(noise * np.sqrt(2.0 / np.pi) * np.exp(-(apart**2)) + outputs * erf(apart))
 

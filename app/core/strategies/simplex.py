@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment, SimplexSearch
@@ -15,6 +14,9 @@ from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
 from app.core.strategies.bias import nominal
 from app.core.strategies.history import best_flight, describe, was_flown
 from app.core.wording import short
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 _UNLIMITED: Final = 1_000_000
 
@@ -40,6 +42,8 @@ class Optimum:
 def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vector) -> Optimum:
     """Nelder–Mead within the bounds, with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's own),
     first steps and budget the experiment's own; gains are rounded before each run of the model, and run once."""
+    from scipy.optimize import minimize
+
     model, search = nominal(experiment), experiment.search
 
     @cache
@@ -51,7 +55,7 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
 
     course: list[float] = []
 
-    def follow(intermediate_result: OptimizeResult) -> None:
+    def follow(intermediate_result: "OptimizeResult") -> None:
         course.append(float(intermediate_result.fun))
 
     simplex = np.vstack((start, start + np.diag(_first_steps(search, space, start))))

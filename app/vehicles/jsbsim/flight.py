@@ -6,9 +6,8 @@ three numbers out (altitude, sink rate, tilt) and one in (thrust).
 
 import math
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-import jsbsim
 import numpy as np
 
 from app.core.control.vertical_loop import RATE_HZ, STEP_S
@@ -16,6 +15,9 @@ from app.vehicles.disturbances import gusts, streams
 from app.vehicles.errors import VehicleError
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, Integers, Rows, control
 from app.vehicles.simulated import MOST_STEPS
+
+if TYPE_CHECKING:
+    import jsbsim
 
 MASS_KG: Final = 0.4
 FULL_THRUST_N: Final = 4 * 0.35 * 4.4482216
@@ -38,12 +40,14 @@ _GUST_CORRELATION_S: Final = 1.0
 _FULL_BATTERY_V: Final = 11.1
 
 
-def new_aircraft() -> jsbsim.FGFDMExec:
+def new_aircraft() -> "jsbsim.FGFDMExec":
     """The AR.Drone 2 of the aircraft file, standing on its springs at 52° north, sea level, at 512 Hz; no wind.
 
     Raises VehicleError when JSBSim cannot load it. JSBSim is silenced by its own switch, not by a logger of ours: it
     keeps a logger for each thread and lets go of it after Python has left the thread, which ends the process.
     """
+    import jsbsim
+
     jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # JSBSim's own gap in its types
     fdm = jsbsim.FGFDMExec(str(_ROOT))
     fdm.set_aircraft_path("aircraft")
@@ -123,7 +127,7 @@ class JsbsimFlight:
         north_ft, east_ft = (self._fdm[f"position/from-start-neu-{axis}-ft"] for axis in "ne")
         return north_ft * _FOOT_M, east_ft * _FOOT_M
 
-    def _property(self, path: str) -> jsbsim.FGPropertyNode:
+    def _property(self, path: str) -> "jsbsim.FGPropertyNode":
         """A handle that skips the search for the name at every access."""
         node = self._fdm.get_property_manager().get_node(path)
         if node is None:

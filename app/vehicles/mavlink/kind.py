@@ -1,17 +1,17 @@
 """The kind `mavlink`: vehicles under Paparazzi, ArduCopter or PX4 at the other end of a link."""
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
 from app.vehicles.base import ConnectedVehicle, Identity, Vehicle, VehicleOption
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap import addresses as sources
-from app.vehicles.mocap.opening import open_source
+
+if TYPE_CHECKING:
+    from app.vehicles.mavlink.vehicle import MavlinkVehicle
 
 SCORED: Final = ("vehicle", "mocap")
 
@@ -35,8 +35,15 @@ def _connect(options: Options, safe_gains: Gains, identity: Identity | None) -> 
     return _vehicle(options, safe_gains, identity, observes=True)
 
 
-def _vehicle(options: Options, safe_gains: Gains, identity: Identity | None, *, observes: bool) -> MavlinkVehicle:
-    """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows."""
+def _vehicle(options: Options, safe_gains: Gains, identity: Identity | None, *, observes: bool) -> "MavlinkVehicle":
+    """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows.
+
+    What speaks to a vehicle is imported here, by the process that opens one: those that only know its settings do not.
+    """
+    from app.vehicles.mavlink.clock import ScaledClock  # noqa: PLC0415
+    from app.vehicles.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415
+    from app.vehicles.mocap.opening import open_source  # noqa: PLC0415
+
     clock = ScaledClock(float(options["clock_speed"]))
     place = str(options["second_source"])
     source = open_source(place, clock) if place else None
