@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from app.core.policy import Vector
+from app.core.quasi_random import halton
 
 if TYPE_CHECKING:  # experiments tell their hazards over a spread
     from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
@@ -25,9 +26,7 @@ class Spread:
 
     def samples(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
         """The mean, then `count` − 1 quasi-random models, shape (count, m); the same every time."""
-        from scipy.stats import qmc
-
-        unit = qmc.Halton(len(self.mean), scramble=False).random(count)[1:]
+        unit = halton(len(self.mean), count)[1:]
         return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
 
     def draws(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":

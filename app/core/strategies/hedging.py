@@ -15,6 +15,7 @@ from app.core.descent import descend
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Vector
+from app.core.quasi_random import halton
 
 HIGHEST_M: Final = 3.6
 LOWEST_M: Final = 2.4
@@ -48,9 +49,7 @@ def merit(takeoff: Takeoff, gains: Matrix, models: Matrix, until_s: float = _FIN
 
 def best_in(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
     """The best gains found in the box, shape (n,); `known` (c, n) are tried among the first points."""
-    from scipy.stats import qmc
-
-    spread = box.low + qmc.Halton(len(box.low), scramble=False).random(_POINTS + 1)[1:] * (box.high - box.low)
+    spread = box.low + halton(len(box.low), _POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))
     first = merit(takeoff, points, models[::2], _COARSE_S)
     starts = points[np.argsort(first, kind="stable")[: len(_EVALUATIONS)]]

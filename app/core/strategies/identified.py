@@ -14,6 +14,7 @@ from app.core.identification import Fit, Identified, identify
 from app.core.options import Option
 from app.core.plants.pitch import STEP_S
 from app.core.policy import PolicySpace, Vector
+from app.core.quasi_random import halton
 from app.core.spread import Spread
 from app.core.strategies.base import ErrorsOf, Explanation, Interval, Proposal, Strategy, band_channels
 from app.core.strategies.bias import nominal
@@ -83,15 +84,13 @@ def _fit_of(definition: Definition) -> Fit:
 def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vector, base: Vector) -> Optimum:
     """Nelder–Mead on the identified model from the best of 256 spread over the bounds and from the flown gains, started
     again from its end until that gains nothing."""
-    from scipy.stats import qmc
-
     reach = PolicySpace(
         tuple(
             replace(gain, lower=float(lower), upper=float(upper))
             for gain, lower, upper in zip(space.gains, low, high, strict=True)
         )
     )
-    spread = low + (high - low) * qmc.Halton(len(low), scramble=False).random(_STARTS)
+    spread = low + (high - low) * halton(len(low), _STARTS)
     starts = np.vstack((base, reach.nearest(space.default), spread))
     errors = nominal(aircraft).errors(starts)
     likely = starts[np.argsort(errors, kind="stable")[:_SEARCHES]]
