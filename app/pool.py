@@ -1,23 +1,19 @@
 """The processes that compute: pure functions go in, results come out, and a process that dies is replaced."""
 
-import os
 import queue
-import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
-from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from traceback import format_exc
 from types import TracebackType
-from typing import Final, Generic, ParamSpec, Self, TypeVar
+from typing import Final, ParamSpec, Self, TypeVar
 
 import structlog
 
+from app.computing import Done, Refused, compute, nothing
 from app.core.errors import GainlineError
 
 P = ParamSpec("P")
@@ -40,10 +36,18 @@ class Pool:
     `concurrent.futures.ProcessPoolExecutor` waits for in vain (docs/decisions/0014).
     """
 
-    def __init__(self, processes: int, *, prepare: Callable[[], object], niceness: int = 0) -> None:
-        """`prepare()` runs in every new process before its first task, to load and compile what tasks need; `niceness`,
-        from 0 to 19, is how far they give way to other processes of the machine."""
-        self._computers = [_Computer(prepare, niceness) for _ in range(processes)]
+    def __init__(
+        self,
+        processes: int,
+        *,
+        prepare: Callable[[], object],
+        afterwards: Callable[[], object] = nothing,
+        niceness: int = 0,
+    ) -> None:
+        """`prepare()` runs in every new process before its first task, to load and compile what the first tasks need;
+        `afterwards()` once it has had nothing to do for a while, for what others need; `niceness`, from 0 to 19, is how
+        far they give way to other processes of the machine."""
+        self._computers = [_Computer(prepare, afterwards, niceness) for _ in range(processes)]
         self._free: queue.LifoQueue[_Computer] = queue.LifoQueue()
         for computer in self._computers:
             self._free.put(computer)
@@ -78,18 +82,6 @@ class Pool:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class _Done(Generic[T]):
-    result: T
-
-
-@dataclass(frozen=True, slots=True)
-class _Refused:
-    """By the task; the error's note says where."""
-
-    error: Exception
-
-
 class _DiedError(Exception):
     """The process is gone without a result."""
 
@@ -98,8 +90,9 @@ class _Computer:
     """A process, started when it is needed, and the pipe to it. It performs for one thread at a time; any may close
     it."""
 
-    def __init__(self, prepare: Callable[[], object], niceness: int) -> None:
+    def __init__(self, prepare: Callable[[], object], afterwards: Callable[[], object], niceness: int) -> None:
         self._prepare = prepare
+        self._afterwards = afterwards
         self._niceness = niceness
         self._lock = threading.Lock()
         self._closed = False
@@ -110,11 +103,11 @@ class _Computer:
         pipe = self._pipe()
         try:
             pipe.send(task)
-            outcome: _Done[T] | _Refused = pipe.recv()
+            outcome: Done[T] | Refused = pipe.recv()
         except (EOFError, OSError) as error:
             self._bury()
             raise _DiedError from error
-        if isinstance(outcome, _Refused):
+        if isinstance(outcome, Refused):
             raise outcome.error
         return outcome.result
 
@@ -135,7 +128,10 @@ class _Computer:
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(
-            target=_compute, args=(theirs, self._prepare, self._niceness), name="computing", daemon=True
+            target=compute,
+            args=(theirs, self._prepare, self._afterwards, self._niceness),
+            name="computing",
+            daemon=True,
         )
         process.start()
         theirs.close()
@@ -153,28 +149,3 @@ class _Computer:
             process, _ = self._running
             process.kill()
             process.join()
-
-
-def _compute(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
-    """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(niceness)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    prepare()
-    with suppress(EOFError, OSError):  # the parent is gone
-        while True:
-            pipe.send(_outcome(pipe.recv()))
-
-
-def _outcome(task: Callable[[], T]) -> _Done[T] | _Refused:
-    try:
-        return _Done(task())
-    except Exception as error:  # noqa: BLE001 - the edge of the process
-        error.add_note(format_exc())
-        return _Refused(error)
-
-
-def _end_with_parent() -> None:
-    if (parent := parent_process()) is not None:
-        parent.join()
-        os._exit(0)

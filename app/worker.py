@@ -22,9 +22,10 @@ from typing import Final
 import structlog
 
 from app import __version__
+from app.campaigns.computation import prepare, prepare_first
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
-from app.campaigns.tasks import Proposer, Surveyor, prepare
+from app.campaigns.tasks import Proposer, Surveyor
 from app.data_dir import prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
@@ -157,7 +158,7 @@ class Worker:
             stack.callback(sessions.close)
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
-            pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
+            pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare_first, afterwards=prepare))
             surveying = stack.enter_context(Pool(LANDSCAPES_AT_ONCE, prepare=prepare, niceness=LANDSCAPE_NICENESS))
             desks = self._desks(database, pool, surveying)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Final
 
 from app.campaigns import service as campaigns
+from app.campaigns.computation import prepare
 from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.schemas import Definition, NewCampaign, StopRule
-from app.campaigns.tasks import Proposer, prepare
+from app.campaigns.tasks import Proposer
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice

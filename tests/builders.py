@@ -7,7 +7,7 @@ import httpx2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.campaigns import proposing
+from app.campaigns import computation, proposing
 from app.core.trajectory import Trajectory
 from app.db.session import Database
 from app.jobs import service as jobs
@@ -125,7 +125,7 @@ def run_jobs(database: Database) -> int:
         assert campaign_id is not None
         with database.read() as session:
             past = proposing.read_history(session, campaign_id)
-        computed = proposing.compute(past)
+        computed = computation.compute(past)
         with database.write() as session:
             if jobs.finish_job(session, job_id, worker=WORKER):
                 proposing.store_proposal(session, campaign_id, computed)

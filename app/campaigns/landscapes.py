@@ -11,9 +11,10 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
+from app.campaigns.computation import History
 from app.campaigns.definitions import definition_of
 from app.campaigns.drawing import history_of
-from app.campaigns.proposing import History, is_stale, read_history
+from app.campaigns.proposing import is_stale, read_history
 from app.core.experiments import experiment_of
 from app.core.landscape import Landscape, Plan, free_gains, space_of
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow

@@ -1,31 +1,28 @@
 """The next gain set: computed as a job from the stored history, stored with that history's digest, judged.
 
-For a worker: `read_history`, then `compute` (pure, in any process), then `store_proposal`.
+For a worker: `read_history`, then `computation.compute` (pure, in any process), then `store_proposal`.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Final
 
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
+from app.campaigns.computation import Computed, History
 from app.campaigns.definitions import definition_of
 from app.campaigns.rehearsals import tell_rehearsed
 from app.campaigns.states import MOVES, CampaignState, Outcome
-from app.core.advice import Advice, advise
-from app.core.calibration import known
 from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.gate import Gate, check_policy
+from app.core.gate import Gate
 from app.core.policy import Gains, PolicySpace
-from app.core.proposing import next_proposal
 from app.core.spread import Spread, before_flight
-from app.core.stopping import Reason, StopVerdict, judge
-from app.core.strategies.base import Proposal
+from app.core.stopping import Reason, StopVerdict
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.errors import ConflictError, NotFoundError
 from app.jobs import service as jobs
@@ -44,34 +41,6 @@ _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "battery low": Outcome.BUDGET,
 }
 _UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no longer say so:"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class History:
-    """All that a proposal is computed from. `digest` changes as soon as any of it does. `donor` is the flight that a
-    warm start comes from; the definition holds the checksum of its record. `battery_v` is the voltage, V, at which the
-    last flight ended, one that does not count included."""
-
-    campaign_id: int
-    definition: Definition
-    flights: tuple[Flight, ...]
-    digest: str
-    donor: Flight | None = None
-    battery_v: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Computed:
-    """A proposal with the gate's word on it, over the `spread` of what is known of the vehicle, the stop rule's, and
-    what is recommended."""
-
-    history_digest: str
-    proposal: Proposal
-    gate: Gate
-    spread: Spread
-    flights: tuple[int, ...]
-    stop_verdict: StopVerdict
-    advice: Advice
 
 
 def read_history(session: Session, campaign_id: int) -> History:
@@ -100,33 +69,6 @@ def _donor(session: Session, definition: Definition) -> Flight | None:
             hint="Choose another start, or name the campaign as the donor again.",
         )
     return found
-
-
-def compute(past: History) -> Computed:
-    """Pure: the same history gives the same answer. Takes up to a second; call it outside of any transaction."""
-    definition, flights = past.definition, past.flights
-    experiment = experiment_of(definition)
-    proposal = next_proposal(definition, flights, past.donor)
-    stop_verdict = judge(definition, flights, proposal, battery_v=past.battery_v)
-    spread = known(experiment, flights) if proposal.spread is None else proposal.spread
-    gate = check_policy(
-        definition,
-        experiment,
-        space_of(definition),
-        proposal.gains,
-        flights,
-        start=proposal.gains if proposal.kind == "start" else None,
-        spread=spread,
-    )
-    return Computed(
-        history_digest=past.digest,
-        proposal=proposal,
-        gate=gate,
-        spread=spread,
-        flights=tuple(flight.number for flight in flights if flight.outcome == "valid"),
-        stop_verdict=stop_verdict,
-        advice=advise(definition, experiment, flights, proposal, stop_verdict),
-    )
 
 
 def store_proposal(session: Session, campaign_id: int, computed: Computed) -> ProposalRow:

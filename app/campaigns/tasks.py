@@ -6,9 +6,7 @@ from typing import Final
 import numpy as np
 import structlog
 
-from app.campaigns import landscapes, proposing
-from app.core.definition import Definition, Flight
-from app.core.experiments.takeoff import Takeoff
+from app.campaigns import computation, landscapes, proposing
 from app.core.landscape import foreseen, plan_survey
 from app.db.session import Database
 from app.errors import GainlineError
@@ -38,7 +36,7 @@ class Proposer:
         started_s = monotonic()
         with self._database.read() as session:
             past = proposing.read_history(session, job.campaign_id)
-        computed = self._pool.run(proposing.compute, past)
+        computed = self._pool.run(computation.compute, past)
         with self._database.write() as session:
             if jobs.finish_job(session, job.id, worker=self._worker):
                 proposing.store_proposal(session, job.campaign_id, computed)
@@ -71,18 +69,3 @@ class Surveyor:
         with self._database.write() as session:
             jobs.finish_job(session, job.id, worker=self._worker, result=result)
         _log.info("landscape stored", points=len(points), seconds=round(monotonic() - started_s, 3))
-
-
-def prepare() -> None:
-    """Load and compile what a proposal needs, so that the first one is as quick as the others."""
-    definition, experiment = Definition(), Takeoff()
-    default = experiment.space.default
-    flown = experiment.simulate(default, experiment.nominal_model)
-    flight = Flight(
-        number=1,
-        gains=experiment.space.mapping(default),
-        trajectory=flown,
-        error=experiment.error(flown),
-        outcome="valid",
-    )
-    proposing.compute(proposing.History(campaign_id=0, definition=definition, flights=(flight,), digest=""))

@@ -1,12 +1,14 @@
 """What the worker and the web process say to each other: one JSON object a line, told apart by `type`."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Final, Literal
-
-from pydantic import Field, TypeAdapter, ValidationError
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from app.core.errors import InputError
 from app.vehicles.base import Condition
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 MAX_LINE_BYTES: Final = 256 * 1024
 
@@ -117,18 +119,26 @@ FromWorker = Shown | WorkerHello | Answer
 ToWorker = Abort | VehicleOrder
 Message = FromWorker | ToWorker
 
-_ADAPTER: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+
+@cache
+def _adapter() -> "TypeAdapter[Message]":
+    """Made when something is first written or read: the processes that fly make messages and neither."""
+    from pydantic import Field, TypeAdapter  # noqa: PLC0415
+
+    return TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
 def encode(message: Message) -> bytes:
     """One line, its end included."""
-    return _ADAPTER.dump_json(message) + b"\n"
+    return _adapter().dump_json(message) + b"\n"
 
 
 def decode(line: bytes) -> Message:
     """Raises InputError when the line is none of the messages above."""
+    from pydantic import ValidationError  # noqa: PLC0415
+
     try:
-        return _ADAPTER.validate_json(line)
+        return _adapter().validate_json(line)
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(

@@ -33,6 +33,7 @@ from app.trials.crew import (
 from app.trials.flying import Monitor
 from app.vehicles.base import FlightRecord, ShouldStop, Stop, Vehicle
 from app.vehicles.errors import SafeGainsError
+from app.vehicles.jsbsim.kind import prepare
 from app.vehicles.open import open_vehicle
 
 CONTROL_WITHIN_S: Final = 10.0
@@ -122,10 +123,14 @@ class Hangar:
 
 
 def _work(pipe: Connection) -> None:
-    """The process: one flight after the other, until the worker closes the pipe or dies."""
+    """The process: one flight after the other, until the worker closes the pipe or dies. Until the first is there, it
+    loads what the usual vehicle needs."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     try:
+        if not pipe.poll():
+            with suppress(GainlineError, ImportError):  # a flight that needs it says so
+                prepare()
         while True:
             if isinstance(orders := pipe.recv(), Orders):
                 _fly(pipe, orders)

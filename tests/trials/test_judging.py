@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.campaigns import proposing
+from app.campaigns import computation, proposing
 from app.core.experiments import get_experiment
 from app.core.glitches import find_glitches
 from app.core.spread import before_flight
@@ -123,7 +123,7 @@ def test_own_gains_are_judged_over_what_the_flights_have_shown(client: TestClien
     with database.write() as session:
         row = session.get_one(CampaignRow, campaign["id"])
         spread = proposing.stored_spread(session, row, experiment)
-        assert spread == proposing.compute(proposing.read_history(session, campaign["id"])).spread
+        assert spread == computation.compute(proposing.read_history(session, campaign["id"])).spread
         assert spread.origin != before_flight(experiment).origin
         for proposal in session.query(ProposalRow):
             proposal.spread = None  # as those of the release before

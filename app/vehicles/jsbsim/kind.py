@@ -2,11 +2,14 @@
 
 from typing import Final
 
+import numpy as np
+
 from app.core.errors import Problem
 from app.core.policy import Gains
 from app.core.wording import percent
 from app.vehicles.base import Vehicle, VehicleOption
 from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, MASS_KG, JsbsimFlight
+from app.vehicles.kernels import COMMAND_SIZE
 from app.vehicles.kinds import Hosts, Options, VehicleKind
 from app.vehicles.simulated import SimulatedVehicle
 
@@ -16,6 +19,12 @@ _HIGHEST_HOVER: Final = 0.95
 def _open(options: Options, safe_gains: Gains) -> Vehicle:
     numbers = {name: float(value) for name, value in options.items()}
     return SimulatedVehicle("jsbsim", safe_gains, options, lambda order: JsbsimFlight(numbers, order.seed))
+
+
+def prepare() -> None:
+    """Load JSBSim, its aircraft and the compiled autopilot, which the first flight would otherwise wait for."""
+    options = {option.name: float(option.default) for option in JSBSIM.options}
+    JsbsimFlight(options, seed=0).advance(1, np.zeros(COMMAND_SIZE, dtype=np.int64))
 
 
 def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:

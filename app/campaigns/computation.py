@@ -1,0 +1,90 @@
+"""What a proposal is computed from, and how: pure, without the database, for processes that only compute."""
+
+from dataclasses import dataclass
+
+from app.core.advice import Advice, advise
+from app.core.calibration import known
+from app.core.definition import Definition, Flight
+from app.core.experiments import experiment_of
+from app.core.experiments.takeoff import Takeoff
+from app.core.gate import Gate, check_policy
+from app.core.landscape import space_of
+from app.core.proposing import next_proposal
+from app.core.spread import Spread
+from app.core.stopping import StopVerdict, judge
+from app.core.strategies.base import Proposal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """All that a proposal is computed from. `digest` changes as soon as any of it does. `donor` is the flight that a
+    warm start comes from; the definition holds the checksum of its record. `battery_v` is the voltage, V, at which the
+    last flight ended, one that does not count included."""
+
+    campaign_id: int
+    definition: Definition
+    flights: tuple[Flight, ...]
+    digest: str
+    donor: Flight | None = None
+    battery_v: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computed:
+    """A proposal with the gate's word on it, over the `spread` of what is known of the vehicle, the stop rule's, and
+    what is recommended."""
+
+    history_digest: str
+    proposal: Proposal
+    gate: Gate
+    spread: Spread
+    flights: tuple[int, ...]
+    stop_verdict: StopVerdict
+    advice: Advice
+
+
+def compute(past: History) -> Computed:
+    """Pure: the same history gives the same answer. Takes up to a second; call it outside of any transaction."""
+    definition, flights = past.definition, past.flights
+    experiment = experiment_of(definition)
+    proposal = next_proposal(definition, flights, past.donor)
+    stop_verdict = judge(definition, flights, proposal, battery_v=past.battery_v)
+    spread = known(experiment, flights) if proposal.spread is None else proposal.spread
+    gate = check_policy(
+        definition,
+        experiment,
+        space_of(definition),
+        proposal.gains,
+        flights,
+        start=proposal.gains if proposal.kind == "start" else None,
+        spread=spread,
+    )
+    return Computed(
+        history_digest=past.digest,
+        proposal=proposal,
+        gate=gate,
+        spread=spread,
+        flights=tuple(flight.number for flight in flights if flight.outcome == "valid"),
+        stop_verdict=stop_verdict,
+        advice=advise(definition, experiment, flights, proposal, stop_verdict),
+    )
+
+
+def prepare_first() -> None:
+    """Load and compile what the first proposal of a takeoff campaign needs."""
+    compute(History(campaign_id=0, definition=Definition(), flights=(), digest=""))
+
+
+def prepare() -> None:
+    """Load and compile what a proposal needs, so that the first one is as quick as the others."""
+    definition, experiment = Definition(), Takeoff()
+    default = experiment.space.default
+    flown = experiment.simulate(default, experiment.nominal_model)
+    flight = Flight(
+        number=1,
+        gains=experiment.space.mapping(default),
+        trajectory=flown,
+        error=experiment.error(flown),
+        outcome="valid",
+    )
+    compute(History(campaign_id=0, definition=definition, flights=(flight,), digest=""))

@@ -1,0 +1,61 @@
+"""What runs in a process of the pool. It imports next to nothing, so that such a process is soon there."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import parent_process
+from multiprocessing.connection import Connection
+from traceback import format_exc
+from typing import Final, Generic, TypeVar
+
+T = TypeVar("T")
+
+IDLE_S: Final = 2.0
+"""Without a task for so long, a new process loads what later ones need."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done(Generic[T]):
+    result: T
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """By the task; the error's note says where."""
+
+    error: Exception
+
+
+def nothing() -> None:
+    """Nothing to prepare."""
+
+
+def compute(pipe: Connection, prepare: Callable[[], object], afterwards: Callable[[], object], niceness: int) -> None:
+    """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(niceness)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    prepare()
+    with suppress(EOFError, OSError):  # the parent is gone
+        while pipe.poll(IDLE_S):
+            pipe.send(_outcome(pipe.recv()))
+        afterwards()
+        while True:
+            pipe.send(_outcome(pipe.recv()))
+
+
+def _outcome(task: Callable[[], T]) -> Done[T] | Refused:
+    try:
+        return Done(task())
+    except Exception as error:  # noqa: BLE001 - the edge of the process
+        error.add_note(format_exc())
+        return Refused(error)
+
+
+def _end_with_parent() -> None:
+    if (parent := parent_process()) is not None:
+        parent.join()
+        os._exit(0)
