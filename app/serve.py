@@ -1,4 +1,7 @@
-"""`gainline serve`: the web process, with a worker beside it."""
+"""`gainline serve`: the web process, with a worker beside it.
+
+The worker is started before the web application is imported, so that both are there at the same time.
+"""
 
 import errno
 import gc
@@ -10,28 +13,18 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Final
 
-import structlog
-import uvicorn
-
 from app.data_dir import prepare_data_dir
-from app.db.migrate import migrate
+from app.db.revision import is_current
 from app.errors import AddressError, AlreadyRunningError, Problem
 from app.locks import LockedError, exclusive
-from app.main import create_app
-from app.network import addresses_elsewhere, exposure, web_address
+from app.network import exposure, web_address
 from app.observability import configure_logs
-from app.qr import qr_text
 from app.settings import Settings
 from app.supervisor import Supervisor
-from app.worker import run_supervised_worker
+from app.worker_process import run_worker_process
 
-STREAMS_END_WITHIN_S: Final = 3
 SWITCH_EVERY_S: Final = 0.001
 """How long a thread that draws may keep the one that answers waiting for the interpreter."""
-COLLECT_EVERY: Final = 50_000
-"""New objects between two searches for garbage in cycles: a large answer is made of several such portions."""
-
-_log = structlog.get_logger(__name__)
 
 
 def say(line: str) -> None:
@@ -58,12 +51,30 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         listener = stack.enter_context(listen(settings.host, settings.port))
         sign(web_address(settings.host, listener.getsockname()[1]))
         configure_logs(settings.data_dir, "web", settings.log_level)
-        migrate(settings.database_file)
+        if not is_current(settings.database_file):
+            _migrate(settings)
         if with_worker:
-            stack.enter_context(Supervisor(run_supervised_worker, settings, name="worker"))
+            stack.enter_context(Supervisor(run_worker_process, settings, name="worker"))
         if (exposed := exposure(settings.host)) is not None:
             announce(exposed)
-        _run(settings, listener, announce)
+        _answer(settings, listener, announce)
+
+
+def _migrate(settings: Settings) -> None:
+    from app.db.migrate import migrate  # noqa: PLC0415
+
+    migrate(settings.database_file)
+
+
+def _answer(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
+    """Import the application while the worker imports its own half, then serve."""
+    gc.disable()  # nothing that is imported is ever garbage; the server enables it when it is ready
+    try:
+        from app.web_server import run  # noqa: PLC0415
+
+        run(settings, listener, announce)
+    finally:
+        gc.enable()
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -73,62 +84,6 @@ def listen(host: str, port: int) -> socket.socket:
         return socket.create_server(where[:2], family=family, backlog=2048)
     except OSError as error:
         raise _no_address(host, port, error) from error
-
-
-class _Server(uvicorn.Server):
-    """Uvicorn, which says when it is ready, and ends the open event streams before it waits for them."""
-
-    def __init__(self, config: uvicorn.Config, *, ready: Callable[[], None], closing: Callable[[], None]) -> None:
-        super().__init__(config)
-        self._ready = ready
-        self._closing = closing
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        await super().startup(sockets)
-        self._ready()
-
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        self._closing()
-        await super().shutdown(sockets)
-
-
-def _run(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
-    application = create_app(settings)
-    address = web_address(settings.host, listener.getsockname()[1])
-
-    def ready() -> None:
-        _spare_what_stays()
-        _log.info("ready", address=address)
-        announce(f"Gainline is ready at {address}")
-        _announce_elsewhere(settings.host, listener.getsockname()[1], announce)
-
-    def closing() -> None:
-        application.state.live.close()
-
-    config = uvicorn.Config(
-        application,
-        log_config=None,
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
-    )
-    _Server(config, ready=ready, closing=closing).run(sockets=[listener])
-
-
-def _spare_what_stays() -> None:
-    """The loaded program is never garbage: the collector need not go through all of it while an answer is made."""
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(COLLECT_EVERY)
-
-
-def _announce_elsewhere(host: str, port: int, announce: Callable[[str], None]) -> None:
-    """Say where a tablet finds the dashboard, to a person with a code to point its camera at."""
-    addresses = addresses_elsewhere(host, port)
-    for address in addresses:
-        announce(f"On a tablet: {address.url}" + (f" ({address.interface})" if address.interface else ""))
-    if addresses and sys.stdout.isatty():
-        announce(qr_text(addresses[0].url))
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:

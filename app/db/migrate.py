@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Final
 from sqlalchemy import inspect, text
 
 from app.data_dir import prepare_data_dir
+from app.db.revision import REVISION
 from app.db.session import open_engine, translated
 from app.errors import SchemaError
 
 if TYPE_CHECKING:
     from alembic.config import Config
-
-REVISION: Final = "0004"
-"""The newest of the migrations, which this program works with."""
 
 _APP: Final = Path(__file__).resolve().parent.parent
 _COMMAND: Final = "gainline serve"

@@ -16,7 +16,8 @@ from fastapi.testclient import TestClient
 from app import network
 from app.data_dir import folder_bytes
 from app.db.backup import SPARE_BYTES
-from app.db.migrate import REVISION, migrate
+from app.db.migrate import migrate
+from app.db.revision import REVISION
 from app.db.session import Database
 from app.main import create_app
 from app.settings import Settings

@@ -12,8 +12,9 @@ from alembic.script import ScriptDirectory
 from fastapi.testclient import TestClient
 from sqlalchemy import CheckConstraint
 
-from app.db.migrate import REVISION, migrate, require_current, revision_of
+from app.db.migrate import migrate, require_current, revision_of
 from app.db.models import Base
+from app.db.revision import REVISION, is_current
 from app.db.session import open_engine
 from app.errors import SchemaError, StorageError
 from app.main import create_app
@@ -43,7 +44,9 @@ def test_every_check_of_the_models_is_in_the_database(migrated_file: Path) -> No
 
 def test_migrating_again_changes_nothing(tmp_path: Path) -> None:
     file = tmp_path / "new" / "gainline.sqlite3"
+    assert not is_current(file)
     migrate(file)
+    assert is_current(file)
     before = file.read_bytes()
     migrate(file)
     assert file.read_bytes() == before
@@ -93,6 +96,7 @@ def test_a_database_of_a_newer_program_is_refused_and_left_alone(settings: Setti
     for check in (require_current, migrate):
         with pytest.raises(SchemaError, match="newer Gainline"):
             check(settings.database_file)
+    assert not is_current(settings.database_file)
     assert revision_of(settings.database_file) == "9999"
 
 
