@@ -1,0 +1,152 @@
+"""How soon the program is there: imports in processor time, the dashboard and the first flight by the clock.
+
+    ./dev exec python -m bench.startup [--rounds 3]
+
+Processor time is that of a fresh interpreter, user and system, the least of several. By the clock: `./dev up` on a data
+folder that it has served before, from the command to the answer of `GET /`, and to the first telemetry above the ground
+of a campaign that is created as soon as the page is there, with its proposal computed and its flight asked for at
+once. The least of the rounds counts, because a machine that does other things as well tells nothing about start-up.
+Prints the figures beside their limits; exits 1 when one is exceeded.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import httpx2
+
+T = TypeVar("T")
+
+ROOT: Final = Path(__file__).parents[1]
+LOOPBACK: Final = "127.0.0.1"
+IMPORT_S: Final = 0.8
+HELP_S: Final = 0.25
+PAGE_S: Final = 2.0
+FLIGHT_S: Final = 4.0
+INTERPRETERS: Final = 7
+PATIENCE_S: Final = 60.0
+LOOK_EVERY_S: Final = 0.01
+OFF_THE_GROUND_M: Final = 0.02
+
+
+def processor_s(command: Sequence[str]) -> float:
+    """Least processor time of several runs of a command, s; the byte code is kept, as it is everywhere else."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    taken = []
+    for _ in range(INTERPRETERS):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        taken.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+    return min(taken)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def up(folder: Path) -> Iterator[str]:
+    """`./dev up`, from the command to the end of the block; the address that it is going to serve."""
+    port = free_port()
+    with (folder / "said").open("w") as said:
+        process = subprocess.Popen(
+            [ROOT / "dev", "up", "--port", str(port), "--data-dir", folder / "data"], stdout=said, stderr=said
+        )
+        try:
+            yield f"http://{LOOPBACK}:{port}"
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(PATIENCE_S)
+
+
+def until(what: str, look: Callable[[], T | None]) -> T:
+    """What `look` gives once it gives something."""
+    deadline_s = time.monotonic() + PATIENCE_S
+    while (found := look()) is None:
+        assert time.monotonic() < deadline_s, f"waited in vain for {what}"
+        time.sleep(LOOK_EVERY_S)
+    return found
+
+
+def page(url: str) -> bytes | None:
+    with contextlib.suppress(httpx2.ConnectError):
+        answer = httpx2.get(url, timeout=PATIENCE_S)
+        assert answer.is_success, "is the UI built? ./dev ui"
+        return answer.content
+    return None
+
+
+def post(api: httpx2.Client, path: str, body: object) -> Any:
+    answer = api.post(path, json=body)
+    assert answer.is_success, answer.text
+    return answer.json()
+
+
+def lift_off(url: str) -> None:
+    """Create a campaign, wait for its proposal, have it flown, and return once the vehicle is above the ground."""
+    with httpx2.Client(base_url=f"{url}/api", timeout=PATIENCE_S) as api:
+        campaign = post(api, "/campaigns", {"name": "First", "vehicle": {"kind": "jsbsim"}, "definition": {}})["id"]
+        with api.stream("GET", "/events") as events:
+            until("the worker", lambda: api.get("/health").json()["worker"] == "running" or None)
+            until("the proposal", lambda: api.get(f"/campaigns/{campaign}").json()["state"] == "ready" or None)
+            proposal = api.get(f"/campaigns/{campaign}/proposal").json()["proposal"]["id"]
+            post(api, f"/campaigns/{campaign}/trials", {"proposal_id": proposal, "fly": {"speed": 10.0}})
+            for line in events.iter_lines():
+                if not line.startswith("data:") or "samples" not in (message := json.loads(line[5:])):
+                    continue
+                if any(sample[1] > OFF_THE_GROUND_M for sample in message["samples"]):
+                    return
+    raise AssertionError("The stream of events ended before the flight began.")
+
+
+def start(folder: Path) -> tuple[float, float]:
+    """From the command to the page and to the first flight, s."""
+    begun_s = time.monotonic()
+    with up(folder) as url:
+        until("the page", lambda: page(url))
+        page_s = time.monotonic() - begun_s
+        lift_off(url)
+        return page_s, time.monotonic() - begun_s
+
+
+def judge(what: str, seconds: float, limit_s: float) -> bool:
+    """Print a figure; whether it is above its limit."""
+    print(f"{what}: {seconds:.2f} s (limit {limit_s:g} s)")
+    return seconds > limit_s
+
+
+def main() -> int:
+    arguments = argparse.ArgumentParser(prog="bench.startup")
+    arguments.add_argument("--rounds", type=int, default=3, help="starts by the clock")
+    rounds = arguments.parse_args().rounds
+    gainline = str(Path(sys.executable).with_name("gainline"))
+    exceeded = judge(
+        "import app.main, processor time", processor_s([sys.executable, "-c", "import app.main"]), IMPORT_S
+    )
+    exceeded |= judge("gainline --help, processor time", processor_s([gainline, "--help"]), HELP_S)
+    with tempfile.TemporaryDirectory() as folder:
+        start(Path(folder))
+        starts = [start(Path(folder)) for _ in range(rounds)]
+    exceeded |= judge("./dev up to the page", min(page_s for page_s, _ in starts), PAGE_S)
+    exceeded |= judge("./dev up to the first flight", min(flight_s for _, flight_s in starts), FLIGHT_S)
+    print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
+    return int(exceeded)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
