@@ -5,6 +5,7 @@ that it starts from), and one part for each record, photo and telemetry log. A r
 (`app.trials.codec`), with its own checksum.
 """
 
+from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, model_validator
@@ -41,10 +42,13 @@ Options = Annotated[dict[Word, OptionValue], Field(max_length=100)]
 
 def _fits(kind: Any) -> AfterValidator:
     """The same object, once it has been seen to be one of this kind: stored numbers must not change their type."""
-    adapter: TypeAdapter[Any] = TypeAdapter(kind)
+
+    @cache
+    def adapter() -> TypeAdapter[Any]:
+        return TypeAdapter(kind)
 
     def check(given: JsonObject) -> JsonObject:
-        adapter.validate_python(given)
+        adapter().validate_python(given)
         return given
 
     return AfterValidator(check)

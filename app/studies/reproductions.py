@@ -1,17 +1,15 @@
-"""The reproductions there are: what each shows in the paper, and how it is run here."""
+"""The reproductions there are: what each shows in the paper, and how it is run here.
+
+The programs that run them are imported by whoever runs one: who only lists them needs none.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
 from app.core.errors import InputError, Problem
-from app.studies.controller import run_controller
 from app.studies.results import Progress, Result
-from app.studies.tables import run_table
-from app.studies.tracking import run_f16
-from app.studies.variability import run_variability
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,13 +30,34 @@ class Reproduction:
     long_form: str = ""
 
 
-def _brief(run: Callable[[Progress], Result]) -> Callable[[Progress, bool], Result]:
-    """For one whose long form is the only one."""
+def _f16(on_progress: Progress, full: bool) -> Result:
+    from app.studies.tracking import run_f16  # noqa: PLC0415
 
-    def either(on_progress: Progress, _full: bool) -> Result:
-        return run(on_progress)
+    return run_f16(on_progress, full)
 
-    return either
+
+def _table1(on_progress: Progress, _full: bool) -> Result:
+    from app.studies.tables import run_table  # noqa: PLC0415
+
+    return run_table("table1", "figure7", on_progress)
+
+
+def _table2(on_progress: Progress, _full: bool) -> Result:
+    from app.studies.tables import run_table  # noqa: PLC0415
+
+    return run_table("table2", "figure11", on_progress)
+
+
+def _controller(on_progress: Progress, _full: bool) -> Result:
+    from app.studies.controller import run_controller  # noqa: PLC0415
+
+    return run_controller(on_progress)
+
+
+def _variability(on_progress: Progress, _full: bool) -> Result:
+    from app.studies.variability import run_variability  # noqa: PLC0415
+
+    return run_variability(on_progress)
 
 
 _ALL: Final = (
@@ -56,7 +75,7 @@ _ALL: Final = (
             "figure3-right": "Fig. 3, right",
             "figure4": "Fig. 4",
         },
-        run=run_f16,
+        run=_f16,
         long_form="Methods compared over 50 models instead of 10, the model identified again also at ±20 and ±80 % and "
         "from noisy logs: ten times as long.",
     ),
@@ -67,7 +86,7 @@ _ALL: Final = (
         paper="Five simulated takeoffs from the default gains take the error from 0.3775 m to 0.1521 m; four from the "
         "simplex's gains, from 0.1006 m to 0.0940 m.",
         figures={"figure7-left": "Fig. 7, left", "figure7-right": "Fig. 7, right"},
-        run=_brief(partial(run_table, "table1", "figure7")),
+        run=_table1,
     ),
     Reproduction(
         name="table2",
@@ -77,7 +96,7 @@ _ALL: Final = (
         paper="Five real takeoffs from the default gains take the error from 0.5102 m to 0.2265 m; three from the "
         "simplex's gains stay at 0.12 m, within the scatter.",
         figures={"figure11-left": "Fig. 11, left", "figure11-right": "Fig. 11, right"},
-        run=_brief(partial(run_table, "table2", "figure11")),
+        run=_table2,
     ),
     Reproduction(
         name="controller",
@@ -85,7 +104,7 @@ _ALL: Final = (
         line="A takeoff recorded from the autopilot's own code, replayed step by step through the replica.",
         paper="The copy of the vertical loop gives the autopilot's outputs up to small disagreements.",
         figures={"figure6-reference": "Fig. 6, above", "figure6-commands": "Fig. 6, below"},
-        run=_brief(run_controller),
+        run=_controller,
     ),
     Reproduction(
         name="variability",
@@ -95,7 +114,7 @@ _ALL: Final = (
         paper="The error scatters by 0.0141 m at the default gains and by 0.0066 m at the tuned ones; the battery does "
         "not show.",
         figures={"figure12": "Fig. 12"},
-        run=_brief(run_variability),
+        run=_variability,
     ),
 )
 

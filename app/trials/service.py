@@ -22,7 +22,6 @@ from app.db.types import utc_now
 from app.errors import ConflictError, NotFoundError
 from app.fleet import service as fleet
 from app.fleet.control import NOBODY, Asker
-from app.logs.readers import read_takeoff
 from app.logs.takeoffs import Takeoff
 from app.moves import check_action, check_move, check_version
 from app.schemas import Page
@@ -133,6 +132,8 @@ def read_record(
 ) -> Takeoff:
     """A takeoff from a log of any kind. Raises TrajectoryError in words, naming the takeoffs to choose from where there
     are several."""
+    from app.logs.readers import read_takeoff  # noqa: PLC0415 - every reader there is
+
     return read_takeoff(stream, name=name, number=takeoff, companion=companion)
 
 
