@@ -4,7 +4,6 @@ The worker is started before the web application is imported, so that both are t
 """
 
 import errno
-import gc
 import signal
 import socket
 import sys
@@ -68,13 +67,9 @@ def _migrate(settings: Settings) -> None:
 
 def _answer(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
     """Import the application while the worker imports its own half, then serve."""
-    gc.disable()  # nothing that is imported is ever garbage; the server enables it when it is ready
-    try:
-        from app.web_server import run  # noqa: PLC0415
+    from app.web_server import run  # noqa: PLC0415
 
-        run(settings, listener, announce)
-    finally:
-        gc.enable()
+    run(settings, listener, announce)
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -1,8 +1,10 @@
 """The web server of `gainline serve`: Uvicorn with the application."""
 
 import gc
+import importlib
 import socket
 import sys
+import threading
 from collections.abc import Callable
 from typing import Final
 
@@ -15,8 +17,9 @@ from app.qr import qr_text
 from app.settings import Settings
 
 STREAMS_END_WITHIN_S: Final = 3
-COLLECT_EVERY: Final = 50_000
-"""New objects between two searches for garbage in cycles: a large answer is made of several such portions."""
+NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
+NUMERICS_AFTER_S: Final = 5.0
+"""How long after it is ready the server loads what charts and judgements need, if nobody has asked for any by then."""
 
 _log = structlog.get_logger(__name__)
 
@@ -45,6 +48,9 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
 
     def ready() -> None:
         _spare_what_stays()
+        loading = threading.Timer(NUMERICS_AFTER_S, _load_numerics)
+        loading.daemon = True
+        loading.start()
         _log.info("ready", address=address)
         announce(f"Gainline is ready at {address}")
         _announce_elsewhere(settings.host, listener.getsockname()[1], announce)
@@ -62,12 +68,16 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
     _Server(config, ready=ready, closing=closing).run(sockets=[listener])
 
 
+def _load_numerics() -> None:
+    """So that the first page with charts does not wait for it."""
+    for module in NUMERICS:
+        importlib.import_module(module)
+
+
 def _spare_what_stays() -> None:
     """The loaded program is never garbage: the collector need not go through all of it while an answer is made."""
     gc.collect()
     gc.freeze()
-    gc.enable()
-    gc.set_threshold(COLLECT_EVERY)
 
 
 def _announce_elsewhere(host: str, port: int, announce: Callable[[str], None]) -> None:

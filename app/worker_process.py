@@ -1,6 +1,5 @@
 """The worker as a process beside the web process, which names it without importing what it is made of."""
 
-import gc
 import signal
 
 from app.settings import Settings
@@ -9,9 +8,6 @@ from app.settings import Settings
 def run_worker_process(settings: Settings) -> None:
     """Import the worker, and work until the parent asks it to end or is gone. Ctrl-C is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    gc.disable()  # nothing that is imported is ever garbage
     from app.worker import run_supervised_worker  # noqa: PLC0415
 
-    gc.freeze()
-    gc.enable()
     run_supervised_worker(settings)

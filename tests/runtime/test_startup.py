@@ -1,0 +1,73 @@
+"""What processes import before anybody asks them for anything, each in a fresh interpreter."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")
+DATABASE = ("pydantic", "sqlalchemy")
+
+SERVE = """
+import sys
+from pathlib import Path
+from fastapi.testclient import TestClient
+from app.main import create_app
+from app.settings import Settings
+data_dir, ui_dir = map(Path, sys.argv[1:])
+with TestClient(create_app(Settings(data_dir=data_dir, ui_dir=ui_dir)), base_url="http://127.0.0.1") as client:
+    for path in ("/", "/api/health", "/api/campaigns", "/api/catalogue", "/api/vehicles"):
+        answer = client.get(path)
+        assert answer.status_code == 200, (path, answer.text)
+"""
+
+HELP = """
+import sys
+from app.__main__ import main
+sys.argv = ["gainline", "--help"]
+try:
+    main()
+except SystemExit as done:
+    assert not done.code
+"""
+
+
+def imported(program: str, *arguments: Path) -> set[str]:
+    """The packages that a program has imported at its end."""
+    tell = "\nprint('\\n'.join({name.partition('.')[0] for name in sys.modules}))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys\n{program}{tell}", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.split())
+
+
+def test_the_first_pages_are_served_without_a_numeric_library(migrated_file: Path, tmp_path: Path) -> None:
+    ui_dir = tmp_path / "ui"
+    ui_dir.mkdir()
+    (ui_dir / "index.html").write_text("<!doctype html><title>Gainline</title>")
+    data_dir = tmp_path / "data"
+    data_dir.mkdir()
+    (data_dir / "gainline.sqlite3").write_bytes(migrated_file.read_bytes())
+    assert not imported(SERVE, data_dir, ui_dir).intersection((*NUMERICS, "alembic"))
+
+
+def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
+    assert not imported(HELP).intersection((*NUMERICS, *DATABASE, "fastapi", "numpy", "structlog"))
+
+
+@pytest.mark.parametrize("module", ["app.campaigns.computation", "app.computing", "app.trials.cockpit"])
+def test_processes_that_compute_and_fly_do_not_import_the_database(module: str) -> None:
+    assert not imported(f"import {module}").intersection((*NUMERICS, *DATABASE))
+
+
+def test_the_worker_starts_without_what_only_its_processes_need() -> None:
+    assert not imported("import app.worker").intersection((*NUMERICS, "alembic", "fastapi"))
+
+
+def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
+    assert not imported("import app.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
