@@ -1,5 +1,6 @@
 """The web application, put together."""
 
+import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Final
@@ -31,6 +32,9 @@ from app.settings import Settings
 from app.studies.router import router as reproductions
 from app.trials.router import records
 from app.trials.router import router as trials
+
+# All that is loaded by now stays: no search for garbage goes through it, the one as the process ends included.
+gc.freeze()
 
 COMPRESSION: Final = 5
 """Of nine, for answers that are compressed anew for each request."""
