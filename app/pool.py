@@ -5,7 +5,6 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from functools import partial
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from types import TracebackType
@@ -15,6 +14,7 @@ import structlog
 
 from app.computing import Done, Refused, compute, nothing
 from app.core.errors import GainlineError
+from app.processes import process_context
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -125,7 +125,7 @@ class _Computer:
             return self._running[1]
 
     def _start(self) -> tuple[BaseProcess, Connection]:
-        context = get_context("spawn")
+        context = process_context()
         ours, theirs = context.Pipe()
         process = context.Process(
             target=compute,

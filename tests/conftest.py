@@ -1,12 +1,14 @@
 """Fixtures of the storage and REST tests: a real database, migrated once and copied, and the real application on it."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
+from sqlalchemy import event
 
 from app.db.migrate import migrate
 from app.db.session import Database
@@ -22,18 +24,28 @@ def migrated_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.fixture(scope="session")
+def shared_application(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
+    """One for all tests of a process: its routes and its statements are compiled once."""
+    folder = tmp_path_factory.mktemp("shared")
+    return create_app(Settings(data_dir=folder / "data", ui_dir=folder / "ui", port=0))
+
+
 @pytest.fixture
-def settings(tmp_path: Path, migrated_file: Path) -> Settings:
+def settings(shared_application: FastAPI, migrated_file: Path) -> Iterator[Settings]:
     """Settings on a fresh data folder with an empty database, and no built dashboard."""
-    chosen = Settings(data_dir=tmp_path / "data", ui_dir=tmp_path / "ui", port=0)
+    chosen: Settings = shared_application.state.settings
     chosen.data_dir.mkdir()
     shutil.copyfile(migrated_file, chosen.database_file)
-    return chosen
+    yield chosen
+    shared_application.state.database.close()
+    shutil.rmtree(chosen.data_dir)
 
 
 @pytest.fixture
-def application(settings: Settings) -> FastAPI:
-    return create_app(settings)
+def application(shared_application: FastAPI, settings: Settings) -> FastAPI:
+    """The application on these settings, to be used as it is: a test that changes it creates one of its own."""
+    return shared_application
 
 
 @pytest.fixture
@@ -41,6 +53,21 @@ def database(application: FastAPI) -> Database:
     """The application's own database."""
     opened: Database = application.state.database
     return opened
+
+
+Listen = Callable[[object, str, Callable[..., object]], None]
+
+
+@pytest.fixture
+def listen() -> Iterator[Listen]:
+    """`sqlalchemy.event.listen` for one test: the database's engine is shared by all of a process."""
+    with ExitStack() as stack:
+
+        def add(target: object, name: str, function: Callable[..., object]) -> None:
+            event.listen(target, name, function)
+            stack.callback(event.remove, target, name, function)
+
+        yield add
 
 
 @pytest.fixture

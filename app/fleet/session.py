@@ -12,13 +12,13 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
 
 from app.fleet.states import ActKind
 from app.live.messages import FlightPhase, Order, Telemetry, VehicleStatus
+from app.processes import process_context
 from app.trials.crew import Decline, Free, Landed, Orders, Restored, Said, Staged, StandDown, TakeOff, Trouble, died
 from app.vehicles.base import CheckItem, Identity, OptionValue
 from app.vehicles.errors import SafeGainsError, VehicleError
@@ -102,7 +102,7 @@ class Session:
     def __init__(self, call: Call, seat: Callable[[Connection, Call], None], *, hear: Hear) -> None:
         self.call: Final = call
         self._hear_of = hear
-        context = get_context("spawn")
+        context = process_context()
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
         self._said: queue.SimpleQueue[FromSeat | None] = queue.SimpleQueue()

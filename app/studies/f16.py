@@ -6,7 +6,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from multiprocessing import get_context
 from statistics import median
 from types import MappingProxyType
 from typing import Final
@@ -18,6 +17,7 @@ from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.proposing import next_proposal
 from app.core.strategies.simplex import Optimum, model_optimum
 from app.core.trajectory import Trajectory
+from app.processes import process_context
 from app.vehicles.lti import whole_flight
 
 BEST_ERROR: Final = 0.204716
@@ -214,7 +214,7 @@ def _computed(cases: Sequence[_Case], processes: int) -> Iterator[tuple[_Case, C
     if processes < 2:
         yield from ((case, _campaign(case)) for case in cases)
         return
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(processes, mp_context=process_context()) as pool:
         waiting = {pool.submit(_campaign, case): case for case in cases}
         yield from ((waiting[done], done.result()) for done in as_completed(waiting))
 

@@ -9,13 +9,13 @@ import signal
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from traceback import format_exc
 from types import TracebackType
 from typing import Final, Self
 
 from app.core.errors import GainlineError, Problem
+from app.processes import process_context
 from app.studies.reproductions import get_reproduction
 from app.studies.results import Result
 
@@ -59,7 +59,7 @@ class StudyProcess:
     """One reproduction between enter and exit; on exit the process is ended, wherever it is."""
 
     def __init__(self, name: str, *, full: bool) -> None:
-        context = get_context("spawn")
+        context = process_context()
         self._pipe, self._theirs = context.Pipe()
         self._process = context.Process(
             target=_work, args=(self._theirs, name, full), name=f"reproduction {name}", daemon=True

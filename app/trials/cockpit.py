@@ -10,12 +10,12 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import suppress
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Final
 
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
+from app.processes import process_context
 from app.trials.crew import (
     Decline,
     Free,
@@ -45,7 +45,7 @@ class Cockpit:
     """The worker's handle of one such process. `stand_down` may be called from any thread and from signal handlers."""
 
     def __init__(self) -> None:
-        context = get_context("spawn")
+        context = process_context()
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
         self._process = context.Process(target=_work, args=(theirs,), name="cockpit", daemon=True)

@@ -2,18 +2,21 @@
 
 import base64
 import errno
+import sqlite3
 
 import pytest
-from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from httpx2 import Response
-from sqlalchemy import event, text
+from sqlalchemy import text
 
 from app import errors
 from app.core.errors import GainlineError
 from app.db.session import Database
 from app.fleet.states import VehicleState
+from app.main import create_app
+from app.settings import Settings
 from tests.builders import create_campaign, create_ready_campaign, get, problems_of
+from tests.conftest import Listen
 
 CAMPAIGN = "/api/campaigns"
 
@@ -197,16 +200,16 @@ def test_another_campaigns_proposal_is_not_found(client: TestClient, database: D
     assert client.post(f"{CAMPAIGN}/{second}/trials", json={"proposal_id": theirs}).status_code == 404
 
 
-def test_a_full_disk_is_503_and_loses_nothing(client: TestClient, database: Database) -> None:
+def test_a_full_disk_is_503_and_loses_nothing(client: TestClient, database: Database, listen: Listen) -> None:
     campaign = create_campaign(client)
     with database.engine.connect() as connection:
         pages = connection.execute(text("PRAGMA page_count")).scalar()
     database.engine.dispose()
 
-    @event.listens_for(database.engine, "connect")
-    def fill_up(connection: object, _entry: object) -> None:
-        connection.execute(f"PRAGMA max_page_count = {pages}")  # type: ignore[attr-defined]
+    def fill_up(connection: sqlite3.Connection, _entry: object) -> None:
+        connection.execute(f"PRAGMA max_page_count = {pages}")
 
+    listen(database.engine, "connect", fill_up)
     answers = [client.post(CAMPAIGN, json={"name": "x" * 120}) for _ in range(60)]
     refused = [answer for answer in answers if answer.status_code != 201]
     assert refused
@@ -217,7 +220,9 @@ def test_a_full_disk_is_503_and_loses_nothing(client: TestClient, database: Data
     assert kept[-1]["id"] == campaign["id"]
 
 
-def test_a_full_disk_outside_of_the_database_is_503_too(application: FastAPI) -> None:
+def test_a_full_disk_outside_of_the_database_is_503_too(settings: Settings) -> None:
+    application = create_app(settings)
+
     @application.get("/api/full")
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -227,7 +232,9 @@ def test_a_full_disk_outside_of_the_database_is_503_too(application: FastAPI) ->
     assert (answer.status_code, is_problem(answer)) == (503, True)
 
 
-def test_a_mistake_of_ours_is_500_with_a_number(application: FastAPI) -> None:
+def test_a_mistake_of_ours_is_500_with_a_number(settings: Settings) -> None:
+    application = create_app(settings)
+
     @application.get("/api/mistake")
     def mistake() -> None:
         raise ZeroDivisionError

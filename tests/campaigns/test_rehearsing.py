@@ -2,7 +2,6 @@
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import event
 
 from app.campaigns.definitions import definition_of
 from app.campaigns.rehearsals import Rehearsed, judge, rehearsal_of
@@ -22,6 +21,7 @@ from tests.builders import (
     lift_off,
     run_jobs,
 )
+from tests.conftest import Listen
 from tests.fleet.vehicles import create_campaign_on, create_connected, put_rehearsal, register
 
 VALID, ABORTED, INVALID, LOST = TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST
@@ -191,13 +191,13 @@ def test_a_rehearsal_that_is_given_to_a_real_vehicle_has_the_safe_gains_of_that_
 
 
 def test_the_gates_word_on_a_rehearsal_is_read_at_once_however_many_flights_it_has(
-    client: TestClient, database: Database, campaign: Json
+    client: TestClient, database: Database, campaign: Json, listen: Listen
 ) -> None:
     put_rehearsal(client, database, campaign)
     with database.read() as session:
         row = get_row(session, campaign["id"])
         rehearsal_of(session, row)
         asked: list[str] = []
-        event.listen(database.engine, "before_cursor_execute", lambda *said: asked.append(said[2]))
+        listen(database.engine, "before_cursor_execute", lambda *said: asked.append(said[2]))
         assert rehearsal_of(session, row).state == "passed"
     assert len([statement for statement in asked if "FROM trial" in statement]) == 1

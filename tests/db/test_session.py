@@ -1,11 +1,12 @@
 """Transactions on a real SQLite file: writers in turn, nothing half done, trouble said in words."""
 
+import sqlite3
 import threading
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import event, text
+from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from app.db.models import CampaignRow, EventRow, FlightRow, JobRow, TrajectoryRow, VehicleRow
@@ -16,6 +17,7 @@ from app.jobs.states import JobState
 from app.trials.history import store_trajectory
 from app.trials.states import FlightState
 from tests.builders import create_campaign, create_climb, create_ready_campaign, create_trial
+from tests.conftest import Listen
 
 THREADS = 8
 WRITES = 25
@@ -77,32 +79,33 @@ def test_a_reader_keeps_its_view_while_others_write(database: Database) -> None:
         assert session.query(JobRow).count() == 0
 
 
-def fill_up(database: Database) -> None:
+def fill_up(database: Database, listen: Listen) -> None:
     """From now on the file may not grow: SQLite then fails as it does on a full disk."""
     with database.engine.connect() as connection:
         pages = connection.execute(text("PRAGMA page_count")).scalar()
     database.engine.dispose()
 
-    @event.listens_for(database.engine, "connect")
-    def limit(connection: object, _entry: object) -> None:
-        connection.execute(f"PRAGMA max_page_count = {pages}")  # type: ignore[attr-defined]
+    def limit(connection: sqlite3.Connection, _entry: object) -> None:
+        connection.execute(f"PRAGMA max_page_count = {pages}")
+
+    listen(database.engine, "connect", limit)
 
 
-def test_a_full_disk_is_said_in_words_and_loses_nothing(database: Database) -> None:
+def test_a_full_disk_is_said_in_words_and_loses_nothing(database: Database, listen: Listen) -> None:
     with database.write() as session:
         session.add(JobRow(kind="before", state=JobState.QUEUED))
-    fill_up(database)
+    fill_up(database, listen)
     with pytest.raises(StorageError, match=r"is full; nothing.*Free some space"), database.write() as session:
         session.add(JobRow(kind="too much", state=JobState.QUEUED, worker="x" * 100_000))
     with database.read() as session:
         assert [row.kind for row in session.query(JobRow)] == ["before"]
 
 
-def test_a_locked_database_is_said_in_words(database: Database) -> None:
-    @event.listens_for(database.engine, "connect")
-    def hurry(connection: object, _entry: object) -> None:
-        connection.execute("PRAGMA busy_timeout = 20")  # type: ignore[attr-defined]
+def test_a_locked_database_is_said_in_words(database: Database, listen: Listen) -> None:
+    def hurry(connection: sqlite3.Connection, _entry: object) -> None:
+        connection.execute("PRAGMA busy_timeout = 20")
 
+    listen(database.engine, "connect", hurry)
     database.engine.dispose()
     with database.write() as session:
         session.execute(text("SELECT 1"))

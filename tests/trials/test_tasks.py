@@ -8,7 +8,7 @@ from datetime import timedelta
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import event, text
+from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.db.models import FlightRow
@@ -20,6 +20,7 @@ from app.trials.flying import Airspace
 from app.trials.states import FlightState, TrialState
 from app.trials.tasks import FlightDeck
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
+from tests.conftest import Listen
 from tests.trials.states import make_vehicle_real
 
 Watch = Callable[[Shown], None]
@@ -70,8 +71,19 @@ def vehicle_state(client: TestClient) -> str:
     return state
 
 
-def when_changed_to(
-    database: Database, state: TrialState | FlightState, act: Callable[[], object], *, stored: bool = True
+WhenChanged = Callable[..., None]
+
+
+@pytest.fixture
+def when_changed_to(database: Database, listen: Listen) -> WhenChanged:
+    def arrange(state: TrialState | FlightState, act: Callable[[], object], *, stored: bool = True) -> None:
+        _arrange(database, listen, state, act, stored=stored)
+
+    return arrange
+
+
+def _arrange(
+    database: Database, listen: Listen, state: TrialState | FlightState, act: Callable[[], object], *, stored: bool
 ) -> None:
     """Something that happens once: as soon as others can see this state, or before it is `stored`."""
     still_to_happen = [act]
@@ -87,8 +99,8 @@ def when_changed_to(
         if changed and still_to_happen:
             still_to_happen.pop()()
 
-    event.listen(database._writers, "after_flush", look)
-    event.listen(database._writers, "after_commit", happen)
+    listen(database._writers, "after_flush", look)
+    listen(database._writers, "after_commit", happen)
 
 
 def refuse(database: Database, operation: str) -> None:
@@ -110,9 +122,9 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
 
 
 def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_ground(
-    client: TestClient, database: Database, field: Airfield, trial_id: int
+    client: TestClient, when_changed_to: WhenChanged, field: Airfield, trial_id: int
 ) -> None:
-    when_changed_to(database, TrialState.FLYING, lambda: field.airspace.abort(trial_id, "somebody walked in"))
+    when_changed_to(TrialState.FLYING, lambda: field.airspace.abort(trial_id, "somebody walked in"))
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["reason"]) == ("aborted", "somebody walked in")
@@ -121,13 +133,11 @@ def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_grou
 
 
 def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
-    client: TestClient, database: Database, field: Airfield, trial_id: int
+    client: TestClient, when_changed_to: WhenChanged, field: Airfield, trial_id: int
 ) -> None:
     seen: list[bool] = []
 
-    when_changed_to(
-        database, FlightState.RUNNING, lambda: seen.append(field.airspace.abort(trial_id, "changed my mind"))
-    )
+    when_changed_to(FlightState.RUNNING, lambda: seen.append(field.airspace.abort(trial_id, "changed my mind")))
     field.fly_next()
     assert seen == [True]
     ended = get(client, f"/api/trials/{trial_id}")
@@ -137,12 +147,12 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
 
 
 def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
-    client: TestClient, database: Database, field: Airfield, trial_id: int
+    client: TestClient, when_changed_to: WhenChanged, field: Airfield, trial_id: int
 ) -> None:
     def fail() -> None:
         raise RuntimeError("the power went")
 
-    when_changed_to(database, FlightState.RUNNING, fail, stored=False)
+    when_changed_to(FlightState.RUNNING, fail, stored=False)
     with pytest.raises(RuntimeError, match="the power went"):
         field.deck.claim()
     assert field.airspace.trials() == []
