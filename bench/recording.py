@@ -27,7 +27,7 @@ from typing import Final
 
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.clock import ScaledClock
+from app.core.clock import ScaledClock
 from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.moves import Plan

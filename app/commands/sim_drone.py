@@ -6,9 +6,9 @@ from contextlib import ExitStack, closing, contextmanager
 from types import FrameType
 
 from app.commands.console import console
+from app.core.clock import ScaledClock
 from app.errors import InputError, Problem
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress
 from app.vehicles.mocap.addresses import parse as parse_source

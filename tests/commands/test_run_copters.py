@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from app.campaigns.files import read_preset
 from app.cli import app
+from app.core.clock import ScaledClock
 from app.vehicles.mavlink.addresses import UdpAddress, parse
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES

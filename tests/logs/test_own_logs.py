@@ -9,7 +9,7 @@ import pytest
 from app.logs.readers import read_takeoff
 from app.vehicles.base import FlightOrder
 from tests.vehicles.flying import TAKEOFF, never, unwatched
-from tests.vehicles.mavlink.hangar import SAFE, Hangar
+from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 
 ONE_SAMPLE_M = 0.002
 """What 20 ms more or less under a set point of 3 m make of the error over 32.6 s: the sample that is in the log before
@@ -21,10 +21,10 @@ def test_the_log_of_a_flight_is_the_flight(autopilot: str, tmp_path: Path) -> No
     gains = dict(SAFE[autopilot])
     first = next(iter(gains))
     gains[first] *= 1.25 if autopilot != "paparazzi" else 2
-    with Hangar(autopilot) as hangar:
+    with LockstepRig(autopilot) as rig:
         if autopilot != "paparazzi":
-            hangar.switch_on_failsafes()
-        vehicle = hangar.vehicle(log_folder=str(tmp_path))
+            rig.switch_on_failsafes()
+        vehicle = rig.vehicle(log_folder=str(tmp_path))
         vehicle.stage(gains)
         record = vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_stop=never)
         vehicle.close()

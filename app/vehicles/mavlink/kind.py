@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Final
 
+from app.core.clock import ScaledClock
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
 from app.vehicles.base import ConnectedVehicle, Identity, Vehicle, VehicleOption

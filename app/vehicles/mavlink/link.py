@@ -1,7 +1,8 @@
 """One conversation with one vehicle.
 
-A thread of its own hears the vehicle. A command leaves from the thread that sends it, without waiting: handed to the
-other thread, it would stand in line with every thread of the program that computes (bench/link.py measures it).
+A thread of its own hears the vehicle, or whoever receives does, where the transport is given. A command leaves from the
+thread that sends it, without waiting: handed to the other thread, it would stand in line with every thread of the
+program that computes (bench/link.py measures it).
 """
 
 import threading
@@ -12,8 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
-from app.vehicles.mavlink.clock import Clock
 from app.vehicles.mavlink.dialects import (
     BAD_DATA,
     Codec,
@@ -27,7 +28,7 @@ from app.vehicles.mavlink.dialects import (
     source_system,
 )
 from app.vehicles.mavlink.tlog import TlogWriter
-from app.vehicles.mavlink.transports import LinkError, Peer, open_transport
+from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
 __all__ = ["Link", "LinkError", "LinkHealth", "LossCounter", "Received"]
 
@@ -37,6 +38,8 @@ UNATTENDED_AFTER_S: Final = 3.0
 answer to a lost ground station is not kept from acting."""
 INBOX: Final = 20_000
 """Messages kept for a program that does not ask for them; then the oldest are dropped, and counted."""
+STEP_S: Final = 1.0 / 256.0
+"""How far the clock is advanced between two looks at a transport that no thread reads."""
 OLDER: Final = 128
 """A sequence number so far ahead is one from the past: packets may overtake each other."""
 
@@ -97,7 +100,8 @@ class Link:
     """Sends to and hears one vehicle; safe to use from any thread.
 
     `target_system` is the vehicle's system id; None takes the first autopilot that is heard. With `tlog`, both
-    directions are appended to that file. With `signing_key`, everything is signed.
+    directions are appended to that file. With `signing_key`, everything is signed. With `transport`, that one is used
+    and no thread is started: `receive` reads it, letting the clock advance while nothing comes.
     """
 
     def __init__(
@@ -111,13 +115,14 @@ class Link:
         component: int = 190,
         tlog: Path | None = None,
         signing_key: bytes | None = None,
+        transport: Transport | None = None,
     ) -> None:
         """Raises LinkError when the address or the file cannot be opened, InputError for signing that cannot be."""
         self._address, self._dialect, self._clock = address, dialect, clock
         self._identity = (system, component, signing_key)
         self._codec = self._new_codec()
         self._heartbeat = dialect.message("HEARTBEAT", _GROUND_STATION)
-        self._transport = open_transport(address)
+        self._transport = transport or open_transport(address)
         try:
             self._tlog = TlogWriter(tlog) if tlog else None
         except LinkError:
@@ -132,12 +137,14 @@ class Link:
         self._next_heartbeat_s = self._attended_s = self._opened_s
         self._listeners = 0
         self._inbox: deque[Received] = deque()
-        self._news = threading.Condition()
+        self._news = threading.Condition(threading.RLock())
         self._sending = threading.Lock()
         self._is_closing = self._is_closed = False
         self._failure: Exception | None = None
-        self._thread = threading.Thread(target=self._run, name=f"link {address}", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
+        if transport is None:
+            self._thread = threading.Thread(target=self._run, name=f"link {address}", daemon=True)
+            self._thread.start()
 
     def __enter__(self) -> Self:
         return self
@@ -191,7 +198,7 @@ class Link:
         with self._news:
             self._listeners += 1
             try:
-                self._news.wait_for(lambda: self._inbox or self._is_closed, self._clock.wall_s(timeout_s))
+                self._wait_for_news(timeout_s)
             finally:
                 self._listeners -= 1
                 self._attended_s = self._clock.now_s()
@@ -215,7 +222,10 @@ class Link:
             self._is_closing = True
             if not self._is_closed:
                 self._transport.wake()
-        self._thread.join()
+        if self._thread is None:
+            self._end()
+        else:
+            self._thread.join()
         if self._tlog:
             self._tlog.close()
 
@@ -223,22 +233,40 @@ class Link:
         why = f"failed: {self._failure}" if self._failure else "is closed"
         return LinkError(f"The link {self._address} {why}.", hint="Connect to the vehicle again.")
 
-    # ---- in the link's own thread
+    def _wait_for_news(self, timeout_s: float) -> None:
+        if self._thread is not None:
+            self._news.wait_for(lambda: self._inbox or self._is_closed, self._clock.wall_s(timeout_s))
+            return
+        until_s = self._clock.now_s() + timeout_s
+        while not self._is_closed:
+            self._attend(0.0)
+            if self._inbox or self._clock.now_s() >= until_s:
+                return
+            self._clock.wait_s(STEP_S)
+
+    # ---- in the link's own thread, where it has one
 
     def _run(self) -> None:
         try:
             while not self._is_closing:
-                self._beat()
-                for data, peer in self._transport.read(self._patience_s()):
-                    self._take_in(data, peer)
+                self._attend(self._patience_s())
         except Exception as error:
             self._failure = error
             raise
         finally:
-            with self._sending, self._news:
-                self._is_closed = True
-                self._transport.close()
-                self._news.notify_all()
+            self._end()
+
+    def _attend(self, timeout_s: float) -> None:
+        """Send the heartbeat that is due, then hear what comes; `timeout_s` on the wall."""
+        self._beat()
+        for data, peer in self._transport.read(timeout_s):
+            self._take_in(data, peer)
+
+    def _end(self) -> None:
+        with self._sending, self._news:
+            self._is_closed = True
+            self._transport.close()
+            self._news.notify_all()
 
     def _patience_s(self) -> float:
         """How long to wait for news, s on the wall."""

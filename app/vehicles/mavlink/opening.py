@@ -5,14 +5,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, signing
-from app.vehicles.mavlink.clock import Clock, ScaledClock
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Aim
 from app.vehicles.mavlink.radio import PATIENCE_S, Radio
+from app.vehicles.mavlink.transports import Transport
 
 TAKEOFF_ALTITUDE_M: Final = 3.0
 HASTE: Final = 4.0
@@ -25,8 +26,15 @@ def patience_of(options: Options) -> float:
     return max(1.0, float(options["clock_speed"]) / HASTE)
 
 
-def open_radio(options: Options, clock: Clock | None, *, overhear: Callable[[Received], None] | None) -> Radio:
-    """`clock` is the vehicle's time, by default that of its options. Raises LinkError when its link or its log cannot
+def open_radio(
+    options: Options,
+    clock: Clock | None,
+    *,
+    overhear: Callable[[Received], None] | None,
+    transport: Transport | None = None,
+) -> Radio:
+    """`clock` is the vehicle's time, by default that of its options; `transport` is read by whoever listens, in place
+    of a thread that reads the address. Raises LinkError when its link or its log cannot
     be opened, InputError for a signing key that cannot be read or used."""
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
@@ -38,6 +46,7 @@ def open_radio(options: Options, clock: Clock | None, *, overhear: Callable[[Rec
         target_system=int(options["system_id"]) or None,
         tlog=_log_path(str(options["log_folder"])),
         signing_key=signing.read_key(Path(key_file)) if key_file else None,
+        transport=transport,
     )
     aim = Aim(
         system=0,

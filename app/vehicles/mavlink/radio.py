@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from app.vehicles.mavlink.clock import Clock
+from app.core.clock import Clock
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.measurements import (
     Battery,

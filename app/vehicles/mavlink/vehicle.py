@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from app.core.clock import Clock
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Condition, FlightOrder, FlightRecord, Identity, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import limits, parameters, preflight, records
-from app.vehicles.mavlink.clock import Clock
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.gains import GainStore
 from app.vehicles.mavlink.gauges import Gauges
@@ -21,6 +21,7 @@ from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.signals import Action, Keep
 from app.vehicles.mavlink.sources import Lookout, Source
 from app.vehicles.mavlink.states import IN_DOUBT, MOVES, State
+from app.vehicles.mavlink.transports import Transport
 from app.vehicles.mavlink.trial import Flight, Flown
 from app.vehicles.mocap.recording import Recorded, Scored, with_second
 
@@ -52,10 +53,12 @@ class MavlinkVehicle:
         identity: Identity | None = None,
         observes: bool = False,
         source: Source | None = None,
+        transport: Transport | None = None,
     ) -> None:
         """Connect, wait for the vehicle (the one of that `identity`, where it is given), and write the safe gains, once
         it is known to be disarmed. `clock` is the vehicle's time, by default that of its options; `source` is a second
-        source of altitude, which is closed with the vehicle.
+        source of altitude, which is closed with the vehicle; `transport` takes the place of the address, and of the
+        thread that reads it.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
         without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
@@ -70,7 +73,8 @@ class MavlinkVehicle:
         self._flight: Flight | None = None
         self._order: StandingOrder | None = None
         self._lookout = None if source is None else Lookout(source)
-        self._radio = open_radio(options, clock, overhear=None if source is None else source.hear)
+        overhear = None if source is None else source.hear
+        self._radio = open_radio(options, clock, overhear=overhear, transport=transport)
         self._gauges = Gauges(self._radio)
         try:
             self._gains = GainStore(self._radio, safe_gains)

@@ -10,8 +10,8 @@ from typing import Final, Protocol
 
 from natnet import NatNetClient, NatNetError, Version
 
+from app.core.clock import Clock
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.clock import Clock
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.sources import SourceSample
 from app.vehicles.mocap.addresses import NatNetAddress

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from app.core.clock import Clock
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.clock import Clock
 from app.vehicles.mavlink.dialects import COMMON, Message, is_known, number
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.sources import SourceSample

@@ -1,6 +1,6 @@
 """Opens the second source of altitude that a text names."""
 
-from app.vehicles.mavlink.clock import Clock
+from app.core.clock import Clock
 from app.vehicles.mavlink.sources import Source
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, StreamAddress, parse
 from app.vehicles.mocap.natnet import NatNetSource

@@ -3,7 +3,7 @@
 import threading
 from typing import Final
 
-from app.vehicles.mavlink.clock import Clock
+from app.core.clock import Clock
 from app.vehicles.mavlink.transports import Transport
 from app.vehicles.simdrone.body import TICK_S
 from app.vehicles.simdrone.drone import Drone

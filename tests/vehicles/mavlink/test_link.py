@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from app.core.clock import ScaledClock
 from app.core.errors import InputError
 from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.dialects import (
     ARDUPILOTMEGA,
     COMMON,

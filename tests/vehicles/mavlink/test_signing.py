@@ -2,9 +2,9 @@
 
 import pytest
 
+from app.core.clock import ScaledClock
 from app.core.errors import InputError
 from app.vehicles.mavlink import signing
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, BAD_DATA, PAPARAZZI, Codec, FieldValue, number
 from app.vehicles.mavlink.link import Link
 from tests.vehicles.mavlink.speaking import Speaker, becomes, collect, position

@@ -1,4 +1,4 @@
-"""Whole trials over real UDP against the simulated drone, which was built by another reading of the same facts."""
+"""Whole trials against the simulated drone, which was built by another reading of the same facts."""
 
 from pathlib import Path
 
@@ -9,16 +9,13 @@ from app.core.errors import InputError
 from app.core.experiments.takeoff import Takeoff
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Stop
 from app.vehicles.errors import SafeGainsError, VehicleError
-from app.vehicles.mavlink.addresses import parse
-from app.vehicles.mavlink.dialects import PAPARAZZI, number, text
+from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.kind import MAVLINK
-from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.open import open_vehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
-from tests.vehicles.mavlink.hangar import SAFE as OWN_SAFE
-from tests.vehicles.mavlink.hangar import Hangar
-from tests.vehicles.mavlink.speaking import becomes
+from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
+from tests.vehicles.mavlink.rigs import LockstepRig
 
 ORDER = FlightOrder(seed=1)
 TAKEOFF = Takeoff()
@@ -34,8 +31,8 @@ def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
         twin.stage(TUNED)
         alone = TAKEOFF.error(twin.fly(ORDER, on_sample=unwatched, should_stop=never).trajectory)
     watcher = Watcher()
-    with Hangar() as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
         assert vehicle.read_gains() == SAFE
         assert vehicle.stage(TUNED) == TUNED
         record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=never)
@@ -68,18 +65,18 @@ FAULTS = [
 def test_whatever_befalls_a_flight_it_ends_on_the_ground_with_the_safe_gains(
     fault: str, ending: str, reason: str
 ) -> None:
-    with Hangar(faults=[fault]) as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig(faults=[fault]) as rig:
+        vehicle = rig.vehicle()
         record = fly(vehicle)
         assert (record.ending, vehicle.read_gains()) == (ending, SAFE)
         assert reason in record.reason
-        assert hangar.drone.body.stands
+        assert rig.drone.body.stands
         vehicle.close()
 
 
 def test_a_rebooted_vehicle_is_left_alone_and_quarantined() -> None:
-    with Hangar(faults=["reboot@3"]) as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig(faults=["reboot@3"]) as rig:
+        vehicle = rig.vehicle()
         record = fly(vehicle)
         assert record.ending == "invalid"
         assert "The vehicle rebooted." in record.reason or "The vehicle disarmed itself" in record.reason
@@ -90,12 +87,12 @@ def test_a_rebooted_vehicle_is_left_alone_and_quarantined() -> None:
 
 
 def test_a_link_that_stays_lost_quarantines_the_vehicle_and_never_stops_its_motors() -> None:
-    with Hangar(faults=["link-lost@3"]) as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig(faults=["link-lost@3"]) as rig:
+        vehicle = rig.vehicle()
         record = fly(vehicle)
         assert record.ending == "invalid"
         assert "The link stayed lost for 60 s." in record.reason
-        assert "kil_thr" not in hangar.writes
+        assert "kil_thr" not in rig.writes
         with pytest.raises(SafeGainsError, match="quarantined"):
             vehicle.stage(SAFE)
         vehicle.close()
@@ -103,17 +100,17 @@ def test_a_link_that_stays_lost_quarantines_the_vehicle_and_never_stops_its_moto
 
 def test_an_abort_sends_the_safe_gains_then_land_and_keeps_the_record() -> None:
     watcher = Watcher(abort_at_s=2.0)
-    with Hangar() as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
         vehicle.stage(TUNED)
-        before = len(hangar.heard)
+        before = len(rig.heard)
         record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
         assert vehicle.read_gains() == SAFE
         vehicle.close()
     assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
     told = [
         text(message, "param_id") if message.get_type() == "PARAM_SET" else f"block {number(message, 'seq'):.0f}"
-        for _, message in hangar.heard[before:]
+        for _, message in rig.heard[before:]
         if message.get_type() in {"PARAM_SET", "SCRIPT_ITEM"}
     ]
     take_off = told.index("block 4")
@@ -125,11 +122,11 @@ def test_an_abort_sends_the_safe_gains_then_land_and_keeps_the_record() -> None:
 
 
 def test_land_never_waits_for_the_list_of_blocks() -> None:
-    with Hangar(faults=["low-battery@1"]) as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig(faults=["low-battery@1"]) as rig:
+        vehicle = rig.vehicle()
         fly(vehicle)
         vehicle.close()
-    told = [message.get_type() for _, message in hangar.heard]
+    told = [message.get_type() for _, message in rig.heard]
     activations = [place for place, kind in enumerate(told) if kind == "SCRIPT_ITEM"]
     assert len(activations) >= 4
     assert all(told[place - 1] == "MISSION_ACK" for place in activations)
@@ -141,62 +138,62 @@ def test_what_would_end_the_program_lands_the_vehicle_first(error: BaseException
         if sample.time_s > 1.0:
             raise error
 
-    with Hangar() as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
         vehicle.stage(TUNED)
         with pytest.raises(type(error)):
             vehicle.fly(ORDER, on_sample=fail, should_stop=never)
         assert vehicle.read_gains() == SAFE
-        assert hangar.drone.body.stands
+        assert rig.drone.body.stands
         vehicle.close()
 
 
 def test_a_flight_aborted_before_it_starts_leaves_one_instant_and_arms_nothing() -> None:
-    with Hangar() as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
         vehicle.stage(TUNED)
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=lambda: Stop("changed my mind"))
         assert (record.ending, record.reason) == ("aborted", "changed my mind")
         assert record.trajectory.time_s.tolist() == [0.0]
-        assert not hangar.told("SCRIPT_ITEM")
+        assert not rig.told("SCRIPT_ITEM")
         vehicle.close()
 
 
 def test_nothing_flies_before_its_gains_are_staged() -> None:
-    with Hangar() as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
         with pytest.raises(VehicleError, match="No gains were staged"):
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         vehicle.close()
 
 
 def test_without_a_heartbeat_nothing_is_sent() -> None:
-    with Hangar(faults=["no-heartbeat@connect"]) as hangar:
+    with LockstepRig(faults=["no-heartbeat@connect"]) as rig:
         with pytest.raises(VehicleError, match=r"No heartbeat was heard.*dialect paparazzi"):
-            hangar.vehicle()
-        assert hangar.heard == []
+            rig.vehicle()
+        assert rig.heard == []
 
 
 def test_another_system_than_the_one_named_is_not_listened_to() -> None:
-    with Hangar() as hangar, pytest.raises(VehicleError, match="No heartbeat was heard"):
-        hangar.vehicle(system_id=32.0)
+    with LockstepRig() as rig, pytest.raises(VehicleError, match="No heartbeat was heard"):
+        rig.vehicle(system_id=32.0)
 
 
 def test_another_autopilot_is_not_flown() -> None:
-    with Hangar("ardupilot") as hangar:
-        options = hangar.options(autopilot="px4")
+    with LockstepRig("ardupilot") as rig:
+        options = rig.options(autopilot="px4")
         with pytest.raises(VehicleError, match=r"Others were heard: MAVLink's autopilots \[3\]"):
-            MavlinkVehicle(options, OWN_SAFE["px4"], is_real=False, clock=hangar)
+            MavlinkVehicle(options, OWN_SAFE["px4"], is_real=False, clock=rig, transport=rig)
 
 
 def test_a_vehicle_that_takes_no_parameters_is_refused() -> None:
-    with Hangar(faults=["param-unconfirmed@connect"]) as hangar, pytest.raises(VehicleError, match="did not confirm"):
-        hangar.vehicle()
+    with LockstepRig(faults=["param-unconfirmed@connect"]) as rig, pytest.raises(VehicleError, match="did not confirm"):
+        rig.vehicle()
 
 
 def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() -> None:
-    with Hangar(faults=["arm-refused@connect"]) as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig(faults=["arm-refused@connect"]) as rig:
+        vehicle = rig.vehicle()
         with pytest.raises(VehicleError, match="would not arm"):
             fly(vehicle)
         assert vehicle.read_gains() == SAFE
@@ -205,26 +202,25 @@ def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() 
 
 def test_a_position_that_comes_too_seldom_is_refused() -> None:
     with (
-        Hangar(release="paparazzi-bare") as hangar,
+        LockstepRig(release="paparazzi-bare") as rig,
         pytest.raises(VehicleError, match=r"Position: .* times a second, needed: 40"),
     ):
-        hangar.vehicle()
+        rig.vehicle()
 
 
 def test_a_low_battery_stays_on_the_ground() -> None:
-    with Hangar() as hangar, pytest.raises(VehicleError, match=r"Battery: .* V, needed: 20 V or more"):
-        hangar.vehicle(min_battery_v=20.0)
+    with LockstepRig() as rig, pytest.raises(VehicleError, match=r"Battery: .* V, needed: 20 V or more"):
+        rig.vehicle(min_battery_v=20.0)
 
 
 def test_an_armed_vehicle_is_met_with_quarantine() -> None:
-    with Hangar() as hangar:
-        link = Link(parse(str(hangar.options()["address"])), PAPARAZZI, clock=hangar, target_system=31)
+    with LockstepRig() as rig:
+        link = rig.link(target_system=31)
         for kind, fields in (("MISSION_ACK", {"type": 0}), ("SCRIPT_ITEM", {"seq": 3, "name": ""})):
             link.send(kind, target_system=31, target_component=0, **fields)
         link.close()
-        assert becomes(lambda: bool(hangar.told("SCRIPT_ITEM")))
         with pytest.raises(SafeGainsError, match="although nobody here armed it"):
-            hangar.vehicle()
+            rig.vehicle()
 
 
 @pytest.mark.parametrize(
@@ -255,13 +251,13 @@ def test_what_runs_on_the_administrators_simulation_hosts_is_no_real_vehicle() -
 def test_a_vehicle_that_does_not_sign_is_not_heard_where_signatures_are_wanted(tmp_path: Path) -> None:
     key = tmp_path / "key.txt"
     key.write_text("3f" * 32 + "\n", encoding="ascii")
-    with Hangar("ardupilot") as hangar, pytest.raises(VehicleError, match="No heartbeat was heard"):
-        hangar.vehicle(signing_key_file=str(key))
+    with LockstepRig("ardupilot") as rig, pytest.raises(VehicleError, match="No heartbeat was heard"):
+        rig.vehicle(signing_key_file=str(key))
 
 
 def test_a_signing_key_that_cannot_be_read_is_refused_without_being_told() -> None:
-    with Hangar("ardupilot") as hangar, pytest.raises(InputError, match="signing key") as refusal:
-        hangar.vehicle(signing_key_file="nowhere/secret.txt")
+    with LockstepRig("ardupilot") as rig, pytest.raises(InputError, match="signing key") as refusal:
+        rig.vehicle(signing_key_file="nowhere/secret.txt")
     assert "secret" not in f"{refusal.value} {refusal.value.problems}"
 
 
@@ -297,9 +293,9 @@ COPTERS = [("ardupilot", ""), ("ardupilot", "ardupilot-4.7"), ("px4", "")]
 @pytest.mark.parametrize(("autopilot", "release"), COPTERS, ids=[release or name for name, release in COPTERS])
 def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str, release: str) -> None:
     safe, gains = OWN_SAFE[autopilot], MILDER[autopilot]
-    with Hangar(autopilot, release=release) as hangar:
-        hangar.switch_on_failsafes()
-        vehicle = hangar.vehicle()
+    with LockstepRig(autopilot, release=release) as rig:
+        rig.switch_on_failsafes()
+        vehicle = rig.vehicle()
         assert vehicle.stage(gains) == gains
         assert vehicle.read_gains() == gains
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
@@ -315,27 +311,27 @@ def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str
 
 @pytest.mark.parametrize(("autopilot", "named"), [("ardupilot", "FS_GCS_ENABLE"), ("px4", "NAV_DLL_ACT")])
 def test_a_vehicle_whose_failsafes_are_off_is_not_flown(autopilot: str, named: str) -> None:
-    with Hangar(autopilot) as hangar, pytest.raises(VehicleError, match=f"Its own failsafe {named}: off"):
-        hangar.vehicle()
+    with LockstepRig(autopilot) as rig, pytest.raises(VehicleError, match=f"Its own failsafe {named}: off"):
+        rig.vehicle()
 
 
 @pytest.mark.parametrize("autopilot", MILDER)
 def test_an_abort_lands_the_other_autopilots_too(autopilot: str) -> None:
     watcher = Watcher(abort_at_s=7.0)
-    with Hangar(autopilot) as hangar:
-        hangar.switch_on_failsafes()
-        vehicle = hangar.vehicle()
+    with LockstepRig(autopilot) as rig:
+        rig.switch_on_failsafes()
+        vehicle = rig.vehicle()
         vehicle.stage(MILDER[autopilot])
         record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
         assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
         assert vehicle.read_gains() == OWN_SAFE[autopilot]
-        assert hangar.drone.body.stands
+        assert rig.drone.body.stands
         vehicle.close()
 
 
 def test_a_link_that_breaks_here_leaves_the_vehicle_to_its_own_failsafe_and_in_quarantine() -> None:
-    with Hangar() as hangar:
-        vehicle = hangar.vehicle()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
         vehicle.stage(TUNED)
 
         def cut(sample: Sample) -> None:
@@ -343,6 +339,6 @@ def test_a_link_that_breaks_here_leaves_the_vehicle_to_its_own_failsafe_and_in_q
                 vehicle.close()
 
         record = vehicle.fly(ORDER, on_sample=cut, should_stop=never)
-        assert (record.ending, hangar.drone.body.stands) == ("invalid", True)
+        assert (record.ending, rig.drone.body.stands) == ("invalid", True)
         with pytest.raises(SafeGainsError, match="quarantined"):
             vehicle.stage(SAFE)

@@ -1,4 +1,4 @@
-"""Whole flights that cameras watch, over real links: the simulated drone, its motion capture, and what goes wrong."""
+"""Whole flights that cameras watch, in real time eight times over: NatNet is heard in a thread of its own."""
 
 import threading
 from collections.abc import Sequence
@@ -13,12 +13,9 @@ from app.vehicles.base import FlightRecord, OptionValue
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.kind import MAVLINK
 from tests.vehicles.flying import SAFE
-from tests.vehicles.mavlink.hangar import Hangar
+from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_vehicle import fly
 from tests.vehicles.simdrone.ground import free_port
-
-SPEED = 8.0
-"""Of the drone's time: sources are looked at every 4 ms on the wall."""
 
 
 def natnet(port: int) -> str:
@@ -27,11 +24,11 @@ def natnet(port: int) -> str:
 
 def flown(mocap: str, faults: Sequence[str] = (), **options: OptionValue) -> FlightRecord:
     """And landed with its safe gains, whatever happened."""
-    with Hangar(faults=faults, speed=SPEED, mocap=mocap) as hangar:
-        vehicle = hangar.vehicle(SAFE, second_source=mocap, **options)
+    with UdpRig(faults=faults, mocap=mocap) as rig:
+        vehicle = rig.vehicle(second_source=mocap, **options)
         record = fly(vehicle)
         assert vehicle.read_gains() == SAFE
-        assert hangar.drone.body.stands
+        assert rig.drone.body.stands
         vehicle.close()
     return record
 
@@ -56,7 +53,10 @@ def test_cameras_can_be_the_ones_that_are_scored() -> None:
 
 
 def test_odometry_on_the_vehicle_s_own_link_is_a_second_source_too() -> None:
-    record = flown("odometry")
+    with LockstepRig(mocap="odometry") as rig:
+        vehicle = rig.vehicle(second_source="odometry")
+        record = fly(vehicle)
+        vehicle.close()
     assert (record.ending, record.reason) == ("completed", "")
     np.testing.assert_allclose(record.trajectory["altitude_2_m"], record.trajectory["altitude_m"], atol=0.1)
 
@@ -81,9 +81,9 @@ def test_cameras_that_drift_away_land_the_vehicle_and_the_record_says_by_how_muc
 
 def test_cameras_that_do_not_see_the_vehicle_on_the_ground_refuse_the_flight() -> None:
     mocap = natnet(free_port())
-    with Hangar(speed=SPEED, mocap=mocap) as hangar:
-        vehicle = hangar.vehicle(second_source=mocap)
-        hangar.drone.cameras.blind = True
+    with UdpRig(mocap=mocap) as rig:
+        vehicle = rig.vehicle(second_source=mocap)
+        rig.drone.cameras.blind = True
         with pytest.raises(VehicleError, match="Second source of altitude: The cameras do not see rigid body 4 of"):
             fly(vehicle)
         vehicle.close()
@@ -91,8 +91,8 @@ def test_cameras_that_do_not_see_the_vehicle_on_the_ground_refuse_the_flight() -
 
 def test_the_source_is_let_go_when_the_vehicle_cannot_be_opened() -> None:
     mocap = natnet(free_port())
-    with Hangar(mocap=mocap) as hangar:
-        options = {**hangar.options(second_source=mocap), "system_id": 99.0}
+    with UdpRig(mocap=mocap) as rig:
+        options = {**rig.options(second_source=mocap), "system_id": 99.0}
         with pytest.raises(VehicleError, match="No heartbeat was heard"):
             MAVLINK.open(options, SAFE)
         assert not any(thread.name.startswith("natnet:") for thread in threading.enumerate())

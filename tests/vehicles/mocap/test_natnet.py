@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
+from app.core.clock import ScaledClock
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mocap import natnet
 from app.vehicles.mocap.addresses import NatNetAddress
 from app.vehicles.mocap.natnet import NatNetSource

@@ -7,9 +7,9 @@ from contextlib import closing
 
 import pytest
 
+from app.core.clock import ScaledClock
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, FieldValue
 from app.vehicles.mavlink.link import Received
 from app.vehicles.mavlink.transports import LinkError

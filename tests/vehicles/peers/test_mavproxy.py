@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from app.core.clock import ScaledClock
 from app.vehicles.simdrone.drone import Drone
 from tests.vehicles.peers.mavproxy import MavProxy
 from tests.vehicles.simdrone.ground import eventually, free_port, served
@@ -22,7 +23,7 @@ def typing_to(
     port = free_port()
     with (
         MavProxy(port, folder, dialect=dialect, mavlink=mavlink, modules=modules) as mavproxy,
-        served(autopilot, f"udp:127.0.0.1:{port}@{free_port()}", speed=SPEED) as drone,
+        served(autopilot, f"udp:127.0.0.1:{port}@{free_port()}", clock=ScaledClock(SPEED)) as drone,
     ):
         yield mavproxy, drone
 

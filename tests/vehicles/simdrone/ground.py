@@ -1,4 +1,7 @@
-"""A plain ground station on a real UDP socket, of the MAVLink library's own dialect objects and nothing of ours."""
+"""A plain ground station, of the MAVLink library's own dialect objects and nothing of ours.
+
+It is in lockstep with a simulated drone, whose time passes while the ground listens, or on a real UDP socket.
+"""
 
 import contextlib
 import socket
@@ -7,16 +10,17 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
+from app.core.clock import Clock, ScaledClock
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import parse
-from app.vehicles.mavlink.clock import ScaledClock
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
-from app.vehicles.simdrone.body import new_body
+from app.vehicles.simdrone.body import TICK_S, new_body
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
+from app.vehicles.simdrone.lockstep import Lockstep
 from app.vehicles.simdrone.server import Server
 
 MODULES: Final = {
@@ -25,13 +29,70 @@ MODULES: Final = {
     "px4": "pymavlink.dialects.v20.common",
 }
 SPEED: Final = 20.0
-WALL_LIMIT_S: Final = 30.0
+SILENCE_S: Final = 120.0
+"""Of the drone's time, or the wall's: nothing that is waited for takes as long."""
 BOOTED_WITHIN_MS: Final = 1000
 STILL: Final[Mapping[str, OptionValue]] = {"scatter": 0.0, "start_latency_s": 0.0}
 """A twin without scatter, that starts at once."""
 
 Heard = Any
 """A message of the library, which has no types."""
+
+
+class Wire(Protocol):
+    """Carries bytes to one drone and back."""
+
+    def send(self, data: bytes) -> None: ...
+    def receive(self) -> list[bytes]:
+        """What has come, waiting for it a little."""
+        ...
+
+    def now_s(self) -> float:
+        """The clock by which it is waited."""
+        ...
+
+
+class LockstepWire:
+    """Whoever waits lets the drone live."""
+
+    def __init__(self, lockstep: Lockstep) -> None:
+        self.now_s = lockstep.now_s
+        self._lockstep = lockstep
+
+    def send(self, data: bytes) -> None:
+        self._lockstep.write(data)
+
+    def receive(self) -> list[bytes]:
+        self._lockstep.wait_s(TICK_S)
+        return [data for data, _ in self._lockstep.read(0.0)]
+
+
+class UdpWire:
+    """A socket of this computer, bound to a port of its own."""
+
+    def __init__(self, drone: tuple[str, int]) -> None:
+        self._drone = drone
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self._socket.settimeout(1.0)
+        self.now_s = time.monotonic
+
+    @property
+    def port(self) -> int:
+        port: int = self._socket.getsockname()[1]
+        return port
+
+    def send(self, data: bytes) -> None:
+        self._socket.sendto(data, self._drone)
+
+    def receive(self) -> list[bytes]:
+        try:
+            return [self._socket.recv(65536)]
+        except TimeoutError:
+            return []
+
+    def close(self) -> None:
+        self._socket.close()
 
 
 @dataclass
@@ -42,8 +103,7 @@ class Ground:
     """
 
     mavlink: Any
-    radio: socket.socket
-    drone: tuple[str, int]
+    wire: Wire
     heard: list[Heard] = field(default_factory=list)
     elapsed_s: float = 0.0
     """Vehicle time told so far, through reboots."""
@@ -64,27 +124,23 @@ class Ground:
         return frame
 
     def send_bytes(self, data: bytes) -> None:
-        self.radio.sendto(data, self.drone)
+        self.wire.send(data)
 
     def listen(self, seconds: float) -> list[Heard]:
         """Everything not looked at yet, and what comes while so many seconds pass on the vehicle."""
         first = self._looked_at
-        self._catch_up()
-        until_s = self.elapsed_s + seconds
-        with self._patience():
-            while self.elapsed_s < until_s:
-                self._hear(WALL_LIMIT_S)
+        until_s, give_up_at_s = self.elapsed_s + seconds, self._limit_s()
+        while self.elapsed_s < until_s:
+            self._hear(give_up_at_s)
         self._looked_at = len(self.heard)
         return self.heard[first:]
 
-    def listen_on_the_wall(self, seconds: float) -> list[Heard]:
-        """Everything not looked at yet, and what comes in so many seconds of this computer's clock: for vehicles that
-        are silent."""
-        first = self._looked_at
-        self._catch_up()
-        until_s = time.monotonic() + seconds
-        while (left_s := until_s - time.monotonic()) > 0.0:
-            self._hear(left_s)
+    def listen_to_silence(self, seconds: float) -> list[Heard]:
+        """Everything not looked at yet, and what comes in so many seconds of the wire's clock: for vehicles that tell
+        no time."""
+        first, until_s = self._looked_at, self.wire.now_s() + seconds
+        while self.wire.now_s() < until_s:
+            self._hear(until_s + seconds)
         self._looked_at = len(self.heard)
         return self.heard[first:]
 
@@ -92,18 +148,16 @@ class Ground:
         self, kind: str, fits: Callable[[Heard], bool] = lambda _message: True, *, within_s: float = 5.0
     ) -> Heard | None:
         """The next message of this kind that fits; None when so many seconds passed on the vehicle without one."""
-        self._catch_up()
-        until_s = self.elapsed_s + within_s
-        with self._patience():
-            while True:
-                while self._looked_at < len(self.heard):
-                    message = self.heard[self._looked_at]
-                    self._looked_at += 1
-                    if message.get_type() == kind and fits(message):
-                        return message
-                if self.elapsed_s > until_s:
-                    return None
-                self._hear(WALL_LIMIT_S)
+        until_s, give_up_at_s = self.elapsed_s + within_s, self._limit_s()
+        while True:
+            while self._looked_at < len(self.heard):
+                message = self.heard[self._looked_at]
+                self._looked_at += 1
+                if message.get_type() == kind and fits(message):
+                    return message
+            if self.elapsed_s > until_s:
+                return None
+            self._hear(give_up_at_s)
 
     def expect(
         self, kind: str, fits: Callable[[Heard], bool] = lambda _message: True, *, within_s: float = 5.0
@@ -116,24 +170,13 @@ class Ground:
         self.send(kind, **fields)
         return self.expect(answer)
 
-    @contextlib.contextmanager
-    def _patience(self) -> Iterator[None]:
-        self._give_up_at_s = time.monotonic() + WALL_LIMIT_S
-        yield
+    def _limit_s(self) -> float:
+        return self.wire.now_s() + SILENCE_S
 
-    def _catch_up(self) -> None:
-        """Take in what came while nobody listened."""
-        self._give_up_at_s = time.monotonic() + WALL_LIMIT_S
-        before = -1
-        while before != len(self.heard):
-            before = len(self.heard)
-            self._hear(0.0001)
-
-    def _hear(self, timeout_s: float) -> None:
-        assert time.monotonic() < self._give_up_at_s, f"the vehicle's time stands at {self.elapsed_s:.1f} s"
-        self.radio.settimeout(max(min(timeout_s, 1.0), 0.0001))
-        with contextlib.suppress(TimeoutError):
-            for message in self.mav.parse_buffer(self.radio.recv(65536)) or []:
+    def _hear(self, give_up_at_s: float) -> None:
+        assert self.wire.now_s() < give_up_at_s, f"the vehicle's time stands at {self.elapsed_s:.1f} s"
+        for data in self.wire.receive():
+            for message in self.mav.parse_buffer(data) or []:
                 self.heard.append(message)
                 self._tell_time(getattr(message, "time_boot_ms", self._boot_ms))
 
@@ -145,23 +188,25 @@ class Ground:
         self._boot_ms = max(boot_ms, self._boot_ms)
 
 
-@contextlib.contextmanager
-def served(
+def switched_on(
     autopilot: str,
-    link: str,
     *,
     vehicle: str = "twin",
     options: Mapping[str, OptionValue] = STILL,
     faults: Sequence[str] = (),
-    speed: float = SPEED,
     seed: int = 1,
-) -> Iterator[Drone]:
-    """A drone on this link, in a thread of its own."""
+) -> Drone:
     kind = get_autopilot(autopilot)
     body = new_body(vehicle, options, seed=seed)
-    drone = Drone(body, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults])
+    return Drone(body, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults])
+
+
+@contextlib.contextmanager
+def served(autopilot: str, link: str, *, clock: Clock | None = None, **settings: Any) -> Iterator[Drone]:
+    """A drone on this link, in a thread of its own, with the settings of `switched_on`."""
+    drone = switched_on(autopilot, **settings)
     transport = open_transport(parse(link))
-    server = Server(drone, transport, ScaledClock(speed))
+    server = Server(drone, transport, clock or ScaledClock(SPEED))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
@@ -172,15 +217,13 @@ def served(
         transport.close()
 
 
-@contextlib.contextmanager
-def flying(autopilot: str, **settings: Any) -> Iterator[Ground]:
-    """A drone served on a free port, with the settings of `served`, and a ground station that it speaks to."""
-    module = import_module(MODULES[autopilot.partition("-")[0]])
-    local = free_port()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
-        radio.bind(("127.0.0.1", 0))
-        with served(autopilot, f"udp:127.0.0.1:{radio.getsockname()[1]}@{local}", **settings):
-            yield Ground(module, radio, ("127.0.0.1", local))
+def dialect_of(autopilot: str) -> Any:
+    return import_module(MODULES[autopilot.partition("-")[0]])
+
+
+def flying(autopilot: str, **settings: Any) -> Ground:
+    """A ground station in lockstep with a drone, with the settings of `switched_on`."""
+    return Ground(dialect_of(autopilot), LockstepWire(Lockstep(switched_on(autopilot, **settings))))
 
 
 def free_port() -> int:

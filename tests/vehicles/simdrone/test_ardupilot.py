@@ -1,6 +1,5 @@
 """How the simulated ArduCopter answers and flies."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -25,9 +24,9 @@ LAND_WITHIN_S = 20.0
 
 
 @pytest.fixture
-def pilot() -> Iterator[ArduPilot]:
-    with flying("ardupilot") as ground:
-        yield ArduPilot(ground)
+def pilot() -> ArduPilot:
+    ground = flying("ardupilot")
+    return ArduPilot(ground)
 
 
 def positions(ground: Ground, seconds: float) -> list[Heard]:
@@ -70,14 +69,14 @@ def test_its_whole_list_is_numbered_without_a_gap(pilot: ArduPilot) -> None:
 
 
 def test_from_4_7_on_the_gains_have_other_names_and_a_tenth_of_the_value() -> None:
-    with flying("ardupilot-4.7") as ground:
-        pilot = ArduPilot(ground)
-        assert pilot.read("PSC_ACCZ_P") is None
-        held = [pilot.read(name) for name in ("PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I")]
-        assert [each.param_value for each in held if each is not None] == pytest.approx([1.0, 5.0, 0.05, 0.1])
-        pilot.hover()
-        ground.listen(5.0)
-        assert pilot.height_m() == pytest.approx(3.0, abs=0.1)
+    ground = flying("ardupilot-4.7")
+    pilot = ArduPilot(ground)
+    assert pilot.read("PSC_ACCZ_P") is None
+    held = [pilot.read(name) for name in ("PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I")]
+    assert [each.param_value for each in held if each is not None] == pytest.approx([1.0, 5.0, 0.05, 0.1])
+    pilot.hover()
+    ground.listen(5.0)
+    assert pilot.height_m() == pytest.approx(3.0, abs=0.1)
 
 
 def test_before_it_knows_where_it_is_it_refuses_to_arm_and_says_why(pilot: ArduPilot) -> None:

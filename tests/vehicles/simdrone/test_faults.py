@@ -48,53 +48,53 @@ def test_a_fault_that_cannot_be_had_is_refused_in_words(text: str) -> None:
 
 
 def test_no_heartbeat_leaves_everything_else() -> None:
-    with flying("paparazzi", faults=["no-heartbeat@connect"]) as ground:
-        kinds = {each.get_type() for each in ground.listen(5.0)}
+    ground = flying("paparazzi", faults=["no-heartbeat@connect"])
+    kinds = {each.get_type() for each in ground.listen(5.0)}
     assert "HEARTBEAT" not in kinds
     assert {"LOCAL_POSITION_NED", "SYS_STATUS"} <= kinds
 
 
 def test_an_unconfirmed_parameter_is_neither_answered_nor_held() -> None:
-    with flying("paparazzi", faults=["param-unconfirmed@connect"]) as ground:
-        pilot = Pilot(ground)
-        pilot.send_setting("gui_v_kp", 400.0)
-        assert ground.wait_for("PARAM_VALUE", within_s=2.0) is None
-        held = pilot.read("gui_v_kp")
+    ground = flying("paparazzi", faults=["param-unconfirmed@connect"])
+    pilot = Pilot(ground)
+    pilot.send_setting("gui_v_kp", 400.0)
+    assert ground.wait_for("PARAM_VALUE", within_s=2.0) is None
+    held = pilot.read("gui_v_kp")
     assert held is not None
     assert held.param_value == 283.0
 
 
 def test_paparazzi_refuses_to_arm_without_a_word() -> None:
-    with flying("paparazzi", faults=["arm-refused@connect"]) as ground:
-        pilot = Pilot(ground)
-        pilot.block(START_ENGINE)
-        assert not pilot.is_armed()
-        assert pilot.command(400, 1.0) == 4
+    ground = flying("paparazzi", faults=["arm-refused@connect"])
+    pilot = Pilot(ground)
+    pilot.block(START_ENGINE)
+    assert not pilot.is_armed()
+    assert pilot.command(400, 1.0) == 4
 
 
 @pytest.mark.parametrize(("autopilot", "result"), [("ardupilot", 4), ("px4", 1)])
 def test_the_others_refuse_to_arm_and_say_why(autopilot: str, result: int) -> None:
-    with flying(autopilot, faults=["arm-refused@connect"]) as ground:
-        pilot = copters.Pilot(ground)
-        ground.listen(4.0)
-        assert pilot.command(copters.ARM, 1.0) == result
-        assert pilot.command(copters.ARM, 1.0, copters.FORCE) == result
-        assert len(pilot.words()) == 2
+    ground = flying(autopilot, faults=["arm-refused@connect"])
+    pilot = copters.Pilot(ground)
+    ground.listen(4.0)
+    assert pilot.command(copters.ARM, 1.0) == result
+    assert pilot.command(copters.ARM, 1.0, copters.FORCE) == result
+    assert len(pilot.words()) == 2
 
 
 def test_without_lift_off_it_stands_though_it_is_armed_and_told_to_climb() -> None:
-    with flying("paparazzi", faults=["no-lift-off@connect"]) as ground:
-        pilot = Pilot(ground)
-        pilot.take_off()
-        assert max(-each.z for each in positions(ground.listen(5.0))) < 0.11
-        assert pilot.is_armed()
+    ground = flying("paparazzi", faults=["no-lift-off@connect"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    assert max(-each.z for each in positions(ground.listen(5.0))) < 0.11
+    assert pilot.is_armed()
 
 
 def test_a_lost_link_is_silent_both_ways_while_the_drone_flies_on() -> None:
-    with flying("paparazzi", faults=["link-lost:8@4"]) as ground:
-        pilot = Pilot(ground)
-        pilot.take_off()
-        heard = positions(ground.listen(25.0))
+    ground = flying("paparazzi", faults=["link-lost:8@4"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    heard = positions(ground.listen(25.0))
     gaps_ms = [b.time_boot_ms - a.time_boot_ms for a, b in pairwise(heard)]
     assert max(gaps_ms) == pytest.approx(8000, abs=50)
     assert sorted(gaps_ms)[-2] <= 20
@@ -102,31 +102,31 @@ def test_a_lost_link_is_silent_both_ways_while_the_drone_flies_on() -> None:
 
 
 def test_during_a_lost_link_commands_do_not_arrive() -> None:
-    with flying("paparazzi", faults=["link-lost:4@2"], speed=4.0) as ground:
-        pilot = Pilot(ground)
-        pilot.take_off()
-        ground.listen(1.9)
-        ground.listen_on_the_wall(0.3)
-        pilot.send_setting("gui_v_kp", 400.0)
-        ground.expect("LOCAL_POSITION_NED", within_s=10.0)
-        held = pilot.read("gui_v_kp")
+    ground = flying("paparazzi", faults=["link-lost:4@2"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    ground.listen(1.9)
+    ground.listen_to_silence(1.2)
+    pilot.send_setting("gui_v_kp", 400.0)
+    ground.expect("LOCAL_POSITION_NED", within_s=10.0)
+    held = pilot.read("gui_v_kp")
     assert held is not None
     assert held.param_value == 283.0
 
 
 def test_a_frozen_position_repeats_itself_its_time_too_while_packets_arrive() -> None:
-    with flying("paparazzi", faults=["frozen-position:3@2"]) as ground:
-        Pilot(ground).take_off()
-        heard = positions(ground.listen(8.0))
+    ground = flying("paparazzi", faults=["frozen-position:3@2"])
+    Pilot(ground).take_off()
+    heard = positions(ground.listen(8.0))
     repeated = [a.time_boot_ms for a, b in pairwise(heard) if a.time_boot_ms == b.time_boot_ms]
     assert len(set(repeated)) == 1
     assert len(repeated) == pytest.approx(3.0 * 51.2, abs=3)
 
 
 def test_a_jumping_position_jumps_a_metre_up_alone() -> None:
-    with flying("paparazzi", faults=["jumping-position@0"]) as ground:
-        Pilot(ground).take_off()
-        heights = [-each.z for each in positions(ground.listen(8.0))]
+    ground = flying("paparazzi", faults=["jumping-position@0"])
+    Pilot(ground).take_off()
+    heights = [-each.z for each in positions(ground.listen(8.0))]
     jumps = [index for index, (a, b) in enumerate(pairwise(heights)) if b - a > 0.7]
     falls = [index for index, (a, b) in enumerate(pairwise(heights)) if a - b > 0.7]
     assert len(jumps) > 10
@@ -136,53 +136,53 @@ def test_a_jumping_position_jumps_a_metre_up_alone() -> None:
 
 @pytest.mark.parametrize("autopilot", ["paparazzi", "ardupilot", "px4"])
 def test_a_low_battery_reads_nine_volts(autopilot: str) -> None:
-    with flying(autopilot, faults=["low-battery@connect"]) as ground:
-        assert ground.expect("SYS_STATUS").voltage_battery == 9000
-        assert ground.expect("BATTERY_STATUS").voltages[0] == 9000
+    ground = flying(autopilot, faults=["low-battery@connect"])
+    assert ground.expect("SYS_STATUS").voltage_battery == 9000
+    assert ground.expect("BATTERY_STATUS").voltages[0] == 9000
 
 
 def test_a_reboot_in_the_air_stops_the_motors_forgets_the_gains_and_starts_the_clock_anew() -> None:
-    with flying("paparazzi", faults=["reboot@6"]) as ground:
-        pilot = Pilot(ground)
-        pilot.set_gains(1624, 1356, 195)
-        pilot.take_off()
-        heard = positions(ground.listen(9.0))
-        first_after = next(b for a, b in pairwise(heard) if b.time_boot_ms < a.time_boot_ms)
-        assert first_after.time_boot_ms < 100
-        assert -first_after.z < 0.2
-        assert not pilot.is_armed()
-        held = pilot.read("gui_v_kp")
+    ground = flying("paparazzi", faults=["reboot@6"])
+    pilot = Pilot(ground)
+    pilot.set_gains(1624, 1356, 195)
+    pilot.take_off()
+    heard = positions(ground.listen(9.0))
+    first_after = next(b for a, b in pairwise(heard) if b.time_boot_ms < a.time_boot_ms)
+    assert first_after.time_boot_ms < 100
+    assert -first_after.z < 0.2
+    assert not pilot.is_armed()
+    held = pilot.read("gui_v_kp")
     assert held is not None
     assert held.param_value == 283.0
 
 
 def test_a_reboot_does_not_mend_what_else_is_wrong() -> None:
-    with flying("paparazzi", faults=["param-unconfirmed@connect", "reboot@1"]) as ground:
-        pilot = Pilot(ground)
-        pilot.take_off()
-        ground.listen(max(1.2 - ground.elapsed_s, 0.1))
-        ground.expect("LOCAL_POSITION_NED", lambda message: message.time_boot_ms < 1000, within_s=10.0)
-        ground.listen(1.0)
-        pilot.send_setting("gui_v_kp", 400.0)
-        assert ground.wait_for("PARAM_VALUE", within_s=1.0) is None
+    ground = flying("paparazzi", faults=["param-unconfirmed@connect", "reboot@1"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    ground.listen(max(1.2 - ground.elapsed_s, 0.1))
+    ground.expect("LOCAL_POSITION_NED", lambda message: message.time_boot_ms < 1000, within_s=10.0)
+    ground.listen(1.0)
+    pilot.send_setting("gui_v_kp", 400.0)
+    assert ground.wait_for("PARAM_VALUE", within_s=1.0) is None
 
 
 def test_some_packets_arrive_twice() -> None:
-    with flying("paparazzi", faults=["duplicated-packets@connect"]) as ground:
-        heard = ground.listen(5.0)
+    ground = flying("paparazzi", faults=["duplicated-packets@connect"])
+    heard = ground.listen(5.0)
     assert sequence_steps(heard) == {0, 1}
 
 
 def test_some_packets_arrive_late() -> None:
-    with flying("paparazzi", faults=["reordered-packets@connect"]) as ground:
-        heard = ground.listen(5.0)
+    ground = flying("paparazzi", faults=["reordered-packets@connect"])
+    heard = ground.listen(5.0)
     assert sequence_steps(heard) == {1, 2, 255}
 
 
 def test_packets_may_come_from_another_system() -> None:
-    with flying("paparazzi", faults=["wrong-system:2@0"]) as ground:
-        Pilot(ground).take_off()
-        systems = [each.get_srcSystem() for each in ground.listen(5.0)]
+    ground = flying("paparazzi", faults=["wrong-system:2@0"])
+    Pilot(ground).take_off()
+    systems = [each.get_srcSystem() for each in ground.listen(5.0)]
     assert set(systems) == {31, 77}
     assert systems[-1] == 31
 

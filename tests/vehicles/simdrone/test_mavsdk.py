@@ -15,6 +15,7 @@ from mavsdk.plugins.info.info import Info, InfoError
 from mavsdk.plugins.param.param import Param
 from mavsdk.plugins.telemetry.telemetry import Telemetry
 
+from app.core.clock import ScaledClock
 from tests.vehicles.simdrone.ground import eventually, free_port, served
 
 SPEED = 5.0
@@ -43,7 +44,7 @@ def station(autopilot: str) -> Iterator[Station]:
     mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     try:
         mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
-        with served(autopilot, f"udp:127.0.0.1:{port}", speed=SPEED):
+        with served(autopilot, f"udp:127.0.0.1:{port}", clock=ScaledClock(SPEED)):
             eventually(lambda: any(system.has_autopilot() for system in mavsdk.get_systems()), FOUND_WITHIN_S)
             system = next(system for system in mavsdk.get_systems() if system.has_autopilot())
             info = Info(system)

@@ -1,6 +1,6 @@
 """How the simulated Paparazzi flies, lands and falls."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +33,8 @@ TUNED = (1624, 1356, 195)
 
 
 @pytest.fixture
-def ground() -> Iterator[Ground]:
-    with flying("paparazzi") as opened:
-        yield opened
+def ground() -> Ground:
+    return flying("paparazzi")
 
 
 @pytest.fixture
@@ -71,11 +70,11 @@ def test_its_takeoff_is_the_replicas_to_the_last_digit(pilot: Pilot) -> None:
 def test_in_the_body_of_jsbsim_it_flies_like_the_recorded_drone(gains: tuple[int, int, int]) -> None:
     name = "_".join(str(gain) for gain in gains)
     recorded = np.loadtxt(TAKEOFFS / f"paparazzi_{name}.csv", delimiter=",", skiprows=1)
-    with flying("paparazzi", vehicle="jsbsim", options={}, speed=8.0) as ground:
-        pilot = Pilot(ground)
-        pilot.set_gains(*gains)
-        pilot.take_off()
-        messages = from_vehicle(ground.listen(24.0), "LOCAL_POSITION_NED")
+    ground = flying("paparazzi", vehicle="jsbsim", options={})
+    pilot = Pilot(ground)
+    pilot.set_gains(*gains)
+    pilot.take_off()
+    messages = from_vehicle(ground.listen(24.0), "LOCAL_POSITION_NED")
     times_s = np.array([each.time_boot_ms for each in messages]) / 1000
     heights = np.array([-each.z for each in messages])
     times_s -= times_s[np.argmax(heights > 0.15)]

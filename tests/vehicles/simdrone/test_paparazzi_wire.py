@@ -1,7 +1,6 @@
 """What Paparazzi says on the wire: the simulated one beside two recorded trials of the real one."""
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -32,9 +31,8 @@ def recordings() -> None:
 
 
 @pytest.fixture
-def ground() -> Iterator[Ground]:
-    with flying("paparazzi") as opened:
-        yield opened
+def ground() -> Ground:
+    return flying("paparazzi")
 
 
 @pytest.fixture
@@ -105,8 +103,8 @@ def test_its_relative_altitude_is_the_recorded_nonsense(ground: Ground) -> None:
 
 
 def test_without_a_telemetry_file_the_position_comes_at_one_and_a_quarter_hertz() -> None:
-    with flying("paparazzi-bare") as ground:
-        times_ms = [each.time_boot_ms for each in from_vehicle(ground.listen(10.0), "LOCAL_POSITION_NED")]
+    ground = flying("paparazzi-bare")
+    times_ms = [each.time_boot_ms for each in from_vehicle(ground.listen(10.0), "LOCAL_POSITION_NED")]
     assert [b - a for a, b in pairwise(times_ms)] == pytest.approx([800] * (len(times_ms) - 1), abs=5)
 
 
@@ -162,13 +160,13 @@ def test_a_frame_of_mavlink_2_gets_no_reply(ground: Ground, pilot: Pilot) -> Non
 
 
 def test_a_burst_of_requests_is_lost_and_the_same_one_by_one_are_all_answered() -> None:
-    with flying("paparazzi", speed=1.0) as ground:
-        for index in range(40):
-            ground.send("PARAM_REQUEST_READ", param_id="", param_index=index, **TO)
-        assert from_vehicle(ground.listen(0.5), "PARAM_VALUE") == []
-        for index in range(40):
-            ground.send("PARAM_REQUEST_READ", param_id="", param_index=index, **TO)
-            assert ground.expect("PARAM_VALUE").param_index == index
+    ground = flying("paparazzi")
+    for index in range(40):
+        ground.send("PARAM_REQUEST_READ", param_id="", param_index=index, **TO)
+    assert from_vehicle(ground.listen(0.5), "PARAM_VALUE") == []
+    for index in range(40):
+        ground.send("PARAM_REQUEST_READ", param_id="", param_index=index, **TO)
+        assert ground.expect("PARAM_VALUE").param_index == index
 
 
 def test_a_list_being_read_locks_the_blocks_until_it_is_acknowledged(ground: Ground) -> None:

@@ -1,6 +1,5 @@
 """How the simulated PX4 answers and flies."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -25,9 +24,9 @@ TAKING_OFF, LOITER, LANDING = (4 << 16 | sub << 24 for sub in (2, 3, 6))
 
 
 @pytest.fixture
-def pilot() -> Iterator[Px4]:
-    with flying("px4") as ground:
-        yield Px4(ground)
+def pilot() -> Px4:
+    ground = flying("px4")
+    return Px4(ground)
 
 
 def test_it_is_a_copter_of_px4_half_a_metre_above_its_own_origin(pilot: Px4) -> None:

@@ -1,7 +1,9 @@
-"""A simulated drone at the other end of real sockets, in a thread, whose own time is the time of both sides.
+"""Simulated drones at the other end of a vehicle's link, whose own time is the time of both sides.
 
-After everything it says the drone waits, briefly, until the ground's threads have looked at the clock: however busy the
-machine is, the ground is not late by much.
+`LockstepRig` shares the thread of the test: every run is the same, and as quick as it can be computed. `UdpRig` has a
+thread of its own behind real sockets and lives in real time, so many times over, for what has threads of its own on the
+ground: after everything it says it waits, briefly, until these have looked at the clock, so that on a busy machine the
+ground is not late by much.
 """
 
 import struct
@@ -18,16 +20,17 @@ from app.vehicles.mavlink.dialects import Message, text
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.transports import open_transport
+from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import TICK_S, new_body
-from app.vehicles.simdrone.cameras import open_outlet
+from app.vehicles.simdrone.cameras import Outlet, open_outlet
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
-from tests.vehicles.mavlink.speaking import LOOPBACK, becomes, free_port
+from app.vehicles.simdrone.lockstep import Lockstep
+from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
 
 SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 283, "ki": 13, "kd": 82},
@@ -37,6 +40,7 @@ SAFE: Final[Mapping[str, Mapping[str, float]]] = {
 _TICKS_AT_ONCE: Final = 4
 _PATIENCE_S: Final = 0.05
 """On the wall: for a thread that has ended its work, or a machine that is very busy."""
+_SPEED: Final = 8.0
 _BYTEWISE: Final = 6
 _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
     "ardupilot": (("FS_GCS_ENABLE", 2, 5), ("FENCE_ENABLE", 2, 1)),
@@ -45,7 +49,33 @@ _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
 """Name, MAVLink's type, value."""
 
 
-class Hangar:
+def switch_on(
+    autopilot: str, faults: Sequence[str], body: Mapping[str, OptionValue] | None, outlet: Outlet | None = None
+) -> Drone:
+    """One whose flights do not scatter."""
+    kind = get_autopilot(autopilot)
+    built = new_body("twin", {"scatter": 0.0, **(body or {})}, seed=1)
+    return Drone(built, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults], outlet)
+
+
+class _Heard:
+    """What reached a drone, with its time."""
+
+    def __init__(self, autopilot: str) -> None:
+        self.autopilot = autopilot
+        self.heard: list[tuple[float, Message]] = []
+        self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
+
+    def told(self, *kinds: str) -> list[Message]:
+        return [message for _, message in self.heard if message.get_type() in kinds]
+
+    @property
+    def writes(self) -> list[str]:
+        """Parameters in the order in which they were written."""
+        return [text(message, "param_id") for message in self.told("PARAM_SET")]
+
+
+class LockstepRig(Lockstep, _Heard):
     """`heard` is everything that reached the drone, with the drone's time."""
 
     def __init__(
@@ -53,23 +83,64 @@ class Hangar:
         autopilot: str = "paparazzi",
         faults: Sequence[str] = (),
         *,
-        speed: float = 25.0,
         release: str = "",
         body: Mapping[str, OptionValue] | None = None,
         mocap: str = "",
     ) -> None:
-        self.autopilot, self.speed = autopilot, speed
-        kind = get_autopilot(release or autopilot)
-        built = new_body("twin", {"scatter": 0.0, **(body or {})}, seed=1)
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
-        planned = [parse_fault(text) for text in faults]
-        self.drone = Drone(built, lambda fresh: kind.make(fresh, kind.system), planned, self._outlet)
+        Lockstep.__init__(self, switch_on(release or autopilot, faults, body, self._outlet))
+        _Heard.__init__(self, autopilot)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._outlet is not None:
+            self._outlet.close()
+
+    def write(self, data: bytes) -> bool:
+        self.heard += [(self.drone.time_s, message) for message in self._codec.parse(data)]
+        return super().write(data)
+
+    # ---- the ground side
+
+    def options(self, **options: OptionValue) -> dict[str, OptionValue]:
+        return MAVLINK.check({"autopilot": self.autopilot, "simulated": True, **options}, field="options")
+
+    def link(self, target_system: int | None = None) -> Link:
+        """As another ground station has it."""
+        address, dialect = parse(str(self.options()["address"])), PROFILES[self.autopilot].dialect
+        return Link(address, dialect, clock=self, target_system=target_system, transport=self)
+
+    def switch_on_failsafes(self) -> None:
+        """As a person does with another ground station before the first flight."""
+        with self.link() as link:
+            while link.vehicle_system is None:
+                link.receive(0.1)
+            for name, kind, value in _FAILSAFES[self.autopilot]:
+                whole = struct.unpack("<f", struct.pack("<i", value))[0] if kind == _BYTEWISE else float(value)
+                whom = {"target_system": 1, "target_component": 0}
+                link.send("PARAM_SET", **whom, param_id=name, param_type=kind, param_value=whole)
+            self.wait_s(TICK_S)
+
+    def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
+        safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
+        chosen = self.options(**options)
+        place = str(chosen["second_source"])
+        source = open_source(place, self) if place else None
+        return MavlinkVehicle(chosen, safe, is_real=False, clock=self, source=source, transport=self)
+
+
+class UdpRig(_Heard):
+    """The same behind a socket."""
+
+    def __init__(self, autopilot: str = "paparazzi", faults: Sequence[str] = (), *, mocap: str = "") -> None:
+        super().__init__(autopilot)
+        self._outlet = open_outlet(parse_source(mocap)) if mocap else None
+        self.drone = switch_on(autopilot, faults, None, self._outlet)
         self._ports = free_port(), free_port()
-        self._transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
-        self._codec = PROFILES[autopilot].dialect.codec(system=1, component=1)
-        self.heard: list[tuple[float, Message]] = []
+        self._transport: Transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
         self.problem: BaseException | None = None
-        self._mute = False
         self._lookers: dict[threading.Thread, bool] = {}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -101,7 +172,7 @@ class Hangar:
         time.sleep(max(self.wall_s(seconds), 0.0))
 
     def wall_s(self, seconds: float) -> float:
-        return seconds / self.speed
+        return seconds / _SPEED
 
     # ---- the ground side
 
@@ -110,34 +181,11 @@ class Hangar:
         chosen = {"autopilot": self.autopilot, "address": address, "simulated": True, **options}
         return MAVLINK.check(chosen, field="options")
 
-    def switch_on_failsafes(self) -> None:
-        """As a person does with another ground station before the first flight."""
-        with Link(parse(str(self.options()["address"])), PROFILES[self.autopilot].dialect, clock=self) as link:
-            assert becomes(lambda: link.vehicle_system is not None or not link.receive(0.1))
-            for name, kind, value in _FAILSAFES[self.autopilot]:
-                whole = struct.unpack("<f", struct.pack("<i", value))[0] if kind == _BYTEWISE else float(value)
-                whom = {"target_system": 1, "target_component": 0}
-                link.send("PARAM_SET", **whom, param_id=name, param_type=kind, param_value=whole)
-            assert becomes(lambda: len(self.writes) == len(_FAILSAFES[self.autopilot]))
-
-    def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
-        safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
+    def vehicle(self, **options: OptionValue) -> MavlinkVehicle:
         chosen = self.options(**options)
         place = str(chosen["second_source"])
         source = open_source(place, _Glances(self)) if place else None
-        return MavlinkVehicle(chosen, safe, is_real=False, clock=self, source=source)
-
-    def mute(self, muted: bool) -> None:
-        """The drone hears, and nothing that it says arrives."""
-        self._mute = muted
-
-    def told(self, *kinds: str) -> list[Message]:
-        return [message for _, message in self.heard if message.get_type() in kinds]
-
-    @property
-    def writes(self) -> list[str]:
-        """Parameters in the order in which they were written."""
-        return [text(message, "param_id") for message in self.told("PARAM_SET")]
+        return MavlinkVehicle(chosen, SAFE[self.autopilot], is_real=False, clock=self, source=source)
 
     # ---- the drone's thread
 
@@ -150,9 +198,9 @@ class Hangar:
                 frames = [frame for _ in range(_TICKS_AT_ONCE) for frame in self.drone.tick()]
                 for looker in tuple(self._lookers):
                     self._lookers[looker] = False
-                for frame in () if self._mute else frames:
+                for frame in frames:
                     self._transport.write(frame)
-                time.sleep(_TICKS_AT_ONCE * TICK_S / self.speed)
+                time.sleep(_TICKS_AT_ONCE * TICK_S / _SPEED)
                 if frames:
                     self._wait_for_lookers()
         except BaseException as error:  # noqa: BLE001 - told by the other thread
@@ -169,14 +217,14 @@ class Hangar:
 class _Glances:
     """The drone's time for somebody whom the drone does not wait for."""
 
-    def __init__(self, hangar: Hangar) -> None:
-        self._hangar = hangar
+    def __init__(self, drone: UdpRig) -> None:
+        self._drone = drone
 
     def now_s(self) -> float:
-        return self._hangar.drone.time_s
+        return self._drone.drone.time_s
 
     def wait_s(self, seconds: float) -> None:
-        self._hangar.wait_s(seconds)
+        self._drone.wait_s(seconds)
 
     def wall_s(self, seconds: float) -> float:
-        return self._hangar.wall_s(seconds)
+        return self._drone.wall_s(seconds)
