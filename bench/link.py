@@ -30,8 +30,8 @@ from typing import Final
 
 import numpy as np
 
-from app.vehicles.mavlink.addresses import UdpAddress
 from app.core.clock import ScaledClock
+from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.dialects import PAPARAZZI, FieldValue, Message, number
 from app.vehicles.mavlink.link import Link
 

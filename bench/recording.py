@@ -25,9 +25,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
 
+from app.core.clock import ScaledClock
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.core.clock import ScaledClock
 from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.moves import Plan

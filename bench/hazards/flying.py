@@ -34,19 +34,16 @@ class Flown:
 
 def carry_out(case: Case) -> Flown:
     """Raises what the simulated drone raised, when it broke down."""
-    with Rig(case) as rig:
-        rig.wait_s(case.warm_s)
-        rig.stages.begin(rig.now_s())
-        flown = _try(rig)
-    if rig.problem is not None:
-        raise rig.problem
-    return flown
+    rig = Rig(case)
+    rig.wait_s(case.warm_s)
+    rig.stages.begin(rig.now_s())
+    return _try(rig)
 
 
 def _try(rig: Rig) -> Flown:
     try:
         source = open_source("odometry", rig) if rig.case.has_second_source else None
-        vehicle = MavlinkVehicle(rig.options(), rig.case.safe, is_real=False, clock=rig, source=source)
+        vehicle = MavlinkVehicle(rig.options(), rig.case.safe, is_real=False, clock=rig, source=source, transport=rig)
     except VehicleError as error:
         rig.stages.over_s = rig.drone.time_s
         return _end(rig, "refused", "unopened", str(error))
