@@ -28,7 +28,7 @@ from app.settings import Settings
 from tests.builders import create_flown_trial, create_imported_trial, create_ready_campaign, create_trial, run_jobs
 from tests.fleet.vehicles import create_campaign_on, create_connected
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.complete
 
 PATHS = json.loads((Path(__file__).parents[2] / "frontend" / "openapi.json").read_text())["paths"]
 FURNISHED = 4

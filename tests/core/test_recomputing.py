@@ -65,7 +65,7 @@ def test_every_proposal_and_every_advice_is_recomputed_bit_for_bit(definition: D
     recompute(definition, flying)
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(DEFINITIONS, FLYING)
 def test_so_are_those_of_many_more_campaigns(definition: Definition, flying: Flying) -> None:

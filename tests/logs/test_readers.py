@@ -136,7 +136,7 @@ def repeated(head: bytes, body: bytes, path: Path, size: int) -> Path:
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 @pytest.mark.parametrize("kind", sorted(ORIGINALS))
 def test_two_hundred_megabytes_take_bounded_time_and_memory(kind: str, tmp_path: Path) -> None:
     whole = {

@@ -94,7 +94,7 @@ def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> Non
         require_sound_database(second.data_dir)
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_a_flight_that_outlived_its_web_process_can_still_be_aborted(tmp_path: Path) -> None:
     first = Serving(tmp_path / "data")
     trial_id = in_the_air(first, first.campaign(), speed=1.0)
@@ -146,7 +146,7 @@ def test_stopping_the_server_in_mid_flight_lands_and_records_it(tmp_path: Path) 
         assert trial["record"]["samples"] > 0
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_a_worker_killed_at_random_moments_never_leaves_a_false_state(serving: Serving) -> None:
     campaign_id = serving.campaign(max_flights=200)
     for number in range(6):

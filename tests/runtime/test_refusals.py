@@ -74,7 +74,7 @@ def test_a_worker_without_a_database_says_what_to_run(tmp_path: Path) -> None:
     assert "gainline serve" in refused.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_a_worker_of_its_own_serves_a_server_without_one(tmp_path: Path) -> None:
     with Serving(tmp_path / "data", "--no-worker") as serving:
         assert serving.get("/health")["worker"] == "absent"
@@ -103,7 +103,7 @@ def test_a_server_with_open_streams_stops_by_itself_and_its_worker_with_it(tmp_p
         os.kill(worker, 0)
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_a_deep_data_folder_works_with_a_short_socket(tmp_path: Path) -> None:
     deep = tmp_path / ("d" * 100) / ("e" * 100)
     deep.mkdir(parents=True)

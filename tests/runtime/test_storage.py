@@ -117,7 +117,7 @@ def test_a_disk_that_fills_up_in_mid_flight_costs_no_record(disk: Path, serving:
     assert landed["reason"] == "enough"
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_a_record_waits_in_the_spool_while_the_database_takes_nothing(tmp_path: Path) -> None:
     with Serving(tmp_path / "data") as serving:
         trial_id = in_the_air(serving, serving.campaign())
@@ -129,7 +129,7 @@ def test_a_record_waits_in_the_spool_while_the_database_takes_nothing(tmp_path: 
         wait_for("the spool to be empty", lambda: not list((serving.data_dir / "spool").iterdir()))
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_a_record_in_the_spool_outlives_its_worker(tmp_path: Path) -> None:
     with Serving(tmp_path / "data") as serving:
         trial_id = in_the_air(serving, serving.campaign())

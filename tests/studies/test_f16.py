@@ -44,7 +44,7 @@ def test_the_showcase_looks_like_the_papers_campaign() -> None:
     assert shown.model_hand["pitch_rad"].shape == shown.model_start["pitch_rad"].shape
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 @pytest.mark.timeout(900)
 def test_over_fifty_models_the_methods_come_in_the_expected_order() -> None:
     """±45 %: raw < scaled outside < scaled inside < identified again, which is there by the second flight."""
@@ -54,7 +54,7 @@ def test_over_fifty_models_the_methods_come_in_the_expected_order() -> None:
     assert results[-1].share_by(2) >= 0.98
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("perturbation", [0.2, 0.8])
 def test_identified_again_49_of_50_models_are_near_by_the_second_flight(perturbation: float) -> None:

@@ -71,7 +71,7 @@ def test_the_long_form_identifies_again_at_every_perturbation_and_from_noisy_log
     assert told == pytest.approx([0.4 + 0.2 * done for done in (1, 2, 3)])
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 @pytest.mark.timeout(300)
 def test_noisy_logs_are_what_the_maximum_a_posteriori_form_is_for() -> None:
     near = [row for row in _methods(_FULL[1:2], (10, 11), lambda _share, _doing: None) if row.unit == "of models"]
@@ -80,7 +80,7 @@ def test_noisy_logs_are_what_the_maximum_a_posteriori_form_is_for() -> None:
     assert squares.measured <= posteriori.measured == 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 @pytest.mark.timeout(900)
 def test_the_brief_form_has_every_row_with_the_methods_in_their_order() -> None:
     """The order of the expected table: raw < outside < inside < identified; the starts within 2 % of theirs."""

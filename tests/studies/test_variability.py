@@ -50,7 +50,7 @@ def test_a_few_batteries_give_every_row_and_the_figure() -> None:
     assert panels[1].lines[-1].y == pytest.approx(shown.tolist(), abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.complete
 def test_200_batteries_scatter_within_40_percent_of_the_papers() -> None:
     """Fig. 12: 0.0141 m at the default gains, 0.0066 m at the tuned ones."""
     result = run_variability(lambda _share, _doing: None, fading_groups=1)
