@@ -1,4 +1,4 @@
-"""The F-16 experiment's study on a few inaccurate models, and over fifty (slow)."""
+"""The F-16 experiment's study on a few inaccurate models, and over fifty."""
 
 from itertools import pairwise
 
