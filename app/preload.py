@@ -1,9 +1,7 @@
-"""Imported by the server that processes are forked from (`app.processes`): what a flight and a proposal need, loaded
-and, as far as it is compiled, compiled."""
+"""Imported by the server that processes are forked from (`app.processes`): what a flight and a first proposal need."""
 
 import app.fleet.seat
-import app.studies.reproductions
 import app.trials.cockpit  # noqa: F401
-from app.campaigns.tasks import prepare
+from app.campaigns.computation import prepare_first
 
-prepare()
+prepare_first()
