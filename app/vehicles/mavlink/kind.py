@@ -41,7 +41,6 @@ def _vehicle(options: Options, safe_gains: Gains, identity: Identity | None, *, 
 
     What speaks to a vehicle is imported here, by the process that opens one: those that only know its settings do not.
     """
-    from app.vehicles.mavlink.clock import ScaledClock  # noqa: PLC0415
     from app.vehicles.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415
     from app.vehicles.mocap.opening import open_source  # noqa: PLC0415
 
