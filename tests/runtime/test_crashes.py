@@ -18,11 +18,21 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
         yield one
 
 
-def children(pid: int) -> list[int]:
-    """The processes that a process has started, multiprocessing's resource tracker apart."""
+def started_by(pid: int) -> dict[int, bytes]:
+    """The processes whose parent it is, and what they were started as."""
     listed = Path(f"/proc/{pid}/task").glob("*/children")
     found = [int(child) for task in listed for child in task.read_text().split()]
-    return [child for child in found if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()]
+    return {child: Path(f"/proc/{child}/cmdline").read_bytes() for child in found}
+
+
+def fork_server(pid: int) -> int:
+    """From which a worker's processes are forked."""
+    return next(child for child, command in started_by(pid).items() if b"multiprocessing.forkserver" in command)
+
+
+def children(pid: int) -> list[int]:
+    """The processes that fly and compute for a worker."""
+    return list(started_by(fork_server(pid)))
 
 
 def in_the_air(serving: Serving, campaign_id: int, *, speed: float) -> int:
@@ -74,6 +84,23 @@ def test_a_flight_whose_own_process_is_killed_is_lost_and_the_worker_goes_on(ser
     assert "exit code -9" in serving.trial(trial_id, "lost")["reason"]
     serving.trial(serving.fly(campaign_id), "valid")
     assert serving.worker_pid() == worker
+
+
+def test_a_killed_fork_server_costs_no_flight_and_there_is_another_for_the_next(serving: Serving) -> None:
+    campaign_id = serving.campaign()
+    worker = serving.worker_pid()
+    trial_id = in_the_air(serving, campaign_id, speed=20.0)
+    killed, crew = fork_server(worker), children(worker)
+    os.kill(killed, signal.SIGKILL)
+    serving.trial(trial_id, "valid")
+    for pid in crew:
+        os.kill(pid, signal.SIGKILL)
+    in_vain = serving.fly(campaign_id)
+    wait_for("the flight's failure", lambda: serving.get(f"/trials/{in_vain}")["flight"]["state"] == "failed")
+    serving.post(f"/trials/{in_vain}/fly", {"speed": None})
+    serving.trial(in_vain, "valid")
+    assert serving.worker_pid() == worker
+    assert fork_server(worker) != killed
 
 
 def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> None:
