@@ -3,7 +3,6 @@
 import fcntl
 import json
 import os
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -11,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+from app.core.clock import REAL_TIME, Clock
 from app.errors import StorageError
 
 POLL_S: Final = 0.1
@@ -36,7 +36,9 @@ class LockedError(Exception):
 
 
 @contextmanager
-def exclusive(path: Path, *, keep_waiting: Callable[[], bool] = lambda: False) -> Iterator[Callable[[str], None]]:
+def exclusive(
+    path: Path, *, keep_waiting: Callable[[], bool] = lambda: False, clock: Clock = REAL_TIME
+) -> Iterator[Callable[[str], None]]:
     """Hold the lock file at `path`; what it yields writes the holder's address into it.
 
     Raises LockedError when another process holds it and `keep_waiting()` is false, StorageError when there can be no
@@ -53,7 +55,7 @@ def exclusive(path: Path, *, keep_waiting: Callable[[], bool] = lambda: False) -
         while not _take(descriptor):
             if not keep_waiting():
                 raise LockedError(_holder(descriptor))
-            time.sleep(POLL_S)
+            clock.wait_s(POLL_S)
         _sign(descriptor, "")
         yield partial(_sign, descriptor)
     finally:

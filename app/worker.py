@@ -26,6 +26,7 @@ from app.campaigns.computation import prepare, prepare_first
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.tasks import Proposer, Surveyor
+from app.core.clock import REAL_TIME, Clock
 from app.data_dir import prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
@@ -138,8 +139,9 @@ def _end_with_parent(ending: Ending) -> None:
 class Worker:
     """Everything that runs while the worker holds its lock."""
 
-    def __init__(self, settings: Settings, ending: Ending, airspace: Airspace) -> None:
+    def __init__(self, settings: Settings, ending: Ending, airspace: Airspace, clock: Clock = REAL_TIME) -> None:
         self._settings = settings
+        self._clock = clock
         self._ending = ending
         self._airspace = airspace
         self._name = f"{platform.node()}:{os.getpid()}"
@@ -182,6 +184,7 @@ class Worker:
             worker=self._name,
             closing=closing,
             real=is_loopback(self._settings.host),
+            clock=self._clock,
         )
         live = LiveServer(live_address(data_dir), abort=self._airspace.abort, order=sessions.order, hello=self._hello)
         deck = FlightDeck(
@@ -192,6 +195,7 @@ class Worker:
             worker=self._name,
             closing=closing,
             session=sessions.session,
+            clock=self._clock,
         )
         return sessions, deck, live
 
@@ -204,7 +208,15 @@ class Worker:
             (LANDSCAPE_JOB, Surveyor(database, surveying, worker=self._name), LANDSCAPES_AT_ONCE),
         )
         return tuple(
-            Desk(database, kind, perform, room=room, worker=self._name, lease_s=self._settings.lease_s)
+            Desk(
+                database,
+                kind,
+                perform,
+                room=room,
+                worker=self._name,
+                lease_s=self._settings.lease_s,
+                clock=self._clock,
+            )
             for kind, perform, room in performed
         )
 
@@ -215,7 +227,7 @@ class Worker:
                     claim()
                 except StorageError as error:
                     _log.error("no work can be claimed", why=str(error))
-                    self._ending.event.wait(RETRY_S)
+                    self._ending.event.wait(self._clock.wall_s(RETRY_S))
                 watch.wait(self._ending.event, LOOK_ANYWAY_S)
 
     def _claim(
@@ -243,7 +255,7 @@ class Worker:
                 work()
             except StorageError as error:
                 _log.error("the worker cannot begin", why=str(error))
-                self._ending.event.wait(RETRY_S)
+                self._ending.event.wait(self._clock.wall_s(RETRY_S))
             else:
                 return
 

@@ -1,14 +1,14 @@
-"""The vehicle's time: every time-out of either side is in seconds of it."""
+"""Time as whoever waits is given it: of a vehicle, whose simulation may run faster than life, or of this computer."""
 
 import math
 import time
-from typing import Protocol
+from typing import Final, Protocol
 
 from app.core.errors import InputError, Problem
 
 
 class Clock(Protocol):
-    """Seconds of vehicle time, which need not be those on the wall: a simulation may run faster."""
+    """Seconds that need not be those on the wall: every wait and every time-out is in seconds of one of these."""
 
     def now_s(self) -> float:
         """Monotonic seconds from an arbitrary origin."""
@@ -45,3 +45,7 @@ class ScaledClock:
 
     def wall_s(self, seconds: float) -> float:
         return seconds / self._speed
+
+
+REAL_TIME: Final = ScaledClock()
+"""This computer's own."""

@@ -8,7 +8,6 @@ import datetime as dt
 import os
 import select
 import signal
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import fields
@@ -86,7 +85,7 @@ def work(pipe: Connection, call: Call) -> None:
         signal.signal(number, signal.SIG_IGN)
     line = Line(pipe)
     try:
-        with in_control(call.lock, within_s=CONTROL_WITHIN_S, wanted=line.is_open):
+        with in_control(call.lock, within_s=CONTROL_WITHIN_S, wanted=line.is_open, clock=call.clock):
             seat = Seat(line, call)
             try:
                 seat.work()
@@ -143,7 +142,7 @@ class Seat:
                     raise
             for _ in range(round(LOOK_AGAIN_S / LOOK_EVERY_S)):
                 self._line.hear()
-                time.sleep(LOOK_EVERY_S)
+                self._call.clock.wait_s(LOOK_EVERY_S)
 
     def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
         connect = get_kind(self._call.kind).connect
@@ -175,7 +174,7 @@ class Seat:
         self._line.say(Obeyed(ordered.order, ordered.reason, problem))
 
     def _show(self) -> None:
-        now_s = time.monotonic()
+        now_s = self._call.clock.now_s()
         if now_s >= self._show_due_s:
             self._show_due_s = max(self._show_due_s + SHOW_EVERY_S, now_s)
             self._line.show(self._status())
@@ -277,7 +276,7 @@ class Seat:
 
     def _take_off(self, orders: Orders) -> FlightRecord:
         experiment = get_experiment(orders.experiment)
-        monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, self._publish)
+        monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, self._publish, self._call.clock)
         monitor.phase("flying")
         record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=self._should_stop)
         monitor.flush()

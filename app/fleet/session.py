@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
 
+from app.core.clock import REAL_TIME, Clock
 from app.fleet.states import ActKind
 from app.live.messages import FlightPhase, Order, Telemetry, VehicleStatus
 from app.processes import process_context
@@ -39,6 +40,7 @@ class Call:
     identity: Identity | None
     lock: Path
     patient: bool = False
+    clock: Clock = REAL_TIME
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

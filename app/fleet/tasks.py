@@ -7,7 +7,6 @@ afterwards.
 
 import datetime as dt
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -19,6 +18,7 @@ from typing import Final
 import structlog
 from sqlalchemy.orm import Session as Transaction
 
+from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.db.session import Database
 from app.errors import ConflictError, StorageError
@@ -69,6 +69,7 @@ class SessionDeck:
         worker: str,
         closing: threading.Event,
         real: bool = True,
+        clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
         self._data_dir = data_dir
@@ -77,6 +78,7 @@ class SessionDeck:
         self._worker = worker
         self._closing = closing
         self._real = real
+        self._clock = clock
         self._berths: dict[int, Berth] = {}
         self._look_due_s = 0.0
         self._seekers = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="link")
@@ -162,7 +164,7 @@ class SessionDeck:
 
     def _take(self, berth: Berth) -> None:
         """The berth for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
-        while not berth.busy.acquire(timeout=GIVES_WAY_S):
+        while not berth.busy.acquire(timeout=self._clock.wall_s(GIVES_WAY_S)):
             if (seeking := berth.seeking) is not None:
                 seeking.hang_up()
 
@@ -192,9 +194,9 @@ class SessionDeck:
         for vehicle_id, berth in tuple(self._berths.items()):
             if (session := berth.session) is not None and not session.alive:
                 self._let_go(vehicle_id, berth, session)
-        if time.monotonic() < self._look_due_s:
+        if self._clock.now_s() < self._look_due_s:
             return
-        self._look_due_s = time.monotonic() + LOOK_FOR_LINKS_EVERY_S
+        self._look_due_s = self._clock.now_s() + LOOK_FOR_LINKS_EVERY_S
         with self._database.read() as transaction:
             wanted = acts.wanted_links(transaction, real=self._real)
         for vehicle in wanted:
@@ -247,6 +249,7 @@ class SessionDeck:
             identity=vehicle.identity,
             lock=self._data_dir / f"vehicle-{vehicle_id}.lock",
             patient=patient,
+            clock=self._clock,
         )
         session = berth.seeking = Session(call, work, hear=partial(self._heard, berth, vehicle_id))
         try:
@@ -299,7 +302,7 @@ class SessionDeck:
                     work(transaction)
             except StorageError as error:
                 _log.error("what became of a vehicle is not stored yet", why=str(error))
-                if self._closing.wait(RETRY_S):
+                if self._closing.wait(self._clock.wall_s(RETRY_S)):
                     return
             except GainlineError as error:
                 _log.error("what became of a vehicle does not fit the books", why=str(error))

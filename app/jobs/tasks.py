@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
-from time import monotonic
 from typing import Final
 
 import structlog
 from sqlalchemy.orm import Session
 
+from app.core.clock import REAL_TIME, Clock
 from app.db.session import Database
 from app.errors import GainlineError, StorageError
 from app.jobs import service as jobs
@@ -51,6 +51,7 @@ class Desk:
         room: int,
         worker: str,
         lease_s: float,
+        clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
         self._kind = kind
@@ -58,6 +59,7 @@ class Desk:
         self._room = room
         self._worker = worker
         self._lease_s = lease_s
+        self._clock = clock
         self._at_work: set[int] = set()
         self._beat_due_s = 0.0
 
@@ -82,9 +84,9 @@ class Desk:
     def heartbeat(self) -> None:
         """When it is time, extend the leases of the jobs at work; those given up (their result found no room on the
         disk) wait again once their lease is over. Raises StorageError."""
-        if monotonic() < self._beat_due_s:
+        if self._clock.now_s() < self._beat_due_s:
             return
-        self._beat_due_s = monotonic() + self._lease_s / BEATS_PER_LEASE
+        self._beat_due_s = self._clock.now_s() + self._lease_s / BEATS_PER_LEASE
         with self._database.write() as session:
             for job_id in tuple(self._at_work):
                 jobs.heartbeat_job(session, job_id, worker=self._worker, lease_s=self._lease_s)
@@ -93,12 +95,12 @@ class Desk:
     def carry_out(self, job: Claimed) -> None:
         """The whole job, from the stored order to the stored result. Raises nothing."""
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
-            began_s = monotonic()
+            began_s = self._clock.now_s()
             ordered = ", ".join(f"{name}: {value}" for name, value in job.order.items())
             _log.info("job begun", worker=self._worker, order=ordered or None)
             try:
                 self._perform(job)
-                _log.info("the worker is done with the job", seconds=round(monotonic() - began_s, 3))
+                _log.info("the worker is done with the job", seconds=round(self._clock.now_s() - began_s, 3))
             except CancelledError:
                 _log.info("job dropped, because the worker ends; it runs again with the next one")
             except StorageError as error:

@@ -142,7 +142,7 @@ def _work(pipe: Connection) -> None:
 def _fly(pipe: Connection, orders: Orders) -> None:
     try:
         with (
-            in_control(orders.lock, within_s=CONTROL_WITHIN_S),
+            in_control(orders.lock, within_s=CONTROL_WITHIN_S, clock=orders.flight.clock),
             open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
         ):
             pipe.send(Staged(vehicle.stage(orders.gains)))
@@ -161,7 +161,8 @@ def _fly(pipe: Connection, orders: Orders) -> None:
 
 
 def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle, standing_down: str | None) -> FlightRecord:
-    monitor = Monitor(orders.campaign_id, orders.trial_id, get_experiment(orders.experiment), pipe.send)
+    experiment = get_experiment(orders.experiment)
+    monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, pipe.send, orders.flight.clock)
     monitor.phase("flying")
     listener = _listener(pipe, orders.trial_id, standing_down)
     record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=listener)

@@ -6,13 +6,13 @@
 `StandDown` may come at any moment; in place of what is missing comes `Trouble`.
 """
 
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from app.core.clock import REAL_TIME, Clock
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import LockedError, exclusive
 from app.vehicles.base import FlightOrder, FlightRecord, OptionValue
@@ -125,12 +125,14 @@ def mistake(error: Exception) -> Trouble:
 
 
 @contextmanager
-def in_control(lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True) -> Iterator[None]:
+def in_control(
+    lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True, clock: Clock = REAL_TIME
+) -> Iterator[None]:
     """The vehicle is this process's alone; one whose worker was killed may still be landing it, and is waited for while
     that is `wanted`. Raises VehicleError."""
-    deadline_s = time.monotonic() + within_s
+    deadline_s = clock.now_s() + within_s
     try:
-        with exclusive(lock, keep_waiting=lambda: wanted() and time.monotonic() < deadline_s):
+        with exclusive(lock, keep_waiting=lambda: wanted() and clock.now_s() < deadline_s, clock=clock):
             yield
     except LockedError as error:
         raise VehicleError(

@@ -1,11 +1,11 @@
 """What a flight shows of itself while it lasts, and how it is told to end: all in memory, nothing waits."""
 
-import time
 from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
+from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, Phase, Shown, Telemetry
 from app.vehicles.base import Sample
@@ -77,13 +77,16 @@ class Monitor:
     from its full-rate record.
     """
 
-    def __init__(self, campaign_id: int, trial_id: int, experiment: Experiment, publish: Publish) -> None:
+    def __init__(
+        self, campaign_id: int, trial_id: int, experiment: Experiment, publish: Publish, clock: Clock = REAL_TIME
+    ) -> None:
         self._campaign_id = campaign_id
         self._trial_id = trial_id
         self._experiment = experiment
         self._columns: list[str] = []
         self._scored_until_s = float(experiment.grid_s[-1])
         self._publish = publish
+        self._clock = clock
         self._rows: list[list[float]] = []
         self._due_s = 0.0
         self._last: tuple[float, float] | None = None
@@ -99,7 +102,7 @@ class Monitor:
         others = [name for name in sample.channels if name != output]
         self._columns = ["time_s", output, *others]
         self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
-        now_s = time.monotonic()
+        now_s = self._clock.now_s()
         if now_s >= self._due_s:
             self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
             self.flush()

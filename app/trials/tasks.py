@@ -5,7 +5,6 @@ nothing waits for the database; a record goes to the spool first, and from there
 """
 
 import threading
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Final
 import structlog
 from sqlalchemy.orm import Session
 
+from app.core.clock import REAL_TIME, Clock
 from app.db.session import Database
 from app.errors import GainlineError, StorageError
 from app.live.messages import FlightPhase, Phase, Telemetry
@@ -76,6 +76,7 @@ class FlightDeck:
         worker: str,
         closing: threading.Event,
         session: Callable[[int], Crew] = _no_session,
+        clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
         self._data_dir = data_dir
@@ -85,6 +86,7 @@ class FlightDeck:
         self._publish = publish
         self._worker = worker
         self._closing = closing
+        self._clock = clock
         self._hangar = Hangar()
 
     def close(self) -> None:
@@ -194,8 +196,8 @@ class FlightDeck:
         if task.mode == "fly":
             return flag.reason
         self._phase(task, "staged")
-        until_s = time.monotonic() + STAGED_FOR_S
-        while time.monotonic() < until_s:
+        until_s = self._clock.now_s() + STAGED_FOR_S
+        while self._clock.now_s() < until_s:
             if flag.reason is not None:
                 return flag.reason
             if not crew.alive:
@@ -208,8 +210,8 @@ class FlightDeck:
                         return None
             except StorageError as error:
                 _log.error("the operator's word cannot be read", why=str(error))
-                time.sleep(RETRY_S)
-            time.sleep(LOOK_EVERY_S)
+                self._clock.wait_s(RETRY_S)
+            self._clock.wait_s(LOOK_EVERY_S)
         return f"nobody asked for its take-off within {STAGED_FOR_S / 60:g} minutes"
 
     def _orders(self, task: FlightTask) -> Orders:
@@ -221,7 +223,7 @@ class FlightDeck:
             vehicle_options=task.vehicle_options,
             safe_gains=task.safe_gains,
             gains=task.gains,
-            flight=FlightOrder(seed=task.seed, speed=task.speed),
+            flight=FlightOrder(seed=task.seed, speed=task.speed, clock=self._clock),
             lock=self._data_dir / f"vehicle-{task.vehicle_kind}.lock",
             tlog=telemetry_log(self._data_dir, task.flight_id),
         )
@@ -259,7 +261,7 @@ class FlightDeck:
             except StorageError as error:
                 _log.error("outcome not stored yet", why=str(error))
                 self._phase(task, "landed", f"The outcome is kept, but not stored yet: {error}")
-                if self._closing.wait(RETRY_S):
+                if self._closing.wait(self._clock.wall_s(RETRY_S)):
                     return False
             else:
                 return True

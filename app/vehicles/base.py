@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
+from app.core.clock import REAL_TIME, Clock
 from app.core.policy import Gains
 from app.core.trajectory import Trajectory
 
@@ -42,12 +43,13 @@ class FlightOrder:
     """What one flight is to do.
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
-    over wall time (10.0: ten times as fast as life); None runs as fast as possible. Vehicles that own no time ignore
-    it.
+    over that of the `clock` (10.0: ten times as fast as life); None runs as fast as possible. Vehicles that own no
+    time ignore both.
     """
 
     seed: int
     speed: float | None = None
+    clock: Clock = REAL_TIME
 
 
 @dataclass(frozen=True, slots=True)

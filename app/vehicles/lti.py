@@ -80,7 +80,7 @@ class LinearAircraft:
         tracking, noise = _Leg(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
         try:
             detail = _flown(noise, tracking)
-            told, stop = _tell(detail, Pacer(order.speed), on_sample, should_stop)
+            told, stop = _tell(detail, Pacer(order.speed, order.clock), on_sample, should_stop)
         finally:
             self._restore()
         if stop is not None:

@@ -1,9 +1,9 @@
 """Simulated time held back to the speed of life, or a multiple of it."""
 
 import math
-import time
 from typing import Final
 
+from app.core.clock import REAL_TIME, Clock
 from app.core.errors import InputError, Problem
 from app.vehicles.base import ShouldStop, Stop
 
@@ -12,12 +12,12 @@ LISTEN_EVERY_S: Final = 0.02
 
 
 class Pacer:
-    """Lets vehicle time pass `speed` times as fast as wall time, never faster; None does not hold it back at all.
+    """Lets vehicle time pass `speed` times as fast as the clock's, never faster; None does not hold it back at all.
 
     Time is counted from the start: a computation that fell behind catches up.
     """
 
-    def __init__(self, speed: float | None) -> None:
+    def __init__(self, speed: float | None, clock: Clock = REAL_TIME) -> None:
         """Raises InputError unless `speed` is a positive finite number or None."""
         if speed is not None and not (math.isfinite(speed) and speed > 0.0):
             raise InputError(
@@ -26,17 +26,18 @@ class Pacer:
                 hint="Give simulated time over wall time, such as 10; nothing means as fast as possible.",
             )
         self._speed = speed
-        self._start_s = time.monotonic()
+        self._clock = clock
+        self._start_s = clock.now_s()
 
     def wait_until(self, vehicle_time_s: float, should_stop: ShouldStop) -> Stop | None:
         """Return None once `vehicle_time_s` seconds of the flight may have passed, or at once what ends it early.
 
-        `should_stop` is asked at least once, every 20 ms of wall time, and last when the time has come.
+        `should_stop` is asked at least once, every 20 ms of the clock, and last when the time has come.
         """
         while True:
             early_s = self._early_s(vehicle_time_s)
             if early_s > 0.0:
-                time.sleep(min(early_s, LISTEN_EVERY_S))
+                self._clock.wait_s(min(early_s, LISTEN_EVERY_S))
             if (stop := should_stop()) is not None:
                 return stop
             if early_s <= LISTEN_EVERY_S:
@@ -45,4 +46,4 @@ class Pacer:
     def _early_s(self, vehicle_time_s: float) -> float:
         if self._speed is None:
             return 0.0
-        return self._start_s + vehicle_time_s / self._speed - time.monotonic()
+        return self._start_s + vehicle_time_s / self._speed - self._clock.now_s()

@@ -90,7 +90,7 @@ class SimulatedVehicle:
         try:
             simulation = self._launch(order)
             rows: list[Rows] = []
-            stop = self._take_off(simulation, rows, Pacer(order.speed), on_sample, should_stop)
+            stop = self._take_off(simulation, rows, Pacer(order.speed, order.clock), on_sample, should_stop)
             self._restore()
             if stop is not None:
                 rows.extend(self._land(simulation, rows[-1]) if rows else [self._stay(simulation)])

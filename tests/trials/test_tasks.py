@@ -20,6 +20,7 @@ from app.trials.flying import Airspace
 from app.trials.states import FlightState, TrialState
 from app.trials.tasks import FlightDeck
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
+from tests.clocks import SimulatedClock
 from tests.conftest import Listen
 from tests.trials.states import make_vehicle_real
 
@@ -34,7 +35,13 @@ class Airfield:
         self.heard: list[Shown] = []
         self.watch: Watch = lambda _said: None
         self.deck = FlightDeck(
-            database, settings.data_dir, self.airspace, self._hear, worker="tests", closing=threading.Event()
+            database,
+            settings.data_dir,
+            self.airspace,
+            self._hear,
+            worker="tests",
+            closing=threading.Event(),
+            clock=SimulatedClock(),
         )
 
     def fly_next(self) -> None:
@@ -265,3 +272,17 @@ def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
     field.deck.recover()
     assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
     assert field.deck._spool.kept() == []
+
+
+def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_gains_back(
+    client: TestClient, database: Database, field: Airfield, trial_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.trials.tasks.LOOK_EVERY_S", 5.0)
+    with database.write() as session:
+        row = session.query(FlightRow).one()
+        row.mode, row.take_off_at = "stage", None
+    field.fly_next()
+    after = get(client, f"/api/trials/{trial_id}")
+    assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
+    assert after["flight"]["problem"] == "nobody asked for its take-off within 10 minutes"
+    assert vehicle_state(client) == "ready"

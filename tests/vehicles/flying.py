@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
@@ -68,10 +69,11 @@ def fly(
     speed: float | None = None,
     on_sample: Callable[[Sample], None] = unwatched,
     should_stop: ShouldStop = never,
+    clock: Clock = REAL_TIME,
 ) -> FlightRecord:
     """With the kind's tuned gains where none are given."""
     vehicle.stage(PROFILES[vehicle.kind].tuned if gains is None else gains)
-    return vehicle.fly(FlightOrder(seed=seed, speed=speed), on_sample=on_sample, should_stop=should_stop)
+    return vehicle.fly(FlightOrder(seed=seed, speed=speed, clock=clock), on_sample=on_sample, should_stop=should_stop)
 
 
 def flown(

@@ -110,12 +110,11 @@ def test_a_burst_is_read_to_its_last_datagram(vehicle: socket.socket) -> None:
 
 def test_a_reader_that_waits_is_woken_by_another_thread() -> None:
     with closing(open_transport(UdpInAddress(LOOPBACK, free_port()))) as transport:
-        start_s = time.monotonic()
-        waker = threading.Timer(0.05, transport.wake)
-        waker.start()
-        assert transport.read(60.0) == []
-        assert time.monotonic() - start_s < SOON_S
-        waker.join()
+        reader = threading.Thread(target=transport.read, args=(3600.0,))
+        reader.start()
+        transport.wake()
+        reader.join(SOON_S)
+        assert not reader.is_alive()
 
 
 # ---- TCP
@@ -157,10 +156,8 @@ def test_writing_never_waits_for_a_peer_that_does_not_read() -> None:
         peer, _ = server.accept()
         taken = bytearray()
         with peer:
-            start_s = time.monotonic()
             while transport.write(block := b"%08d" % len(taken) * 64):
                 taken += block
-            assert time.monotonic() - start_s < SOON_S
             assert len(taken) > BACKLOG
             arrived = bytearray()
             peer.settimeout(SOON_S)

@@ -1,7 +1,6 @@
 """The loop around a simulated drone: links, clocks, and ground stations that send rubbish."""
 
 import math
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from itertools import pairwise
@@ -16,6 +15,7 @@ from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.simdrone.autopilots.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, new_body, throttle_command
 from app.vehicles.simdrone.server import LARGEST_LAG_S
+from tests.clocks import ClockByHand
 from tests.vehicles.simdrone.ground import (
     Ground,
     UdpWire,
@@ -77,22 +77,6 @@ def test_nothing_that_a_ground_station_can_say_ends_it(autopilot: str) -> None:
         for _ in range(10):
             answers += len(drone.tick())
     assert answers > 300
-
-
-class ClockByHand:
-    """Stands where the test has put it; whoever waits looks again soon."""
-
-    def __init__(self) -> None:
-        self.time_s = 0.0
-
-    def now_s(self) -> float:
-        return self.time_s
-
-    def wait_s(self, seconds: float) -> None:
-        time.sleep(self.wall_s(seconds))
-
-    def wall_s(self, seconds: float) -> float:
-        return min(seconds, 0.001)
 
 
 def test_its_time_follows_the_clock_and_never_overtakes_it() -> None:
