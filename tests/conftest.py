@@ -49,7 +49,8 @@ def settings(shared_application: FastAPI, migrated_file: Path) -> Iterator[Setti
     shutil.copyfile(migrated_file, chosen.database_file)
     yield chosen
     shared_application.state.database.close()
-    shutil.rmtree(chosen.data_dir)
+    for folder in (chosen.data_dir, chosen.ui_dir):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @pytest.fixture

@@ -141,6 +141,7 @@ def test_results_are_read_again_and_a_line_cut_off_is_dropped(tmp_path: Path) ->
     assert file.read_text().count("\n") == 1
 
 
+@pytest.mark.complete
 def test_what_is_missing_is_made_in_processes_and_reported(tmp_path: Path) -> None:
     results = Results(tmp_path / "results.jsonl")
     vehicle = population(TASK.population, 1, TASK.seed)[0]

@@ -108,11 +108,16 @@ def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> Non
     campaign_id = first.campaign()
     worker = first.worker_pid()
     trial_id = in_the_air(first, campaign_id, speed=3.0)
+    crew = children(worker)
+    for pid in crew:
+        os.kill(pid, signal.SIGSTOP)  # the flight now takes as long as a server takes to start
     os.kill(first.process.pid, signal.SIGKILL)
     assert first.stop() == -signal.SIGKILL
     with Serving(tmp_path / "data") as second:
         assert is_alive(worker), "it finishes its flight"
         assert second.worker_pid() == worker, "and is heard by the new web process meanwhile"
+        for pid in crew:
+            os.kill(pid, signal.SIGCONT)
         flown = second.trial(trial_id, "valid")
         assert flown["record"]["duration_s"] > 32.6
         wait_for("the old worker's end", lambda: not is_alive(worker))

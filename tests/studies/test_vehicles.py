@@ -89,6 +89,7 @@ def test_the_twins_own_optimum_is_at_least_as_good_as_the_reference_measurement(
     TAKEOFF.space.check(optimum.gains)
 
 
+@pytest.mark.complete
 def test_a_search_in_jsbsim_ends_below_the_known_good_gains() -> None:
     optimum = own_optimum(FURTHER[9])
     assert optimum.error < noise_free_error(FURTHER[9], TUNED) < noise_free_error(FURTHER[9], SAFE)

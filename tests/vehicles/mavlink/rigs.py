@@ -10,10 +10,14 @@ import struct
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
+import pytest
+
 from app.core.policy import Gains
+from app.vehicles import open as open_module
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import Message, text
@@ -122,6 +126,11 @@ class LockstepRig(Lockstep, _Heard):
                 whom = {"target_system": 1, "target_component": 0}
                 link.send("PARAM_SET", **whom, param_id=name, param_type=kind, param_value=whole)
             self.wait_s(TICK_S)
+
+    def take_the_place_of_every_vehicle(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Whoever opens a vehicle over MAVLink is given this one, with the options asked for."""
+        kind = replace(MAVLINK, open=lambda options, safe_gains: self.vehicle(safe_gains, **options))
+        monkeypatch.setattr(open_module, "VEHICLE_KINDS", {**open_module.VEHICLE_KINDS, kind.name: kind})
 
     def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
         safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
