@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Locator, Page, ViewportSize, expect
 
+from app.figures.theme import PALETTES
+
 T = TypeVar("T")
 Theme = Literal["light", "dark"]
 Viewport = ViewportSize
@@ -26,6 +28,38 @@ gd => gd.data.map(trace => ({
   dash: trace.line?.dash, width: trace.line?.width, bar: trace.error_y?.value, bars: trace.error_y?.array,
 }))
 """
+
+_SETTLED: Final = """async ink => {
+  const frame = () => new Promise(requestAnimationFrame);
+  const all = (what, within = document) => Array.from(within.querySelectorAll(what));
+  const isDrawn = plot => plot.dataset.drawn && (!ink || !plot.layout || plot.layout.font.color === ink);
+  const waiting = () => [...all("[aria-busy=true]"), ...all("[role=group] > div:last-child").filter(one => !isDrawn(one))];
+  const places = () => all("main, main section, .js-plotly-plot").map(one => {
+    const {x, y, width, height} = one.getBoundingClientRect();
+    return [x, y, width, height].map(Math.round);
+  }).join(";");
+  const isMoving = () => document.getAnimations().some(
+    one => one.playState === "running" && one.effect?.getComputedTiming().endTime < Infinity);
+  await document.fonts.ready;
+  window.seenInTest ??= new WeakSet();
+  for (const section of all("main section").filter(one => !window.seenInTest.has(one))) {
+    window.seenInTest.add(section);
+    section.scrollIntoView();
+    await frame();
+    await frame();
+  }
+  for (let same = 0, last = ""; same < 3;) {
+    await frame();
+    const late = waiting();
+    late[0]?.scrollIntoView();
+    const now = places();
+    same = late.length === 0 && now === last && !isMoving() ? same + 1 : 0;
+    last = now;
+  }
+  scrollTo(0, 0);
+  await frame();
+}"""
+"""Until everything is fetched and drawn, in view or not, and nothing has moved for three frames."""
 
 
 def printed(value: float, uncertainty: float, unit: str = "m") -> str:
@@ -100,6 +134,11 @@ class Dashboard:
     def live_points(self) -> int:
         live = self.trace("takeoffs", "live")
         return 0 if live is None else len(live["x"])
+
+    def settled(self, theme: Theme | None = None) -> None:
+        """Wait until nothing is being fetched or drawn any more, what is drawn once it is seen included, the charts in
+        that theme's colours, and nothing moves."""
+        self.page.evaluate(_SETTLED, None if theme is None else PALETTES[theme].ink)
 
     # ---- the API's own word
 

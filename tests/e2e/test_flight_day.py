@@ -23,7 +23,7 @@ from tests.e2e.flying_by_hand import (
     take_control,
     word,
 )
-from tests.e2e.test_pages import ROOT, SCREENSHOTS, when_drawn
+from tests.e2e.test_pages import ROOT, SCREENSHOTS
 from tests.runtime.drones import SAFE, Drone
 
 PICTURES: Final = ROOT / "docs" / "images" / "day" if os.environ.get("GAINLINE_README_IMAGE") else SCREENSHOTS / "day"
@@ -322,7 +322,7 @@ def see_the_list(dashboard: Dashboard, campaign_id: int) -> None:
 def picture(dashboard: Dashboard, name: str, *, at_rest: bool = True) -> None:
     """What the tablet shows now."""
     if at_rest:
-        when_drawn(dashboard)
+        dashboard.settled()
     keep(dashboard.page, name)
 
 
