@@ -41,6 +41,7 @@ _SETTLED: Final = """async ink => {
   const isMoving = () => document.getAnimations().some(
     one => one.playState === "running" && one.effect?.getComputedTiming().endTime < Infinity);
   await document.fonts.ready;
+  const [x, y] = [scrollX, scrollY];
   window.seenInTest ??= new WeakSet();
   for (const section of all("main section").filter(one => !window.seenInTest.has(one))) {
     window.seenInTest.add(section);
@@ -56,7 +57,7 @@ _SETTLED: Final = """async ink => {
     same = late.length === 0 && now === last && !isMoving() ? same + 1 : 0;
     last = now;
   }
-  scrollTo(0, 0);
+  scrollTo(x, y);
   await frame();
 }"""
 """Until everything is fetched and drawn, in view or not, and nothing has moved for three frames."""

@@ -323,6 +323,7 @@ def picture(dashboard: Dashboard, name: str, *, at_rest: bool = True) -> None:
     """What the tablet shows now."""
     if at_rest:
         dashboard.settled()
+        dashboard.page.evaluate("scrollTo(0, 0)")
     keep(dashboard.page, name)
 
 
