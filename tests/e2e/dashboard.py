@@ -33,7 +33,8 @@ _SETTLED: Final = """async ink => {
   const frame = () => new Promise(requestAnimationFrame);
   const all = (what, within = document) => Array.from(within.querySelectorAll(what));
   const isDrawn = plot => plot.dataset.drawn && (!ink || !plot.layout || plot.layout.font.color === ink);
-  const waiting = () => [...all("[aria-busy=true]"), ...all("[role=group] > div:last-child").filter(one => !isDrawn(one))];
+  const undrawn = () => all("[role=group] > div:last-child").filter(one => !isDrawn(one));
+  const waiting = () => [...all("[aria-busy=true]"), ...undrawn()];
   const places = () => all("main, main section, .js-plotly-plot").map(one => {
     const {x, y, width, height} = one.getBoundingClientRect();
     return [x, y, width, height].map(Math.round);
@@ -176,31 +177,8 @@ class Dashboard:
             self.post(f"/campaigns/{campaign_id}/trials", {"proposal_id": proposal["id"], "fly": {"speed": None}})
             self.until(partial(self._classed, campaign_id, number))
 
-    def rehearse(self, campaign_id: int) -> None:
-        """Fly the campaign on its simulation, over the API, until its rehearsal is over: it has passed."""
-        rehearsal = self.post(f"/campaigns/{campaign_id}/rehearsal")["id"]
-        self.until(lambda: self._flown_on(campaign_id, rehearsal), within_s=180.0)
-        assert self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "passed"
-
-    def _flown_on(self, campaign_id: int, rehearsal: int) -> bool:
-        """Whether the rehearsal is over; else its next flight is asked for as soon as that is possible."""
-        if self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] != "under way":
-            return True
-        is_idle = "plan" in self.get(f"/campaigns/{rehearsal}")["actions"]
-        following = self.get(f"/campaigns/{rehearsal}/proposal")
-        if is_idle and following["state"] == "ready":
-            order = {"proposal_id": following["proposal"]["id"], "fly": {"speed": None}}
-            asked = self.page.request.post(f"{self.url}/api/campaigns/{rehearsal}/trials", data=order)
-            assert asked.ok or asked.status == 409, asked.text()  # it may have come to its stop meanwhile
-        return False
-
     def _classed(self, campaign_id: int, number: int) -> bool:
         return any(trial["number"] == number and trial["state"] == "valid" for trial in self.trials(campaign_id))
-
-    def reproduce(self, name: str) -> None:
-        """Run a reproduction over the API, to its end."""
-        self.post(f"/reproductions/{name}/run")
-        self.until(lambda: bool(self.get(f"/reproductions/{name}")["rows"]))
 
     def fly_headless_body(self, campaign_id: int, body: Json) -> Json:
         """Fly gains or a variant at full speed, over the API; the trial as it then is."""

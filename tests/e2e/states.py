@@ -1,8 +1,8 @@
 """States of a server's data for its pages, written straight into its database by the program's own services.
 
-The rows are those that the program itself would write: gains are proposed by the strategy, judged by the gate, and flown
-by the simulated vehicle. Every flight is one transaction together with the proposal that follows it, so that the worker
-of a running server finds nothing to do; browsers are told of it as of any other change.
+The rows are those that the program itself would write: gains are proposed by the strategy, judged by the gate, and
+flown by the simulated vehicle. Every flight is one transaction together with the proposal that follows it, so that the
+worker of a running server finds nothing to do; browsers are told of it as of any other change.
 """
 
 import io
@@ -96,9 +96,7 @@ class States:
 
     def plan(self, campaign_id: int, gains: Mapping[str, float]) -> int:
         """A trial that nobody has flown; its id."""
-        return self._write(
-            lambda session: trials.create_trial(session, campaign_id, NewTrial(gains=dict(gains))).id
-        )
+        return self._write(lambda session: trials.create_trial(session, campaign_id, NewTrial(gains=dict(gains))).id)
 
     def take_record(self, campaign_id: int, csv: Callable[[Mapping[str, float]], bytes]) -> int:
         """The proposed gains, flown elsewhere: `csv` makes the record that these gains leave; the trial's id."""

@@ -44,9 +44,7 @@ def test_the_first_flight_lands_after_three_clicks_at_most_and_the_next_after_tw
     assert 1 <= clicks(page) - first <= 2
 
 
-def test_the_wizard_creates_the_simulated_takeoff_with_one_click(
-    open_dashboard: Opener, shared_server: Server
-) -> None:
+def test_the_wizard_creates_the_simulated_takeoff_with_one_click(open_dashboard: Opener, shared_server: Server) -> None:
     dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.page.add_init_script(_COUNT)
     dashboard.open("/new")

@@ -49,9 +49,7 @@ def test_the_live_curve_grows_while_it_flies_and_the_button_aborts_at_once(
     assert trial["record"]["duration_s"] < 30
 
 
-def test_what_is_drawn_live_is_what_was_measured_and_becomes_the_record(
-    dashboard: Dashboard, campaign_id: int
-) -> None:
+def test_what_is_drawn_live_is_what_was_measured_and_becomes_the_record(dashboard: Dashboard, campaign_id: int) -> None:
     dashboard.fly()
     wait_for_live(dashboard, 200)
     live = dashboard.trace("takeoffs", "live")

@@ -30,7 +30,9 @@ def test_a_telemetry_log_is_handed_in_and_scored_with_its_own_gains(dashboard: D
     assert trial["read_back"] == {"kp": 283, "ki": 13, "kd": 82}
 
 
-def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_confirmed(dashboard: Dashboard, states: States) -> None:
+def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_confirmed(
+    dashboard: Dashboard, states: States
+) -> None:
     campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
     hand_in(dashboard, ("both.tlog", recorded(DEFAULT) + recorded(TUNED)))

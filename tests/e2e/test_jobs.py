@@ -86,7 +86,8 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
 def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, empty_server: Server) -> None:
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
-    dashboard.reproduce("controller")
+    dashboard.post("/reproductions/controller/run")
+    dashboard.until(lambda: bool(dashboard.get("/reproductions/controller")["rows"]))
     dashboard.open("/jobs")
     filters = page.get_by_role("radiogroup", name="Jobs shown")
     expect(page.get_by_role("list", name="Jobs that are over").get_by_role("listitem").first).to_be_visible()

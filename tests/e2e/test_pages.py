@@ -12,7 +12,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import FloatRect, Page, expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Theme, Viewport
+from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Theme
 from tests.e2e.states import States
 
 ROOT = Path(__file__).parents[2]

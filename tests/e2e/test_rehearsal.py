@@ -5,9 +5,8 @@ from typing import Final
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, Dashboard
+from tests.e2e.dashboard import PHONE
 from tests.e2e.states import States
-
 
 REAL: Final = {
     "options": {"address": "udp:127.0.0.1:14987@14986"},

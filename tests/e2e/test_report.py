@@ -96,9 +96,7 @@ def test_the_file_draws_its_charts_with_no_network_and_can_be_read_by_everybody(
     page.screenshot(path=SCREENSHOTS / f"report-{viewport['width']}-light.png", full_page=True)
 
 
-def test_the_file_draws_what_the_page_draws(
-    reader: Reader, dashboard: Dashboard, campaign_id: int
-) -> None:
+def test_the_file_draws_what_the_page_draws(reader: Reader, dashboard: Dashboard, campaign_id: int) -> None:
     page = reader.open(TABLET)
     for chart in CHARTS:
         card = dashboard.get(f"/campaigns/{campaign_id}/figures/{chart}?stacked=true")

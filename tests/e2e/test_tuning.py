@@ -14,7 +14,9 @@ WRAPPING = {"kp": 283, "ki": 1356, "kd": 82}
 """The paper's Table 2: ki·(sum of errors) can wrap at 32 bits."""
 
 
-def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(dashboard: Dashboard, states: States) -> None:
+def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(
+    dashboard: Dashboard, states: States
+) -> None:
     campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
     dashboard.open_campaign(campaign_id)
     curve, lower, upper = (dashboard.trace("takeoffs", *what[:1], **what[1]) for what in (
@@ -48,7 +50,9 @@ def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard,
     expect(dashboard.page.get_by_text("Of ten flights, nine should end inside it")).to_be_visible()
 
 
-def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(dashboard: Dashboard, states: States) -> None:
+def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(
+    dashboard: Dashboard, states: States
+) -> None:
     campaign_id = states.campaign(strategy="gradient", seed=3, stop=PATIENT, flights=2)
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("Max")
@@ -117,7 +121,9 @@ def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_w
     expect(verdict).to_contain_text("the paper flew these gains")
 
 
-def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(dashboard: Dashboard, states: States) -> None:
+def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(
+    dashboard: Dashboard, states: States
+) -> None:
     time_s = np.arange(0.0, 33.0, 0.02)
     altitude_m = 3.0 * (1.0 - np.exp(-time_s))
     altitude_m[500:505] += 1.5

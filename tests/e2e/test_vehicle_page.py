@@ -32,9 +32,7 @@ def worn(states: States) -> int:
 def sagging(states: States) -> int:
     """A campaign on a simulation whose battery sags, with two flights."""
     budget = {"kind": "budget", "max_flights": 4}
-    return states.campaign(
-        name="Sagging", options={"battery_sag": 0.08}, strategy="calibrated", stop=budget, flights=2
-    )
+    return states.campaign(name="Sagging", options={"battery_sag": 0.08}, strategy="calibrated", stop=budget, flights=2)
 
 
 def take_records(states: States, flights: int, model: Sequence[float]) -> int:
@@ -96,9 +94,7 @@ def test_the_chart_of_the_batteries_has_the_voltages_of_the_flights(
     assert all(one["battery_v_after"] < one["battery_v_before"] for one in flights)
 
 
-def test_a_flight_elsewhere_is_drawn_while_the_page_is_open(
-    dashboard: Dashboard, states: States, sagging: int
-) -> None:
+def test_a_flight_elsewhere_is_drawn_while_the_page_is_open(dashboard: Dashboard, states: States, sagging: int) -> None:
     dashboard.open(f"/vehicles/{states.vehicle_of(sagging)}")
     expect(dashboard.plot(BATTERIES)).to_be_visible()
     flown = dashboard.get(f"/trials/{states.fly(sagging)[0]}")["number"]
