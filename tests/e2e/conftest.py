@@ -10,15 +10,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from typing import TypeVar
 from urllib.parse import urlsplit
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Error, Page, expect, sync_playwright
 
 from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport
+from tests.e2e.states import States
 from tests.runtime.processes import wait_for
 
 HERE = Path(__file__).parent
@@ -32,12 +34,59 @@ ENDS_WITHIN_S = 90
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 
+EVERYDAY = {
+    "test_flight_day.py::test_a_day_from_the_wizard_to_the_report",
+    "test_pages.py::test_the_ui_stays_light_before_its_charts",
+}
+"""What `./dev test` runs of the browser tests; all others belong to the complete ring."""
+T = TypeVar("T")
+
+
+class Started:
+    """What browser tests share: begun when the first of them asks for it, ended when this process goes on to a test of
+    another kind. Playwright's event loop, while it runs, would be in the way of other tests' asyncio.run."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._begun: dict[str, object] = {}
+
+    def get(self, name: str, kind: type[T], begin: Callable[[], AbstractContextManager[T]]) -> T:
+        if name not in self._begun:
+            self._begun[name] = self._stack.enter_context(begin())
+        found = self._begun[name]
+        assert isinstance(found, kind)
+        return found
+
+    def begun(self, name: str, kind: type[T]) -> T | None:
+        found = self._begun.get(name)
+        return found if isinstance(found, kind) else None
+
+    def end(self) -> None:
+        self._begun.clear()
+        self._stack.close()
+
+
+STARTED = Started()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if HERE in item.path.parents:
             item.add_marker(pytest.mark.browser)
+            if f"{item.path.name}::{getattr(item, 'originalname', item.name)}" not in EVERYDAY:
+                item.add_marker(pytest.mark.complete)
             # What a module's tests share takes as long as all its campaigns, and has limits of its own.
             item.add_marker(pytest.mark.timeout(180, func_only=True))
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
+    """After the fixtures of this test."""
+    try:
+        yield
+    finally:
+        if nextitem is None or HERE not in nextitem.path.parents:
+            STARTED.end()
 
 
 @pytest.fixture(scope="session")
@@ -48,27 +97,28 @@ def chromium() -> str:
     return found
 
 
-@pytest.fixture(scope="module")
-def playwright() -> Iterator[Playwright]:
-    """Ended with its module: while it runs, its event loop would be in the way of other tests' asyncio.run."""
+@contextmanager
+def launched(chromium: str) -> Iterator[Browser]:
     expect.set_options(timeout=PATIENCE_MS)
-    with sync_playwright() as running:
-        yield running
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="module")
-def browser(playwright: Playwright, chromium: str) -> Iterator[Browser]:
-    running = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-    yield running
-    running.close()
+def browser(chromium: str) -> Browser:
+    """One for all browser tests of this process."""
+    return STARTED.get("browser", Browser, lambda: launched(chromium))
 
 
 class Server:
     """`gainline serve` in a process of its own."""
 
-    def __init__(self, data_dir: Path, port: int = 0) -> None:
+    def __init__(self, data_dir: Path, port: int = 0, *options: str) -> None:
         self.data_dir = data_dir
         self._port = port
+        self._options = options
         self._process: subprocess.Popen[bytes] | None = None
         self.url = ""
 
@@ -79,14 +129,15 @@ class Server:
         said = self.data_dir.with_suffix(".log")
         with said.open("wb") as log:
             self._process = subprocess.Popen(
-                [gainline, "serve", "--port", str(self._port), "--data-dir", self.data_dir],
+                [gainline, "serve", "--port", str(self._port), "--data-dir", self.data_dir, *self._options],
                 stdout=log, stderr=subprocess.STDOUT)  # fmt: skip
         while (found := re.search(r"http://\S+:\d+", said.read_text())) is None:
             assert self._process.poll() is None, f"the server did not start:\n{said.read_text()}"
             time.sleep(0.05)
         self.url = found.group()
         self._port = urlsplit(self.url).port or 0
-        wait_for("the worker", self._works)  # what is asked for before is withdrawn
+        if "--no-worker" not in self._options:
+            wait_for("the worker", self._works)  # what is asked for before is withdrawn
 
     def _works(self) -> bool:
         return bool(httpx2.get(f"{self.url}/api/health").json()["worker"] == "running")
@@ -109,8 +160,8 @@ class Server:
 
 
 @contextmanager
-def served(data_dir: Path, port: int = 0) -> Iterator[Server]:
-    server = Server(data_dir, port)
+def served(data_dir: Path, port: int = 0, *options: str) -> Iterator[Server]:
+    server = Server(data_dir, port, *options)
     try:
         server.start()
         yield server
@@ -118,16 +169,35 @@ def served(data_dir: Path, port: int = 0) -> Iterator[Server]:
         server.stop()
 
 
-@pytest.fixture(scope="session")
-def shared_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """One server for all tests that do not mind each other's campaigns."""
-    with served(tmp_path_factory.mktemp("shared")) as server:
-        yield server
+@contextmanager
+def written(server: Server) -> Iterator[States]:
+    states = States(server.data_dir)
+    yield states
+    states.close()
+
+
+@pytest.fixture(scope="module")
+def shared_server(tmp_path_factory: pytest.TempPathFactory) -> Server:
+    """One server for all tests of this process that neither stop it nor set it up otherwise."""
+    return STARTED.get("server", Server, lambda: served(tmp_path_factory.mktemp("shared") / "data"))
+
+
+@pytest.fixture(scope="module")
+def states(shared_server: Server) -> States:
+    """What the shared server's database is to hold."""
+    return STARTED.get("states", States, lambda: written(shared_server))
+
+
+@pytest.fixture
+def empty_server(shared_server: Server, states: States) -> Server:
+    """The shared server as with a new data folder. Not for a module that shares campaigns between its tests."""
+    states.clear()
+    return shared_server
 
 
 @pytest.fixture
 def own_server(tmp_path: Path) -> Iterator[Server]:
-    """A server with an empty database."""
+    """A server that a test may stop."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     with served(tmp_path / "data", port) as server:
@@ -137,25 +207,94 @@ def own_server(tmp_path: Path) -> Iterator[Server]:
 Opener = Callable[..., Dashboard]
 
 
+class Tabs:
+    """The tabs that tests take turns in. One that has shown the program before has it compiled already, and shows it in
+    a third of the time that a new one takes."""
+
+    def __init__(self, browser: Browser) -> None:
+        self._browser = browser
+        self._contexts: dict[str, BrowserContext] = {}
+        self._free: dict[str, list[Page]] = {}
+        self.wrong: list[str] = []
+
+    def take(self, url: str) -> Page:
+        """As new: at no page of the program, nothing in the browser's store."""
+        if url not in self._contexts:
+            self._contexts[url] = new_context(self._browser, url)
+        if free := self._free.setdefault(url, []):
+            return free.pop()
+        page = self._contexts[url].new_page()
+        watch(page, url, self.wrong)
+        return page
+
+    def give_back(self, url: str, page: Page) -> None:
+        """Leave the program, and with it its connections to the server. What was opened beside it is closed, and so is
+        all of it where a test has left it in a state that there is no way back from."""
+        context = self._contexts.get(url)
+        if context is None:
+            return
+        try:
+            page.unroute_all(behavior="ignoreErrors")
+            page.goto("/api/health")
+            page.evaluate("localStorage.clear(); sessionStorage.clear()")
+            page.mouse.move(0, 0)
+            self._free[url].append(page)
+            for other in context.pages:
+                if other.opener() is not None:
+                    other.close()
+        except Error:
+            self._free.pop(url, None)
+            self._contexts.pop(url).close()
+
+
+def new_context(browser: Browser, url: str) -> BrowserContext:
+    return browser.new_context(base_url=url, viewport=TABLET, accept_downloads=True, reduced_motion="reduce")
+
+
+@pytest.fixture(scope="module")
+def tabs(browser: Browser) -> Tabs:
+    return STARTED.get("tabs", Tabs, lambda: nullcontext(Tabs(browser)))
+
+
 @pytest.fixture
-def open_dashboard(browser: Browser) -> Iterator[Opener]:
-    """Opens a dashboard in a browser profile of its own; afterwards nothing must have gone wrong in any of them."""
-    wrong: list[str] = []
+def open_dashboard(browser: Browser, tabs: Tabs) -> Iterator[Opener]:
+    """Opens a dashboard in a tab whose store is empty; afterwards nothing must have gone wrong in any of them.
+
+    With `alone` the tab has a browser profile of its own: for tests that put scripts or a clock of their own into
+    their pages, take the browser's network away, or look at what it fetches. So has one of a server of one's own.
+    """
+    tabs.wrong.clear()
+    taken: list[tuple[str, Page]] = []
     with ExitStack() as stack:
 
-        def open_one(url: str, *, theme: Theme = "light", viewport: Viewport = TABLET) -> Dashboard:
-            context = browser.new_context(base_url=url, color_scheme=theme, viewport=viewport, accept_downloads=True)
+        def own(url: str) -> Page:
+            context = new_context(browser, url)
             stack.callback(context.close)
             page = context.new_page()
+            watch(page, url, tabs.wrong)
+            return page
+
+        def open_one(
+            url: str, *, theme: Theme = "light", viewport: Viewport = TABLET, alone: bool = False
+        ) -> Dashboard:
+            shared = STARTED.begun("server", Server)
+            if alone or shared is None or url != shared.url:
+                page = own(url)
+            else:
+                page = tabs.take(url)
+                taken.append((url, page))
             page.set_default_timeout(PATIENCE_MS)
-            _watch(page, url, wrong)
+            page.emulate_media(color_scheme=theme)
+            page.set_viewport_size(viewport)
             return Dashboard(page, url)
 
         yield open_one
-    assert wrong == []
+    for url, page in taken:
+        tabs.give_back(url, page)
+    assert tabs.wrong == []
 
 
-def _watch(page: Page, url: str, wrong: list[str]) -> None:
+def watch(page: Page, url: str, wrong: list[str]) -> None:
     """Note scripts that failed and requests to any other host."""
     own = urlsplit(url).netloc
     page.on("pageerror", lambda error: wrong.append(f"script error: {error}"))

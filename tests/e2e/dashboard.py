@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Locator, Page, ViewportSize, expect
 
+from app.figures.theme import PALETTES
+
 T = TypeVar("T")
 Theme = Literal["light", "dark"]
 Viewport = ViewportSize
@@ -26,6 +28,40 @@ gd => gd.data.map(trace => ({
   dash: trace.line?.dash, width: trace.line?.width, bar: trace.error_y?.value, bars: trace.error_y?.array,
 }))
 """
+
+_SETTLED: Final = """async ink => {
+  const frame = () => new Promise(requestAnimationFrame);
+  const all = (what, within = document) => Array.from(within.querySelectorAll(what));
+  const isDrawn = plot => plot.dataset.drawn && (!ink || !plot.layout || plot.layout.font.color === ink);
+  const undrawn = () => all("[role=group] > div:last-child").filter(one => !isDrawn(one));
+  const waiting = () => [...all("[aria-busy=true]"), ...undrawn()];
+  const places = () => all("main, main section, .js-plotly-plot").map(one => {
+    const {x, y, width, height} = one.getBoundingClientRect();
+    return [x, y, width, height].map(Math.round);
+  }).join(";");
+  const isMoving = () => document.getAnimations().some(
+    one => one.playState === "running" && one.effect?.getComputedTiming().endTime < Infinity);
+  await document.fonts.ready;
+  const [x, y] = [scrollX, scrollY];
+  window.seenInTest ??= new WeakSet();
+  for (const section of all("main section").filter(one => !window.seenInTest.has(one))) {
+    window.seenInTest.add(section);
+    section.scrollIntoView();
+    await frame();
+    await frame();
+  }
+  for (let same = 0, last = ""; same < 3;) {
+    await frame();
+    const late = waiting();
+    late[0]?.scrollIntoView();
+    const now = places();
+    same = late.length === 0 && now === last && !isMoving() ? same + 1 : 0;
+    last = now;
+  }
+  scrollTo(x, y);
+  await frame();
+}"""
+"""Until everything is fetched and drawn, in view or not, and nothing has moved for three frames."""
 
 
 def printed(value: float, uncertainty: float, unit: str = "m") -> str:
@@ -101,6 +137,11 @@ class Dashboard:
         live = self.trace("takeoffs", "live")
         return 0 if live is None else len(live["x"])
 
+    def settled(self, theme: Theme | None = None) -> None:
+        """Wait until nothing is being fetched or drawn any more, what is drawn once it is seen included, the charts in
+        that theme's colours, and nothing moves."""
+        self.page.evaluate(_SETTLED, None if theme is None else PALETTES[theme].ink)
+
     # ---- the API's own word
 
     def get(self, path: str) -> Any:
@@ -136,31 +177,8 @@ class Dashboard:
             self.post(f"/campaigns/{campaign_id}/trials", {"proposal_id": proposal["id"], "fly": {"speed": None}})
             self.until(partial(self._classed, campaign_id, number))
 
-    def rehearse(self, campaign_id: int) -> None:
-        """Fly the campaign on its simulation, over the API, until its rehearsal is over: it has passed."""
-        rehearsal = self.post(f"/campaigns/{campaign_id}/rehearsal")["id"]
-        self.until(lambda: self._flown_on(campaign_id, rehearsal), within_s=180.0)
-        assert self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] == "passed"
-
-    def _flown_on(self, campaign_id: int, rehearsal: int) -> bool:
-        """Whether the rehearsal is over; else its next flight is asked for as soon as that is possible."""
-        if self.get(f"/campaigns/{campaign_id}")["rehearsal"]["state"] != "under way":
-            return True
-        is_idle = "plan" in self.get(f"/campaigns/{rehearsal}")["actions"]
-        following = self.get(f"/campaigns/{rehearsal}/proposal")
-        if is_idle and following["state"] == "ready":
-            order = {"proposal_id": following["proposal"]["id"], "fly": {"speed": None}}
-            asked = self.page.request.post(f"{self.url}/api/campaigns/{rehearsal}/trials", data=order)
-            assert asked.ok or asked.status == 409, asked.text()  # it may have come to its stop meanwhile
-        return False
-
     def _classed(self, campaign_id: int, number: int) -> bool:
         return any(trial["number"] == number and trial["state"] == "valid" for trial in self.trials(campaign_id))
-
-    def reproduce(self, name: str) -> None:
-        """Run a reproduction over the API, to its end."""
-        self.post(f"/reproductions/{name}/run")
-        self.until(lambda: bool(self.get(f"/reproductions/{name}")["rows"]))
 
     def fly_headless_body(self, campaign_id: int, body: Json) -> Json:
         """Fly gains or a variant at full speed, over the API; the trial as it then is."""

@@ -8,6 +8,7 @@ from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard, printed
+from tests.e2e.states import States
 
 
 def assert_drawn_as_recorded(dashboard: Dashboard, trial: dict[str, object]) -> None:
@@ -20,8 +21,8 @@ def assert_drawn_as_recorded(dashboard: Dashboard, trial: dict[str, object]) -> 
     assert max(drawn["y"]) == pytest.approx(altitude_m.max(), abs=2e-4)
 
 
-def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url)
+def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard: Opener, empty_server: Server) -> None:
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/")
     expect(page.get_by_role("heading", name="Tune a takeoff in a handful of flights")).to_be_visible()
@@ -63,10 +64,8 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     assert [one["meta"]["trial"] for one in emphasised] == [best["number"]]
 
 
-def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", strategy="calibrated")
-    dashboard.fly_headless(campaign_id, 1)
-    dashboard.when_ready(campaign_id)
+def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(strategy="calibrated", flights=1)
     dashboard.open_campaign(campaign_id)
     predicted = dashboard.trace("takeoffs", "prediction")
     assert predicted is not None
@@ -82,8 +81,8 @@ def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard) 
         expect(row).to_contain_text(str(round(change["next"])))
 
 
-def test_a_flight_of_ones_own_gains_goes_through_the_same_checks(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("jsbsim")
+def test_a_flight_of_ones_own_gains_goes_through_the_same_checks(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign("jsbsim")
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("Max")
     dashboard.button("Edit gains").click()
@@ -106,9 +105,8 @@ def standing(dashboard: Dashboard, *, trial: int) -> str | None:
     return None if drawn is None else str(drawn["meta"]["standing"])
 
 
-def test_a_flight_marked_invalid_is_left_out_and_can_be_taken_back(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin")
-    dashboard.fly_headless(campaign_id, 2)
+def test_a_flight_marked_invalid_is_left_out_and_can_be_taken_back(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(flights=2)
     dashboard.open_campaign(campaign_id)
     second = dashboard.trials(campaign_id)[1]
     verdict = dashboard.panel("Flight 2")
@@ -131,12 +129,11 @@ def test_a_flight_marked_invalid_is_left_out_and_can_be_taken_back(dashboard: Da
     assert measured["x"] == [1, 2]
 
 
-def test_a_campaign_flown_elsewhere_takes_records_as_csv(dashboard: Dashboard) -> None:
-    source = dashboard.create("twin", seed=5)
-    dashboard.fly_headless(source, 1)
+def test_a_campaign_flown_elsewhere_takes_records_as_csv(dashboard: Dashboard, states: States) -> None:
+    source = states.campaign(seed=5, flights=1)
     [flown] = dashboard.trials(source)
     record = dashboard.page.request.get(f"{dashboard.url}/api/trials/{flown['id']}/trajectory.csv").body()
-    campaign_id = dashboard.create("import")
+    campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
     expect(dashboard.page.get_by_text("REAL", exact=True).first).to_be_visible()
 
@@ -157,9 +154,8 @@ def test_a_campaign_flown_elsewhere_takes_records_as_csv(dashboard: Dashboard) -
     assert_drawn_as_recorded(dashboard, trial)
 
 
-def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin")
-    dashboard.fly_headless(campaign_id, 1)
+def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(flights=1)
     [trial] = dashboard.trials(campaign_id)
     dashboard.open(f"/campaigns/{campaign_id}/flights/{trial['id']}")
     drawn = dashboard.trace("flight", "flight")
@@ -173,9 +169,8 @@ def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard) -> None:
     assert len(lines) == 1 + trial["record"]["samples"]
 
 
-def test_the_numbers_behind_a_chart_stand_in_a_table(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin")
-    dashboard.fly_headless(campaign_id, 1)
+def test_the_numbers_behind_a_chart_stand_in_a_table(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(flights=1)
     [trial] = dashboard.trials(campaign_id)
     dashboard.open_campaign(campaign_id)
     dashboard.button("Error per flight: show the numbers as a table").click()
@@ -183,11 +178,12 @@ def test_the_numbers_behind_a_chart_stand_in_a_table(dashboard: Dashboard) -> No
     expect(table).to_contain_text(f"{trial['error']:.4f}")
 
 
-def test_the_list_finds_campaigns_by_name_and_vehicle(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url)
-    flown = dashboard.create("twin")
-    dashboard.fly_headless(flown, 2)
-    dashboard.create("jsbsim")
+def test_the_list_finds_campaigns_by_name_and_vehicle(
+    open_dashboard: Opener, empty_server: Server, states: States
+) -> None:
+    dashboard = open_dashboard(empty_server.url)
+    flown = states.campaign(flights=2)
+    states.campaign("jsbsim")
     dashboard.open("/")
     cards = dashboard.page.get_by_role("list", name="Campaigns").get_by_role("listitem")
     expect(cards).to_have_count(2)

@@ -1,14 +1,11 @@
 """The charts of a campaign with a thousand flights: one flight seen everywhere, a zoom that shows more, small pages."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 from playwright.sync_api import Locator, expect
 
 from bench.seeding import seed_database
-from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.conftest import Server
 from tests.e2e.dashboard import Dashboard, Json
 
 FLIGHTS = 1000
@@ -16,32 +13,19 @@ SAMPLES = 4000
 
 
 @pytest.fixture(scope="module")
-def crowded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, int]]:
-    """A server on a database with one campaign of a thousand flights."""
-    folder: Path = tmp_path_factory.mktemp("crowded")
-    campaigns = seed_database(folder, flights={"Crowd": FLIGHTS}, samples=SAMPLES)
-    with served(folder) as server:
-        yield server, campaigns["Crowd"]
+def crowd(shared_server: Server) -> int:
+    """A campaign of a thousand flights."""
+    return seed_database(shared_server.data_dir, flights={"Crowd": FLIGHTS}, samples=SAMPLES)["Crowd"]
 
 
 @pytest.fixture
-def page_of_many(open_dashboard: Opener, crowded: tuple[Server, int]) -> Dashboard:
-    server, campaign_id = crowded
-    dashboard = open_dashboard(server.url)
-    dashboard.open_campaign(campaign_id)
+def page_of_many(dashboard: Dashboard, crowd: int) -> Dashboard:
+    dashboard.open_campaign(crowd)
     for chart in ("errors", "gains"):
         expect(dashboard.plot(chart)).to_be_visible()
     expect(row(dashboard, FLIGHTS)).to_be_attached()
-    at_rest(dashboard)
+    dashboard.settled()
     return dashboard
-
-
-def at_rest(dashboard: Dashboard) -> None:
-    """Wait until nothing on the page moves any more, so that a place on it stays what it is."""
-    heights: list[object] = []
-    while len(heights) < 10 or len(set(map(str, heights[-10:]))) > 1:
-        heights.append(dashboard.plot("errors").bounding_box())
-        dashboard.page.wait_for_timeout(100)
 
 
 def row(dashboard: Dashboard, flight: int) -> Locator:
@@ -105,7 +89,8 @@ def test_a_flight_that_is_pointed_at_stands_out_as_curve_mark_and_row(page_of_ma
     )
     assert lent is not None
     assert lent["name"] == f"Flight {trial[0]}"
-    time_s, altitude_m = page_of_many.record(plain)
+    best = best_of(page_of_many)
+    time_s, altitude_m = page_of_many.record(best["trial_id"] - best["trial_number"] + plain)
     np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)
 
 
@@ -135,10 +120,10 @@ def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None
     number = best_of(page_of_many)["trial_number"]
     chart = page_of_many.plot("errors")
     chart.scroll_into_view_if_needed()
-    at_rest(page_of_many)
+    page_of_many.settled()
     x, y = place_of(chart, number)
     brush(page_of_many, (x - 15, y - 60), (x + 15, y - 60))  # else a pixel holds three flights
-    at_rest(page_of_many)
+    page_of_many.settled()
     place = place_of(chart, number)
     page_of_many.page.mouse.move(place[0] - 3, place[1])
     page_of_many.page.mouse.move(*place)

@@ -27,9 +27,9 @@ def landed(dashboard: Dashboard, number: int) -> None:
 
 
 def test_the_first_flight_lands_after_three_clicks_at_most_and_the_next_after_two_more(
-    open_dashboard: Opener, own_server: Server
+    open_dashboard: Opener, empty_server: Server
 ) -> None:
-    dashboard = open_dashboard(own_server.url)
+    dashboard = open_dashboard(empty_server.url, alone=True)
     page = dashboard.page
     page.add_init_script(_COUNT)
     dashboard.open("/")
@@ -44,7 +44,8 @@ def test_the_first_flight_lands_after_three_clicks_at_most_and_the_next_after_tw
     assert 1 <= clicks(page) - first <= 2
 
 
-def test_the_wizard_creates_the_simulated_takeoff_with_one_click(dashboard: Dashboard) -> None:
+def test_the_wizard_creates_the_simulated_takeoff_with_one_click(open_dashboard: Opener, shared_server: Server) -> None:
+    dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.page.add_init_script(_COUNT)
     dashboard.open("/new")
     dashboard.button("Create campaign").click()

@@ -3,7 +3,6 @@
 import csv
 import re
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
@@ -11,10 +10,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, Dashboard, Json, printed
+from tests.e2e.states import States
 
 CURVES = "Curves"
 MANUAL: Json = {"strategy": "manual", "stop": {"kind": "budget", "max_flights": 50}}
@@ -32,18 +32,14 @@ class Flown:
 
 
 @pytest.fixture(scope="module")
-def flown(shared_server: Server, browser: Browser) -> Iterator[Flown]:
+def flown(states: States) -> Flown:
     """Two campaigns of the twin, the second with other gains, and one of another experiment."""
-    context = browser.new_context()
-    dashboard = Dashboard(context.new_page(), shared_server.url)
-    morning = dashboard.create("twin", name="Compared in the morning", seed=3, **MANUAL)
-    early = [dashboard.fly_headless_body(morning, {"gains": gains})["id"] for gains in (FIRST, FIRST, OTHER)]
-    evening = dashboard.create("twin", name="Compared in the evening", seed=4, **MANUAL)
-    late = [dashboard.fly_headless_body(evening, {"gains": OTHER})["id"] for _ in range(2)]
-    pitch = dashboard.create("lti", experiment="pitch-tracking", strategy="identified")
-    dashboard.fly_headless(pitch, 1)
-    yield Flown(morning, early, late, dashboard.trials(pitch)[0]["id"])
-    context.close()
+    morning = states.campaign(name="Compared in the morning", seed=3, **MANUAL)
+    early = [states.fly_gains(morning, gains) for gains in (FIRST, FIRST, OTHER)]
+    evening = states.campaign(name="Compared in the evening", seed=4, **MANUAL)
+    late = [states.fly_gains(evening, OTHER) for _ in range(2)]
+    pitch = states.campaign("lti", experiment="pitch-tracking", strategy="identified")
+    return Flown(morning, early, late, states.fly(pitch)[0])
 
 
 FIRST = {"kp": 283, "ki": 13, "kd": 82}
@@ -204,10 +200,12 @@ def test_what_cannot_be_compared_is_said_and_can_be_left_out(dashboard: Dashboar
     assert chosen(page) == [one, other]
 
 
-def test_a_flight_whose_campaign_was_deleted_is_said_to_be_gone(dashboard: Dashboard, flown: Flown) -> None:
+def test_a_flight_whose_campaign_was_deleted_is_said_to_be_gone(
+    dashboard: Dashboard, states: States, flown: Flown
+) -> None:
     page = dashboard.page
     one, other = flown.early[0], flown.early[2]
-    doomed = dashboard.create("import", name="Deleted soon")
+    doomed = states.campaign("import", name="Deleted soon")
     proposal = dashboard.get(f"/campaigns/{doomed}/proposal")["proposal"]
     gone = dashboard.post(f"/campaigns/{doomed}/trials", {"proposal_id": proposal["id"]})["id"]
     dashboard.open(address([one, gone]))

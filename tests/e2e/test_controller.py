@@ -15,8 +15,8 @@ DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
 
 
 @pytest.fixture
-def page_of_checks(open_dashboard: Opener, own_server: Server) -> Dashboard:
-    dashboard = open_dashboard(own_server.url)
+def page_of_checks(open_dashboard: Opener, empty_server: Server) -> Dashboard:
+    dashboard = open_dashboard(empty_server.url)
     dashboard.open("/controller")
     return dashboard
 
@@ -124,8 +124,8 @@ def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
     assert newest(dashboard)["gains_from"] == "worked out from the commands"
 
 
-def test_on_a_phone_nothing_is_cut_off(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url, viewport=PHONE)
+def test_on_a_phone_nothing_is_cut_off(open_dashboard: Opener, empty_server: Server) -> None:
+    dashboard = open_dashboard(empty_server.url, viewport=PHONE)
     dashboard.open("/controller")
     dashboard.button("Check the example").click()
     expect(dashboard.page.get_by_text(re.compile("^The replica agrees"))).to_be_visible()

@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import sqlite3
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
@@ -35,6 +34,7 @@ from app.errors import (
 from app.live.client import LinkDownError
 from tests.e2e.conftest import Opener, Server, served
 from tests.e2e.dashboard import Dashboard, Json
+from tests.e2e.states import States
 from tests.logs.recorded import recorded
 
 AT_START: Final = {app.errors.SchemaError, app.errors.AlreadyRunningError, app.errors.AddressError}
@@ -45,7 +45,7 @@ RETRIED_MS: Final = 40_000
 """A read that failed at the server is tried three times more before the page says so."""
 
 Undo = Callable[[], None]
-Provoke = Callable[[Dashboard, Server], Undo | None]
+Provoke = Callable[[Dashboard, Server, States], Undo | None]
 """What it returns is called once the page has been read: until then the error has to last."""
 PROVOKED: Final[dict[type[GainlineError] | str, Provoke]] = {}
 
@@ -58,25 +58,12 @@ def provokes(kind: type[GainlineError] | str) -> Callable[[Provoke], Provoke]:
     return keep
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """One that finds no browser, so that it cannot print."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PATH", "/nowhere")
-        with served(tmp_path_factory.mktemp("errors") / "data") as one:
-            yield one
-
-
-@pytest.fixture
-def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
-    return open_dashboard(server.url)
-
-
 def instead(
     dashboard: Dashboard,
     act: str,
     *,
     path: str | None = None,
+    url: str | None = None,
     method: str | None = None,
     body: str | bytes | None = None,
     headers: dict[str, str] | None = None,
@@ -90,7 +77,7 @@ def instead(
             return
         route.fulfill(
             response=route.fetch(
-                url=None if path is None else f"{dashboard.url}/api{path}",
+                url=None if path is None else f"{url or dashboard.url}/api{path}",
                 method=method,
                 post_data=body,
                 headers={**request.headers, **(headers or {})},
@@ -104,12 +91,13 @@ def create_instead(
     dashboard: Dashboard,
     *,
     path: str | None = None,
+    url: str | None = None,
     method: str | None = None,
     body: str | bytes | None = None,
     headers: dict[str, str] | None = None,
 ) -> None:
     """Press "Create campaign" on its page, with another request behind it."""
-    instead(dashboard, "/campaigns", path=path, method=method, body=body, headers=headers)
+    instead(dashboard, "/campaigns", path=path, url=url, method=method, body=body, headers=headers)
     dashboard.open("/new")
     dashboard.button("Create campaign").click()
 
@@ -118,30 +106,18 @@ def create_instead(
 def stopped_worker(server: Server) -> Iterator[None]:
     """Neither working nor answering, and not just holding the database."""
     worker = server.worker_pid()
-    os.kill(worker, signal.SIGSTOP)
+    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=60.0, isolation_level=None)) as file:
+        file.execute("BEGIN IMMEDIATE")
+        os.kill(worker, signal.SIGSTOP)
+        file.execute("ROLLBACK")
     try:
-        while not _is_free(server):
-            os.kill(worker, signal.SIGCONT)
-            time.sleep(0.05)
-            os.kill(worker, signal.SIGSTOP)
         yield
     finally:
         os.kill(worker, signal.SIGCONT)
 
 
-def _is_free(server: Server) -> bool:
-    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=0.5, isolation_level=None)) as file:
-        try:
-            file.execute("BEGIN IMMEDIATE")
-        except sqlite3.OperationalError:
-            return False
-        file.execute("ROLLBACK")
-    return True
-
-
-def hand_in(dashboard: Dashboard, name: str, content: bytes | Path) -> None:
-    campaign_id = dashboard.create("import")
-    dashboard.open_campaign(campaign_id)
+def hand_in(dashboard: Dashboard, states: States, name: str, content: bytes | Path) -> None:
+    dashboard.open_campaign(states.campaign("import"))
     with dashboard.page.expect_file_chooser() as chooser:
         dashboard.button("Upload flight record").click()
     if isinstance(content, Path):
@@ -154,59 +130,54 @@ def hand_in(dashboard: Dashboard, name: str, content: bytes | Path) -> None:
 
 
 @provokes(NotAllowedError)
-def _a_real_vehicle_ordered_off_at_once(dashboard: Dashboard, _server: Server) -> None:
-    vehicle = dashboard.post(
-        "/vehicles",
-        {
-            "name": "Number 1",
-            "kind": "mavlink",
-            "options": {"address": "udp:127.0.0.1:14995@14994"},
-            "safe_gains_confirmed": True,
-            "statement": "Ada has seen it fly on these",
-        },
+def _a_real_vehicle_ordered_off_at_once(dashboard: Dashboard, _server: Server, states: States) -> None:
+    vehicle = states.vehicle(
+        "Ordered off",
+        options={"address": "udp:127.0.0.1:14995@14994"},
+        safe_gains_confirmed=True,
+        statement="Ada has seen it fly on these",
     )
-    body = {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle["id"]}, "definition": {}}
-    campaign = dashboard.when_ready(dashboard.post("/campaigns", body)["id"])
+    campaign = states.campaign("mavlink", name="Up to 3 m", vehicle_id=vehicle)
     order = {"gains": {"kp": 283, "ki": 13, "kd": 82}, "fly": {"speed": 1}}
     create_instead(dashboard, path=f"/campaigns/{campaign}/trials", body=json.dumps(order))
 
 
 @provokes(NotFoundError)
-def _a_campaign_that_never_was(dashboard: Dashboard, _server: Server) -> None:
+def _a_campaign_that_never_was(dashboard: Dashboard, _server: Server, _states: States) -> None:
     dashboard.open("/campaigns/999999")
 
 
 @provokes(BusyError)
-def _a_vehicle_asked_while_it_is_still_being_asked(dashboard: Dashboard, server: Server) -> None:
+def _a_vehicle_asked_while_it_is_still_being_asked(dashboard: Dashboard, server: Server, states: States) -> None:
     options = {"address": "udp:127.0.0.1:14993@14992", "simulated": True}
     dashboard.open("/")
-    vehicle = dashboard.post("/vehicles", {"name": "Bee", "kind": "mavlink", "options": options})
+    vehicle = states.vehicle("Busy", options=options)
     with stopped_worker(server):
-        dashboard.post(f"/vehicles/{vehicle['id']}/connect")
-        create_instead(dashboard, path=f"/vehicles/{vehicle['id']}/connect", body="{}")
+        dashboard.post(f"/vehicles/{vehicle}/connect")
+        create_instead(dashboard, path=f"/vehicles/{vehicle}/connect", body="{}")
         expect(dashboard.page.get_by_role("alert")).to_be_visible()
 
 
 @provokes(ConflictError)
-def _a_campaign_finished_before_its_first_flight(dashboard: Dashboard, _server: Server) -> None:
+def _a_campaign_finished_before_its_first_flight(dashboard: Dashboard, _server: Server, _states: States) -> None:
     made = dashboard.post("/campaigns", {"name": "New", "vehicle": {"kind": "twin"}, "definition": {}})
     create_instead(dashboard, path=f"/campaigns/{made['id']}/finish", body="{}")
 
 
 @provokes(TooLargeError)
-def _a_log_of_a_whole_summer(dashboard: Dashboard, server: Server) -> None:
+def _a_log_of_a_whole_summer(dashboard: Dashboard, server: Server, states: States) -> None:
     log = server.data_dir.parent / "summer.tlog"
     log.write_bytes(bytes(49 * 2**20))
-    hand_in(dashboard, log.name, log)
+    hand_in(dashboard, states, log.name, log)
 
 
 @provokes(MediaTypeError)
-def _a_form_in_place_of_json(dashboard: Dashboard, _server: Server) -> None:
+def _a_form_in_place_of_json(dashboard: Dashboard, _server: Server, _states: States) -> None:
     create_instead(dashboard, headers={"content-type": "application/x-www-form-urlencoded"})
 
 
 @provokes(KeyReusedError)
-def _the_key_of_another_act(dashboard: Dashboard, _server: Server) -> None:
+def _the_key_of_another_act(dashboard: Dashboard, _server: Server, _states: States) -> None:
     key = {"Idempotency-Key": "written-once"}
     body = {"name": "First", "vehicle": {"kind": "twin"}, "definition": {}}
     assert dashboard.page.request.post(f"{dashboard.url}/api/campaigns", data=body, headers=key).ok
@@ -214,8 +185,8 @@ def _the_key_of_another_act(dashboard: Dashboard, _server: Server) -> None:
 
 
 @provokes(GainsError)
-def _gains_under_which_the_integrator_wraps(dashboard: Dashboard, _server: Server) -> None:
-    dashboard.open_campaign(dashboard.create("twin"))
+def _gains_under_which_the_integrator_wraps(dashboard: Dashboard, _server: Server, states: States) -> None:
+    dashboard.open_campaign(states.campaign())
     dashboard.button("Edit gains").click()
     for name, value in {"kp": 283, "ki": 1356, "kd": 82}.items():
         dashboard.page.get_by_label(re.compile(f"^{name}")).fill(str(value))
@@ -223,17 +194,17 @@ def _gains_under_which_the_integrator_wraps(dashboard: Dashboard, _server: Serve
 
 
 @provokes(TrajectoryError)
-def _a_record_of_one_sample(dashboard: Dashboard, _server: Server) -> None:
-    hand_in(dashboard, "short.csv", b"time_s,altitude_m\n0,0\n")
+def _a_record_of_one_sample(dashboard: Dashboard, _server: Server, states: States) -> None:
+    hand_in(dashboard, states, "short.csv", b"time_s,altitude_m\n0,0\n")
 
 
 @provokes(UnconfirmedError)
-def _a_log_flown_with_other_gains(dashboard: Dashboard, _server: Server) -> None:
-    hand_in(dashboard, "tuned.tlog", recorded("paparazzi_1624_1356_195.tlog"))
+def _a_log_flown_with_other_gains(dashboard: Dashboard, _server: Server, states: States) -> None:
+    hand_in(dashboard, states, "tuned.tlog", recorded("paparazzi_1624_1356_195.tlog"))
 
 
 @provokes(InputError)
-def _bounds_the_wrong_way_round(dashboard: Dashboard, _server: Server) -> None:
+def _bounds_the_wrong_way_round(dashboard: Dashboard, _server: Server, _states: States) -> None:
     dashboard.open("/new")
     dashboard.page.get_by_role("button", name=re.compile("^Advanced")).click()
     dashboard.page.get_by_label("kp at least").fill("3000")
@@ -242,13 +213,21 @@ def _bounds_the_wrong_way_round(dashboard: Dashboard, _server: Server) -> None:
 
 
 @provokes(UnavailableError)
-def _a_pdf_without_a_browser_to_print_it(dashboard: Dashboard, _server: Server) -> None:
-    campaign_id = dashboard.create("twin")
-    create_instead(dashboard, path=f"/campaigns/{campaign_id}/report.pdf", method="GET")
+def _a_pdf_without_a_browser_to_print_it(dashboard: Dashboard, server: Server, _states: States) -> Undo:
+    """From a server that finds none; nothing is computed there."""
+    with ExitStack() as stack:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("PATH", "/nowhere")
+            other = stack.enter_context(served(server.data_dir.parent / "browserless", 0, "--no-worker"))
+        states = States(other.data_dir)
+        stack.callback(states.close)
+        path = f"/campaigns/{states.campaign()}/report.pdf"
+        create_instead(dashboard, path=path, url=other.url, method="GET", headers={"origin": other.url})
+        return stack.pop_all().close
 
 
 @provokes(StorageError)
-def _a_database_that_somebody_else_holds(dashboard: Dashboard, server: Server) -> None:
+def _a_database_that_somebody_else_holds(dashboard: Dashboard, server: Server, _states: States) -> None:
     dashboard.open("/new")
     with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")
@@ -258,14 +237,16 @@ def _a_database_that_somebody_else_holds(dashboard: Dashboard, server: Server) -
 
 
 @provokes(LinkDownError)
-def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server) -> Undo:
-    campaign_id = dashboard.create("twin")
+def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server, states: States) -> Undo:
+    campaign_id = states.campaign()
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("1×")
     dashboard.fly()
     abort = dashboard.page.get_by_role("button", name=re.compile("^ABORT")).first
     expect(abort).to_be_visible()
     with ExitStack() as stack:
+        [trial] = dashboard.trials(campaign_id)
+        stack.callback(lambda: dashboard.post(f"/trials/{trial['id']}/abort"))
         stack.enter_context(stopped_worker(server))
         abort.click()
         expect(dashboard.page.get_by_role("alert")).to_contain_text("remote control")
@@ -273,7 +254,7 @@ def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server) 
 
 
 @provokes(GainlineError)
-def _one_without_a_kind_of_its_own(dashboard: Dashboard, _server: Server) -> None:
+def _one_without_a_kind_of_its_own(dashboard: Dashboard, _server: Server, _states: States) -> None:
     """None reaches the API at present, so the program's own answer to one is made here."""
     made = over_http.own_error(GainlineError("The order cannot be read.", hint="Run the reproduction anew."))
     dashboard.page.route(
@@ -289,22 +270,22 @@ def _one_without_a_kind_of_its_own(dashboard: Dashboard, _server: Server) -> Non
 
 
 @provokes("400")
-def _a_body_that_is_no_text(dashboard: Dashboard, _server: Server) -> None:
+def _a_body_that_is_no_text(dashboard: Dashboard, _server: Server, _states: States) -> None:
     create_instead(dashboard, body=b"\xff\xfe{")
 
 
 @provokes("404")
-def _a_path_that_is_not_there(dashboard: Dashboard, _server: Server) -> None:
+def _a_path_that_is_not_there(dashboard: Dashboard, _server: Server, _states: States) -> None:
     create_instead(dashboard, path="/campaign")
 
 
 @provokes("405")
-def _a_method_that_is_not_known(dashboard: Dashboard, _server: Server) -> None:
+def _a_method_that_is_not_known(dashboard: Dashboard, _server: Server, _states: States) -> None:
     create_instead(dashboard, method="DELETE")
 
 
 @provokes("invalid")
-def _a_budget_below_nothing(dashboard: Dashboard, _server: Server) -> None:
+def _a_budget_below_nothing(dashboard: Dashboard, _server: Server, _states: States) -> None:
     dashboard.open("/new")
     dashboard.page.get_by_role("button", name=re.compile("^Advanced")).click()
     dashboard.page.get_by_label("Flights at most").fill("-3")
@@ -312,18 +293,19 @@ def _a_budget_below_nothing(dashboard: Dashboard, _server: Server) -> None:
 
 
 @provokes("foreign")
-def _a_page_of_another_site(dashboard: Dashboard, _server: Server) -> None:
+def _a_page_of_another_site(dashboard: Dashboard, _server: Server, _states: States) -> None:
     create_instead(dashboard, headers={"origin": "http://elsewhere.example"})
 
 
 @provokes("unforeseen")
-def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: Server) -> None:
-    campaign_id = dashboard.create("import")
-    trial = dashboard.post(f"/campaigns/{campaign_id}/trials", {"gains": {"kp": 283, "ki": 13, "kd": 82}})
-    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3")) as file:
-        file.execute("UPDATE trial SET gains = '[1]' WHERE id = ?", (trial["id"],))
+def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: Server, states: States) -> Undo:
+    campaign_id = states.campaign("import")
+    trial = states.plan(campaign_id, {"kp": 283, "ki": 13, "kd": 82})
+    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=60.0)) as file:
+        file.execute("UPDATE trial SET gains = '[1]' WHERE id = ?", (trial,))
         file.commit()
-    dashboard.open(f"/campaigns/{campaign_id}/flights/{trial['id']}")
+    dashboard.open(f"/campaigns/{campaign_id}/flights/{trial}")
+    return states.clear
 
 
 # ---- what must be on the screen
@@ -351,7 +333,7 @@ def test_every_kind_of_error_has_a_story_that_provokes_it() -> None:
 
 @pytest.mark.parametrize("kind", sorted(PROVOKED, key=_name), ids=_name)
 def test_an_error_says_what_happened_and_what_to_do(
-    dashboard: Dashboard, server: Server, kind: type[GainlineError] | str
+    dashboard: Dashboard, shared_server: Server, states: States, kind: type[GainlineError] | str
 ) -> None:
     told: list[Json] = []
 
@@ -360,10 +342,11 @@ def test_an_error_says_what_happened_and_what_to_do(
             told.append(answer.json())
 
     dashboard.page.on("response", note)
-    undo = PROVOKED[kind](dashboard, server)
+    undo = PROVOKED[kind](dashboard, shared_server, states)
     try:
         _is_told(dashboard, told, TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1])
     finally:
+        dashboard.page.remove_listener("response", note)
         if undo is not None:
             undo()
 
@@ -385,7 +368,10 @@ def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
         expect(dashboard.page.locator("body")).to_contain_text(text, use_inner_text=True, ignore_case=True)
 
 
-def test_a_server_that_cannot_be_reached_is_told_with_what_became_of_the_act(dashboard: Dashboard) -> None:
+def test_a_server_that_cannot_be_reached_is_told_with_what_became_of_the_act(
+    open_dashboard: Opener, shared_server: Server
+) -> None:
+    dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.open("/new")
     create = dashboard.button("Create campaign")
     expect(create).to_be_visible()

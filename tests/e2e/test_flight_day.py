@@ -14,6 +14,7 @@ from tests.e2e.dashboard import Dashboard, Json, printed
 from tests.e2e.flying_by_hand import (
     DRONE_SPEED,
     abort,
+    disconnect,
     hold_until_it_flies,
     in_state,
     line_of,
@@ -23,7 +24,8 @@ from tests.e2e.flying_by_hand import (
     take_control,
     word,
 )
-from tests.e2e.test_pages import ROOT, SCREENSHOTS, when_drawn
+from tests.e2e.states import States
+from tests.e2e.test_pages import ROOT, SCREENSHOTS
 from tests.runtime.drones import SAFE, Drone
 
 PICTURES: Final = ROOT / "docs" / "images" / "day" if os.environ.get("GAINLINE_README_IMAGE") else SCREENSHOTS / "day"
@@ -42,12 +44,15 @@ def drone() -> Iterator[Drone]:
 
 
 @pytest.mark.timeout(480, func_only=True)
-def test_a_day_from_the_wizard_to_the_report(open_dashboard: Opener, own_server: Server, drone: Drone) -> None:
-    dashboard = open_dashboard(own_server.url)
+def test_a_day_from_the_wizard_to_the_report(
+    open_dashboard: Opener, empty_server: Server, states: States, drone: Drone
+) -> None:
+    dashboard = open_dashboard(empty_server.url, alone=True)
+    dashboard.page.clock.install()
     dashboard.open("/vehicles")
     vehicle_id = register(dashboard, drone)
     campaign_id = create(dashboard, vehicle_id)
-    rehearse(dashboard, campaign_id)
+    rehearse(dashboard, states, campaign_id)
     first = fly_the_first(dashboard, campaign_id, vehicle_id)
     abort_the_second(dashboard, campaign_id, vehicle_id)
     mark_the_third_invalid(dashboard, campaign_id, first)
@@ -59,6 +64,7 @@ def test_a_day_from_the_wizard_to_the_report(open_dashboard: Opener, own_server:
     promote(dashboard, campaign_id, vehicle_id)
     open_the_report(dashboard, campaign_id)
     see_the_list(dashboard, campaign_id)
+    disconnect(dashboard, vehicle_id)
 
 
 # ---- before the flights
@@ -89,8 +95,8 @@ def create(dashboard: Dashboard, vehicle_id: int) -> int:
     return dashboard.when_ready(dashboard.campaign_id)
 
 
-def rehearse(dashboard: Dashboard, campaign_id: int) -> None:
-    """Begun and ended on the page; its flights are flown over the API."""
+def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
+    """Begun and ended on the page; its flights are written."""
     page = dashboard.page
     expect(dashboard.panel("Rehearse first")).to_contain_text("Not rehearsed yet")
     expect(dashboard.button("Stage")).to_have_count(0)
@@ -98,7 +104,8 @@ def rehearse(dashboard: Dashboard, campaign_id: int) -> None:
     dashboard.button("Rehearse on the simulation").click()
     expect(page.get_by_text("This is a rehearsal")).to_be_visible()
     assert dashboard.get(f"/campaigns/{dashboard.campaign_id}")["rehearses"] == campaign_id
-    dashboard.rehearse(campaign_id)
+    dashboard.when_ready(dashboard.campaign_id)
+    states.rehearse(campaign_id)
     expect(page.get_by_text("The rehearsal has passed")).to_be_visible()
     page.get_by_role("link", name=f"{NAME} on Number 1").click()
     expect(dashboard.button("Stage")).to_be_visible()
@@ -322,7 +329,8 @@ def see_the_list(dashboard: Dashboard, campaign_id: int) -> None:
 def picture(dashboard: Dashboard, name: str, *, at_rest: bool = True) -> None:
     """What the tablet shows now."""
     if at_rest:
-        when_drawn(dashboard)
+        dashboard.settled()
+        dashboard.page.evaluate("scrollTo(0, 0)")
     keep(dashboard.page, name)
 
 

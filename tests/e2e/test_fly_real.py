@@ -8,11 +8,13 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
-from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard
 from tests.e2e.flying_by_hand import (
     DRONE_SPEED,
+    HOLD_MS,
     abort,
+    disconnect,
     hold,
     hold_button,
     hold_until_it_flies,
@@ -26,41 +28,37 @@ from tests.e2e.flying_by_hand import (
     take_control,
     word,
 )
+from tests.e2e.states import States
 from tests.runtime.drones import SAFE, TRIED, Drone
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with served(tmp_path_factory.mktemp("field") / "data") as one:
-        yield one
-
-
-@pytest.fixture(scope="module")
-def vehicle_id(server: Server, browser: Browser) -> Iterator[int]:
+def vehicle_id(shared_server: Server, states: States, browser: Browser) -> Iterator[int]:
     """A drone on loopback, registered as REAL and connected."""
-    with Drone(speed=DRONE_SPEED) as drone, browser.new_context(base_url=server.url) as context:
-        office = Dashboard(context.new_page(), server.url)
-        office.page.goto("/")
-        expect(office.page.get_by_text("Live", exact=True)).to_be_visible(timeout=120_000)
-        yield register(office, drone)
+    states.clear()
+    with Drone(speed=DRONE_SPEED) as drone, browser.new_context(base_url=shared_server.url) as context:
+        office = Dashboard(context.new_page(), shared_server.url)
+        vehicle = register(office, drone)
+        yield vehicle
+        disconnect(office, vehicle)
 
 
 @pytest.fixture
-def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
-    return open_dashboard(server.url)
+def dashboard(open_dashboard: Opener, shared_server: Server) -> Dashboard:
+    """Its page has a clock that can be put forward."""
+    dashboard = open_dashboard(shared_server.url, alone=True)
+    dashboard.page.clock.install()
+    return dashboard
 
 
 @pytest.fixture
-def trial_id(dashboard: Dashboard, vehicle_id: int) -> Iterator[int]:
+def trial_id(dashboard: Dashboard, states: States, vehicle_id: int) -> Iterator[int]:
     """A trial of gains other than the safe ones, in a campaign of its own, the fly screen open."""
     in_state(dashboard, vehicle_id, "ready")
-    once = {"stop": {"kind": "budget", "max_flights": 1}}
-    made = dashboard.post(
-        "/campaigns", {"name": "Up to 3 m", "vehicle": {"kind": "mavlink", "id": vehicle_id}, "definition": once}
-    )
-    dashboard.when_ready(made["id"])
-    dashboard.rehearse(made["id"])
-    trial: int = dashboard.post(f"/campaigns/{made['id']}/trials", {"gains": TRIED})["id"]
+    once = {"kind": "budget", "max_flights": 1}
+    campaign_id = states.campaign("mavlink", name="Up to 3 m", vehicle_id=vehicle_id, stop=once)
+    states.rehearse(campaign_id)
+    trial = states.plan(campaign_id, TRIED)
     dashboard.open(f"/fly/{trial}")
     yield trial
     if state_of(dashboard, trial) in {"staged", "flying"}:
@@ -101,9 +99,12 @@ def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
         dashboard.page.get_by_role("link", name="Next flight").click()
         headings = dashboard.page.get_by_role("heading", level=2)
         said: set[str] = set()
-        while "Flight budget used" not in said:
+
+        def is_over() -> bool:
             said.update(text.strip() for text in headings.all_inner_texts())
-            dashboard.page.wait_for_timeout(20)
+            return "Flight budget used" in said
+
+        dashboard.until(is_over)
     assert "Flight 1 wants your word" not in said
     expect(dashboard.panel("Flight 1")).to_be_visible()
     assert state_of(dashboard, trial_id) == "valid"
@@ -137,11 +138,11 @@ def slow_answers(page: Page) -> Iterator[None]:
 def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
     take_control(dashboard)
     stage(dashboard, len(TRIED))
-    hold(dashboard.page, 1.2)
+    hold(dashboard.page, HOLD_MS - 300)
     hold_button(dashboard.page).focus()
     for key in ("Enter", "Space"):
         dashboard.page.keyboard.down(key)
-        dashboard.page.wait_for_timeout(2500)
+        dashboard.page.clock.run_for(HOLD_MS + 500)
         dashboard.page.keyboard.up(key)
     asked = dashboard.page.request.post(f"{dashboard.url}/api/trials/{trial_id}/take-off")
     assert asked.status == 403

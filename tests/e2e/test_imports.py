@@ -5,6 +5,7 @@ import re
 from playwright.sync_api import FilePayload, expect
 
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded
 
@@ -19,8 +20,8 @@ def hand_in(dashboard: Dashboard, *files: tuple[str, bytes]) -> None:
     )
 
 
-def test_a_telemetry_log_is_handed_in_and_scored_with_its_own_gains(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("import")
+def test_a_telemetry_log_is_handed_in_and_scored_with_its_own_gains(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
     hand_in(dashboard, (DEFAULT, recorded(DEFAULT)))
     dashboard.until(lambda: any(trial["state"] == "valid" for trial in dashboard.trials(campaign_id)))
@@ -29,8 +30,10 @@ def test_a_telemetry_log_is_handed_in_and_scored_with_its_own_gains(dashboard: D
     assert trial["read_back"] == {"kp": 283, "ki": 13, "kd": 82}
 
 
-def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_confirmed(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("import")
+def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_confirmed(
+    dashboard: Dashboard, states: States
+) -> None:
+    campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
     hand_in(dashboard, ("both.tlog", recorded(DEFAULT) + recorded(TUNED)))
     choices = dashboard.page.get_by_role("button", name=re.compile(r"^Takeoff \d: "))
@@ -43,8 +46,8 @@ def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_c
     assert (trial["gains"]["ki"], trial["kind"]) == (1356, "manual")
 
 
-def test_a_ground_log_is_handed_in_together_with_its_companion(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("import")
+def test_a_ground_log_is_handed_in_together_with_its_companion(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
     data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False)).encode()
     hand_in(dashboard, ("flight.log", COMPANION.encode()), ("flight.data", data))

@@ -11,6 +11,7 @@ from playwright.sync_api import expect
 from app.studies.process import NICENESS
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
 
 
 def children_of(pid: int) -> list[int]:
@@ -49,14 +50,14 @@ def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int) -> No
 
 
 def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is_retried(
-    open_dashboard: Opener, own_server: Server
+    open_dashboard: Opener, empty_server: Server, states: States
 ) -> None:
-    dashboard = open_dashboard(own_server.url)
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/jobs")
     job_id = dashboard.post("/reproductions/variability/run")["id"]
-    kill_until_given_up(dashboard, own_server, job_id)
-    dashboard.reproduce("controller")
+    kill_until_given_up(dashboard, empty_server, job_id)
+    states.reproduce("controller")
     groups = page.get_by_role("main").get_by_role("list", name=re.compile("jobs", re.IGNORECASE))
     expect(groups.nth(1)).to_be_visible()
     first = groups.first.get_by_role("listitem").first
@@ -82,16 +83,18 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     expect(over.get_by_text("Cancelled", exact=True)).to_be_visible()
 
 
-def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url)
+def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, empty_server: Server) -> None:
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
-    dashboard.reproduce("controller")
+    dashboard.post("/reproductions/controller/run")
+    dashboard.until(lambda: bool(dashboard.get("/reproductions/controller")["rows"]))
     dashboard.open("/jobs")
     filters = page.get_by_role("radiogroup", name="Jobs shown")
     expect(page.get_by_role("list", name="Jobs that are over").get_by_role("listitem").first).to_be_visible()
     filters.get_by_text("Failed", exact=True).click()
     expect(page.get_by_text("Nothing has failed.")).to_be_visible()
     filters.get_by_text("Over", exact=True).click()
-    log = page.get_by_text("Log of job 1")
+    [job] = dashboard.get("/jobs")["items"]
+    log = page.get_by_text(f"Log of job {job['id']}")
     log.click()
     expect(page.get_by_text("reproduction stored")).to_be_visible()

@@ -6,10 +6,11 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from playwright.sync_api import Locator, expect
+from playwright.sync_api import Locator, Request, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
 from tests.e2e.wifi import Wifi
 
 LOST_MS = 40_000
@@ -60,7 +61,12 @@ def heading(dashboard: Dashboard, name: str) -> Locator:
 def test_two_tabs_show_the_same_truth_over_one_stream_each(open_dashboard: Opener, shared_server: Server) -> None:
     one, other = open_dashboard(shared_server.url), open_dashboard(shared_server.url)
     streams: list[str] = []
-    one.page.on("request", lambda request: streams.append(request.url) if "/api/events" in request.url else None)
+
+    def note(request: Request) -> None:
+        if "/api/events" in request.url:
+            streams.append(request.url)
+
+    one.page.on("request", note)
     campaign_id = new_campaign(one, "Seen twice")
     one.open(f"/campaigns/{campaign_id}")
     other.open(f"/campaigns/{campaign_id}")
@@ -73,21 +79,26 @@ def test_two_tabs_show_the_same_truth_over_one_stream_each(open_dashboard: Opene
     one.page.go_back()
     expect(heading(one, "Seen by both")).to_be_visible()
     assert len(streams) == 1
+    one.page.remove_listener("request", note)
     other.page.reload()
     expect(heading(other, "Seen by both")).to_be_visible()
 
 
 def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboard: Opener, own_server: Server) -> None:
+    """Pages open all the same meanwhile: they were fetched before the server was lost."""
     dashboard, other = open_dashboard(own_server.url), open_dashboard(own_server.url)
-    campaign_id = new_campaign(dashboard, "Before")
-    dashboard.open(f"/campaigns/{campaign_id}")
-    other.open("/")
-    dashboard.page.wait_for_timeout(3000)
+    campaign_id = dashboard.create("twin", name="Before")
+    dashboard.open_campaign(campaign_id)
+    with other.page.expect_response(re.compile(r"/assets/later-.*\.js")):
+        other.open("/")
+    other.until(lambda: bool(other.page.evaluate(CHARTS_FETCHED)))
     own_server.stop()
     is_away(dashboard)
+    expect(dashboard.page.get_by_role("banner").get_by_text("The server does not answer.")).to_be_visible()
     expect(heading(dashboard, "Before")).to_be_visible()
     other.button("More pages").click()
     other.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
+    expect(heading(other, "Jobs")).to_be_visible()
     expect(other.page.get_by_role("alert")).to_contain_text("The server cannot be reached.", timeout=LOST_MS)
     own_server.start()
     is_live(dashboard)
@@ -95,6 +106,8 @@ def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboa
     expect(heading(dashboard, "After")).to_be_visible()
     is_live(other)
     expect(other.page.get_by_role("alert")).to_have_count(0)
+    dashboard.fly_headless(campaign_id, 1)
+    expect(dashboard.panel("Flight 1")).to_be_visible()
 
 
 def test_a_killed_worker_is_told_until_it_is_back(dashboard: Dashboard, shared_server: Server) -> None:
@@ -118,7 +131,8 @@ def test_after_a_lost_wifi_the_page_catches_up(open_dashboard: Opener, shared_se
         expect(heading(dashboard, "Renamed ashore")).to_be_visible()
 
 
-def test_a_page_that_slept_wakes_up_to_date(dashboard: Dashboard) -> None:
+def test_a_page_that_slept_wakes_up_to_date(open_dashboard: Opener, shared_server: Server) -> None:
+    dashboard = open_dashboard(shared_server.url, alone=True)
     campaign_id = new_campaign(dashboard, "In the evening")
     dashboard.open(f"/campaigns/{campaign_id}")
     session = dashboard.page.context.new_cdp_session(dashboard.page)
@@ -130,39 +144,27 @@ def test_a_page_that_slept_wakes_up_to_date(dashboard: Dashboard) -> None:
 
 
 def test_a_line_that_only_looks_open_is_given_up_and_a_flight_on_it_is_not_shown_as_current(
-    open_dashboard: Opener, own_server: Server
+    dashboard: Dashboard, shared_server: Server, states: States
 ) -> None:
-    dashboard = open_dashboard(own_server.url)
-    campaign_id = dashboard.create("twin")
+    campaign_id = states.campaign()
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("1×")
     dashboard.fly()
     bar = dashboard.page.get_by_role("region", name=re.compile("^Flying: "))
     expect(bar).to_contain_text(re.compile(r"\d\.\d\d m"))
     expect(bar).not_to_contain_text("as last heard")
-    with stopped(own_server.pid):
+    with stopped(shared_server.pid):
         expect(bar).to_contain_text("as last heard", timeout=LOST_MS)
         is_away(dashboard)
     is_live(dashboard)
     expect(bar.get_by_text("as last heard")).to_have_count(0)
+    dashboard.post(f"/trials/{dashboard.trials(campaign_id)[0]['id']}/abort")
 
 
-def test_space_aborts_also_from_a_text_field_and_leaves_the_text_alone(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", name="Abort me")
-    dashboard.open_campaign(campaign_id)
-    dashboard.choose_speed("1×")
-    dashboard.fly()
-    expect(dashboard.page.get_by_role("button", name=re.compile("^ABORT")).first).to_be_visible()
-    dashboard.button("Rename the campaign").click()
-    name = dashboard.page.get_by_label("Name of the campaign")
-    name.fill("Abort")
-    name.press("Space")
-    dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "aborted")
-    assert dashboard.trials(campaign_id)[0]["read_back"] is not None
-    expect(name).to_have_value("Abort")
-
-
-def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(dashboard: Dashboard) -> None:
+def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(
+    open_dashboard: Opener, shared_server: Server
+) -> None:
+    dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.page.route("**/assets/later-*.js", lambda route: route.abort())
     dashboard.open("/vehicles")
     expect(dashboard.page.get_by_role("alert")).to_contain_text("This page could not be fetched.")
@@ -170,14 +172,3 @@ def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(dashboard: D
     dashboard.page.unroute("**/assets/later-*.js")
     dashboard.button("Try again").click()
     expect(heading(dashboard, "Vehicles")).to_be_visible()
-
-
-def test_pages_open_though_the_server_was_lost_before_they_were(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url)
-    with dashboard.page.expect_response(re.compile(r"/assets/later-.*\.js")):
-        dashboard.open("/")
-    dashboard.until(lambda: bool(dashboard.page.evaluate(CHARTS_FETCHED)))
-    own_server.stop()
-    dashboard.page.get_by_role("button", name="More pages").click()
-    dashboard.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
-    expect(heading(dashboard, "Jobs")).to_be_visible()

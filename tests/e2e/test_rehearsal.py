@@ -1,34 +1,27 @@
 """A campaign on a real vehicle: the page asks for its rehearsal, and leads there and back."""
 
+from typing import Final
+
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, Dashboard
+from tests.e2e.dashboard import PHONE
+from tests.e2e.states import States
 
-
-def register(dashboard: Dashboard) -> int:
-    """A real vehicle that nobody has switched on."""
-    made = dashboard.post(
-        "/vehicles",
-        {
-            "name": "Number 1",
-            "kind": "mavlink",
-            "options": {"address": "udp:127.0.0.1:14987@14986"},
-            "safe_gains_confirmed": True,
-            "statement": "Ada has seen it fly on these",
-        },
-    )
-    assert made["is_real"]
-    identity: int = made["id"]
-    return identity
+REAL: Final = {
+    "options": {"address": "udp:127.0.0.1:14987@14986"},
+    "safe_gains_confirmed": True,
+    "statement": "Ada has seen it fly on these",
+}
+"""Nobody has switched it on."""
 
 
 def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
-    open_dashboard: Opener, own_server: Server
+    open_dashboard: Opener, empty_server: Server, states: States
 ) -> None:
-    dashboard = open_dashboard(own_server.url)
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
-    dashboard.open(f"/new?vehicle={register(dashboard)}")
+    dashboard.open(f"/new?vehicle={states.vehicle('Number 1', **REAL)}")
     expect(page.get_by_text("before its first flight the campaign is rehearsed on a simulation")).to_be_visible()
     dashboard.button("Create campaign").click()
     asks = dashboard.panel("Rehearse first")
@@ -46,16 +39,17 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     page.get_by_role("link", name="Number 1").last.click()
     expect(asks).to_contain_text("Under way: 0 of 3 valid flights.")
     page.get_by_role("link", name="Go on with the rehearsal").click()
-    dashboard.rehearse(real)
+    dashboard.when_ready(rehearsal)
+    states.rehearse(real)
     expect(page.get_by_text("The rehearsal has passed")).to_be_visible()
     page.get_by_role("link", name="Number 1").last.click()
     expect(page.get_by_role("link", name="Stage")).to_be_visible()
     assert dashboard.get(f"/campaigns/{real}")["rehearsal"]["state"] == "passed"
 
 
-def test_what_asks_for_it_fits_on_a_phone(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url, theme="dark", viewport=PHONE)
-    dashboard.open(f"/new?vehicle={register(dashboard)}")
+def test_what_asks_for_it_fits_on_a_phone(open_dashboard: Opener, empty_server: Server, states: States) -> None:
+    dashboard = open_dashboard(empty_server.url, theme="dark", viewport=PHONE)
+    dashboard.open(f"/new?vehicle={states.vehicle('Number 1', **REAL)}")
     dashboard.button("Create campaign").click()
     expect(dashboard.button("Rehearse on the simulation")).to_be_visible()
     assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

@@ -6,13 +6,14 @@ from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, Dashboard
+from tests.e2e.states import States
 
 FIG6 = "Fig. 6: the replica of the controller"
 FIG12 = "Fig. 12: takeoffs repeated over a battery"
 
 
-def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url)
+def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, empty_server: Server) -> None:
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/")
     dashboard.button("More pages").click()
@@ -39,8 +40,8 @@ def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, 
     expect(dashboard.button(f"Run: {FIG6}")).to_be_visible()
 
 
-def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard = open_dashboard(own_server.url)
+def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, empty_server: Server) -> None:
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/jobs")
     expect(page.get_by_text("Nothing has been computed yet.")).to_be_visible()
@@ -67,13 +68,9 @@ def test_on_a_phone_the_pages_are_behind_a_menu(open_dashboard: Opener, shared_s
     expect(dashboard.page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
 
 
-def test_long_lists_of_jobs_come_in_pages(open_dashboard: Opener, own_server: Server) -> None:
-    dashboard: Dashboard = open_dashboard(own_server.url)
-    campaign_id = dashboard.create("twin")
-    for _ in range(22):
-        dashboard.post(f"/campaigns/{campaign_id}/proposal")
-        dashboard.when_ready(campaign_id)
-    dashboard.until(lambda: dashboard.get("/jobs?state=queued&state=running")["total"] == 0)
+def test_long_lists_of_jobs_come_in_pages(open_dashboard: Opener, empty_server: Server, states: States) -> None:
+    dashboard: Dashboard = open_dashboard(empty_server.url)
+    states.propose_again(states.campaign(), 22)
     total = dashboard.get("/jobs")["total"]
     assert total > 20
     dashboard.open("/jobs")

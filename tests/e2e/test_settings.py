@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport
+from tests.e2e.states import States
 from tests.runtime.processes import Serving
 
 VOICE = """
@@ -72,8 +73,10 @@ def test_a_server_that_others_reach_shows_its_address_to_a_camera(open_dashboard
         expect(panel).to_contain_text("anybody who can reach this machine")
 
 
-def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(dashboard: Dashboard, tmp_path: Path) -> None:
-    campaign_id = dashboard.create("twin", name="Worth keeping")
+def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
+    dashboard: Dashboard, states: States, tmp_path: Path
+) -> None:
+    campaign_id = states.campaign(name="Worth keeping")
     dashboard.open("/settings")
     with dashboard.page.expect_download() as waiting:
         dashboard.button("Download a backup").click()
@@ -128,8 +131,10 @@ def test_keys_are_explained_by_a_key_and_those_of_the_page_come_first(dashboard:
     expect(help_).to_be_visible()
 
 
-def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(dashboard: Dashboard) -> None:
-    dashboard.create("twin")
+def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(
+    dashboard: Dashboard, states: States
+) -> None:
+    states.campaign()
     dashboard.open("/")
     search = dashboard.page.get_by_label("Search")
     expect(search).to_be_visible()
@@ -140,9 +145,12 @@ def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(
     expect(dashboard.page.get_by_role("dialog", name="Keys on this page")).to_be_hidden()
 
 
-def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switched_on(dashboard: Dashboard) -> None:
+def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switched_on(
+    open_dashboard: Opener, shared_server: Server, states: States
+) -> None:
+    dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.page.add_init_script(VOICE)
-    campaign_id = dashboard.create("twin")
+    campaign_id = states.campaign()
     dashboard.open(f"/campaigns/{campaign_id}")
     region = dashboard.page.locator("[aria-live=polite]", has_text="Landed")
     dashboard.fly_headless(campaign_id, 1)
@@ -159,11 +167,10 @@ def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switch
     assert "Taking off." in said(dashboard)
 
 
-def test_every_number_that_one_may_ask_about_is_explained_by_keyboard(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", strategy="calibrated", stop={"kind": "budget", "max_flights": 20})
-    dashboard.fly_headless(campaign_id, 2)
-    dashboard.fly_headless_body(campaign_id, {"variant": "repeat"})
-    dashboard.when_ready(campaign_id)
+def test_every_number_that_one_may_ask_about_is_explained_by_keyboard(dashboard: Dashboard, states: States) -> None:
+    patient = {"kind": "budget", "max_flights": 20}
+    campaign_id = states.campaign(strategy="calibrated", stop=patient, flights=2)
+    states.repeat(campaign_id)
     dashboard.open_campaign(campaign_id)
     dashboard.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
     expect(dashboard.page.get_by_role("button", name="What was learned of the vehicle?")).to_be_visible()

@@ -7,16 +7,18 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.dashboard import Dashboard, printed
+from tests.e2e.states import States
 
 PATIENT = {"kind": "budget", "max_flights": 20}
 WRAPPING = {"kp": 283, "ki": 1356, "kd": 82}
 """The paper's Table 2: ki·(sum of errors) can wrap at 32 bits."""
 
 
-def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", strategy="calibrated", seed=3, stop=PATIENT)
-    dashboard.fly_headless(campaign_id, 1)
-    dashboard.open_campaign(dashboard.when_ready(campaign_id))
+def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(
+    dashboard: Dashboard, states: States
+) -> None:
+    campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
+    dashboard.open_campaign(campaign_id)
     curve, lower, upper = (dashboard.trace("takeoffs", *what[:1], **what[1]) for what in (
         ("prediction", {}), ("band", {"edge": "lower"}), ("band", {"edge": "upper"})))  # fmt: skip
     assert curve is not None and lower is not None and upper is not None  # noqa: PT018
@@ -33,10 +35,9 @@ def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(da
     )
 
 
-def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", strategy="calibrated", seed=3, stop=PATIENT)
-    dashboard.fly_headless(campaign_id, 1)
-    dashboard.open_campaign(dashboard.when_ready(campaign_id))
+def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
+    dashboard.open_campaign(campaign_id)
     why = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["explanation"]
     card = dashboard.panel("Next flight: 2")
     card.get_by_text("Why these gains").click()
@@ -49,10 +50,11 @@ def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard)
     expect(dashboard.page.get_by_text("Of ten flights, nine should end inside it")).to_be_visible()
 
 
-def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", strategy="gradient", seed=3, stop=PATIENT)
-    dashboard.fly_headless(campaign_id, 2)
-    dashboard.open_campaign(dashboard.when_ready(campaign_id))
+def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(
+    dashboard: Dashboard, states: States
+) -> None:
+    campaign_id = states.campaign(strategy="gradient", seed=3, stop=PATIENT, flights=2)
+    dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("Max")
     dashboard.page.get_by_role("button", name=re.compile("^Repeat (instead|the best)$")).click()
     dashboard.until(lambda: [one["state"] for one in dashboard.trials(campaign_id)] == ["valid"] * 3)
@@ -85,8 +87,8 @@ def refuse(page: Page) -> None:
     page.get_by_role("button", name="Fly these gains").click()
 
 
-def test_a_refusal_offers_the_nearest_value_that_would_pass(dashboard: Dashboard) -> None:
-    campaign_id = dashboard.create("twin", step_fraction=1.0, first_step_fraction=1.0)
+def test_a_refusal_offers_the_nearest_value_that_would_pass(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign("twin", step_fraction=1.0, first_step_fraction=1.0)
     dashboard.open_campaign(campaign_id)
     refuse(dashboard.page)
     ki = dashboard.page.get_by_label(re.compile("^ki"))
@@ -99,9 +101,9 @@ def test_a_refusal_offers_the_nearest_value_that_would_pass(dashboard: Dashboard
 
 
 def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_with_the_flight(
-    dashboard: Dashboard,
+    dashboard: Dashboard, states: States
 ) -> None:
-    campaign_id = dashboard.create("twin")
+    campaign_id = states.campaign("twin")
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("Max")
     refuse(dashboard.page)
@@ -119,12 +121,14 @@ def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_w
     expect(verdict).to_contain_text("the paper flew these gains")
 
 
-def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(dashboard: Dashboard) -> None:
+def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(
+    dashboard: Dashboard, states: States
+) -> None:
     time_s = np.arange(0.0, 33.0, 0.02)
     altitude_m = 3.0 * (1.0 - np.exp(-time_s))
     altitude_m[500:505] += 1.5
     content = "time_s,altitude_m\n" + "".join(f"{t:.3f},{z:.5f}\n" for t, z in zip(time_s, altitude_m, strict=True))
-    campaign_id = dashboard.create("import")
+    campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
     with dashboard.page.expect_file_chooser() as chooser:
         dashboard.button("Upload flight record").click()
@@ -143,9 +147,8 @@ def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(das
     assert max(seconds) == pytest.approx(10.1, abs=0.1)
 
 
-def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard) -> None:
-    donor = dashboard.create("twin", name="Donor of the warm start", strategy="calibrated")
-    dashboard.fly_headless(donor, 2)
+def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard, states: States) -> None:
+    donor = states.campaign(name="Donor of the warm start", strategy="calibrated", flights=2)
     page = dashboard.page
     dashboard.open("/new")
     recommended = dashboard.get("/catalogue")["strategies"][0]
@@ -163,7 +166,7 @@ def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard
     assert (start["donor"]["campaign_id"], start["donor"]["trial_number"]) == (donor, best["trial_number"])
 
 
-def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dashboard) -> None:
+def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dashboard, states: States) -> None:
     page = dashboard.page
     dashboard.open("/new")
     experiment = next(one for one in dashboard.get("/catalogue")["experiments"] if one["name"] == "pitch-tracking")
@@ -173,7 +176,7 @@ def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dash
     dashboard.button("Create campaign").click()
     expect(page.get_by_role("heading", name="F-16 by hand")).to_be_visible()
     campaign_id = dashboard.when_ready(dashboard.campaign_id)
-    dashboard.fly_headless(campaign_id, 1)
+    states.fly(campaign_id)
     [trial] = dashboard.trials(campaign_id)
     unit = experiment["error_unit"]
     expect(dashboard.panel("Flight 1")).to_contain_text(f"{trial['error']:.3f} {unit}")

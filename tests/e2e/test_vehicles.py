@@ -4,28 +4,24 @@ import json
 import os
 import re
 import signal
-from collections.abc import Iterator
 from typing import Final
 
 import pytest
 from playwright.sync_api import Locator, expect
 
-from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.conftest import Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.flying_by_hand import DRONE_SPEED
+from tests.e2e.states import States
 from tests.runtime.drones import SAFE, TRIED, Drone
 
 SAFE_IN_BRACKETS: Final = "[283 13 82]"
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with served(tmp_path_factory.mktemp("fleet") / "data") as one:
-        yield one
-
-
-@pytest.fixture
-def dashboard(open_dashboard: Opener, server: Server) -> Dashboard:
-    return open_dashboard(server.url)
+@pytest.fixture(scope="module", autouse=True)
+def _no_other_vehicles(states: States) -> None:
+    """Names are given once."""
+    states.clear()
 
 
 def fact(dashboard: Dashboard, panel: str, title: str) -> Locator:
@@ -56,7 +52,7 @@ def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
 
 def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dashboard: Dashboard) -> None:
     page = dashboard.page
-    with Drone() as drone:
+    with Drone(speed=DRONE_SPEED) as drone:
         vehicle_id = register_by_hand(dashboard, "Bee", drone)
         expect(page.get_by_role("heading", level=1)).to_have_text("Bee")
         expect(state_word(dashboard, "Not connected")).to_be_visible()
@@ -93,10 +89,11 @@ def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dash
         ]
 
 
-def test_a_campaign_with_a_registered_vehicle_has_its_experiment(dashboard: Dashboard) -> None:
+def test_a_campaign_with_a_registered_vehicle_has_its_experiment(dashboard: Dashboard, states: States) -> None:
     page = dashboard.page
-    options = {"autopilot": "px4", "address": "udpin:127.0.0.1:14998", "simulated": True}
-    vehicle = dashboard.post("/vehicles", {"name": "Moth", "kind": "mavlink", "options": options})
+    vehicle_id = states.vehicle(
+        "Moth", options={"autopilot": "px4", "address": "udpin:127.0.0.1:14998", "simulated": True}
+    )
     dashboard.open("/new")
     expect(page.get_by_role("radio", name=re.compile("Moth"))).to_have_count(0)
     dashboard.button("Moth").click()
@@ -105,20 +102,17 @@ def test_a_campaign_with_a_registered_vehicle_has_its_experiment(dashboard: Dash
     dashboard.button("Create campaign").click()
     page.wait_for_url(re.compile(r"/campaigns/\d+$"))
     campaign = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
-    assert (campaign["vehicle"]["id"], campaign["definition"]["experiment"]) == (vehicle["id"], "takeoff-px4")
+    assert (campaign["vehicle"]["id"], campaign["definition"]["experiment"]) == (vehicle_id, "takeoff-px4")
 
 
-def left_in_the_air(dashboard: Dashboard, server: Server, drone: Drone, name: str) -> int:
+def left_in_the_air(dashboard: Dashboard, server: Server, states: States, drone: Drone, name: str) -> int:
     """A vehicle that nobody flies any more: its session was killed while it flew."""
-    options = {"address": drone.address, "simulated": True}
-    vehicle_id: int = dashboard.post("/vehicles", {"name": name, "kind": "mavlink", "options": options})["id"]
+    vehicle_id = states.vehicle(name, options={"address": drone.address, "simulated": True})
     dashboard.post(f"/vehicles/{vehicle_id}/connect")
     until_in_state(dashboard, vehicle_id, "ready")
-    made = dashboard.post("/campaigns", {"name": name, "vehicle": {"kind": "mavlink", "id": vehicle_id}})
-    campaign_id = dashboard.when_ready(made["id"])
-    trial = dashboard.post(f"/campaigns/{campaign_id}/trials", {"gains": TRIED})
+    trial_id = states.plan(states.campaign("mavlink", name=name, vehicle_id=vehicle_id), TRIED)
     dashboard.open(f"/vehicles/{vehicle_id}")
-    dashboard.post(f"/trials/{trial['id']}/fly")
+    dashboard.post(f"/trials/{trial_id}/fly")
     expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^[1-3]\.\d\d m$"))
     os.kill(json.loads((server.data_dir / f"vehicle-{vehicle_id}.lock").read_text())["pid"], signal.SIGKILL)
     until_in_state(dashboard, vehicle_id, "quarantined")
@@ -141,11 +135,11 @@ def until_in_state(dashboard: Dashboard, vehicle_id: int, state: str) -> None:
 
 
 def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
-    dashboard: Dashboard, server: Server
+    dashboard: Dashboard, shared_server: Server, states: States
 ) -> None:
     page = dashboard.page
-    with Drone() as drone:
-        vehicle_id = left_in_the_air(dashboard, server, drone, "Wasp")
+    with Drone(speed=DRONE_SPEED) as drone:
+        vehicle_id = left_in_the_air(dashboard, shared_server, states, drone, "Wasp")
         expect(page.get_by_role("heading", name="Quarantined: do not fly it")).to_be_visible()
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("armed")
         dashboard.button("Land now").click()
@@ -158,3 +152,5 @@ def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
         expect(state_word(dashboard, "Ready")).to_be_visible()
         assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
         expect(dashboard.panel("Gains it was given")).to_contain_text("Safe gains at the release")
+        dashboard.post(f"/vehicles/{vehicle_id}/disconnect")
+        until_in_state(dashboard, vehicle_id, "disconnected")

@@ -7,17 +7,16 @@ from playwright.sync_api import Locator, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, Dashboard
+from tests.e2e.states import States
 from tests.trials.test_photos import png
 
 Json = dict[str, Any]
 
 
 @pytest.fixture
-def campaign_id(dashboard: Dashboard) -> int:
+def campaign_id(states: States) -> int:
     """With three valid flights."""
-    made = dashboard.create("twin", stop={"kind": "budget", "max_flights": 12})
-    dashboard.fly_headless(made, 3)
-    return dashboard.when_ready(made)
+    return states.campaign(stop={"kind": "budget", "max_flights": 12}, flights=3)
 
 
 def by_error(dashboard: Dashboard, campaign_id: int) -> list[Json]:
@@ -57,11 +56,11 @@ def test_marking_the_best_invalid_says_what_it_changes_before_and_after_and_is_u
     assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == best["number"]
 
 
-def test_a_flight_that_came_to_nothing_is_flown_again_with_its_gains(dashboard: Dashboard, campaign_id: int) -> None:
+def test_a_flight_that_came_to_nothing_is_flown_again_with_its_gains(
+    dashboard: Dashboard, states: States, campaign_id: int
+) -> None:
     best = by_error(dashboard, campaign_id)[0]
-    dashboard.post(
-        f"/trials/{best['id']}/classify", {"version": best["version"], "outcome": "invalid", "reason": "Wind gust"}
-    )
+    states.classify(best["id"], "invalid", "Wind gust")
     verdict = open_flight(dashboard, best)
     verdict.get_by_role("button", name="Retry these gains").click()
     dashboard.until(lambda: len(dashboard.trials(campaign_id)) == 4)
@@ -119,10 +118,9 @@ def test_a_note_that_is_being_written_outlives_a_verdict(dashboard: Dashboard, c
     assert dashboard.get(f"/trials/{trial['id']}")["note"] == "Gust from the north"
 
 
-def test_it_fits_on_a_phone(open_dashboard: Opener, shared_server: Server) -> None:
+def test_it_fits_on_a_phone(open_dashboard: Opener, shared_server: Server, states: States) -> None:
     dashboard = open_dashboard(shared_server.url, viewport=PHONE)
-    campaign_id = dashboard.create("twin")
-    dashboard.fly_headless(campaign_id, 1)
+    campaign_id = states.campaign(flights=1)
     verdict = open_flight(dashboard, dashboard.trials(campaign_id)[0])
     verdict.get_by_role("button", name="Mark invalid").click()
     verdict.get_by_text("Note and photos").click()
@@ -130,13 +128,12 @@ def test_it_fits_on_a_phone(open_dashboard: Opener, shared_server: Server) -> No
 
 
 def test_a_card_clones_a_campaign_onto_another_vehicle_and_archives_a_finished_one(
-    open_dashboard: Opener, own_server: Server
+    open_dashboard: Opener, empty_server: Server, states: States
 ) -> None:
-    dashboard = open_dashboard(own_server.url)
+    dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
-    campaign_id = dashboard.create("twin", name="On the twin", stop={"kind": "budget", "max_flights": 1})
-    dashboard.fly_headless(campaign_id, 1)
-    dashboard.until(lambda: dashboard.get(f"/campaigns/{campaign_id}")["state"] == "finished")
+    campaign_id = states.campaign(name="On the twin", stop={"kind": "budget", "max_flights": 1}, flights=1)
+    assert dashboard.get(f"/campaigns/{campaign_id}")["state"] == "finished"
     dashboard.open("/")
     card = page.get_by_role("listitem").filter(has=page.get_by_role("heading", name="On the twin", exact=True))
     card.get_by_text("Clone or archive").click()

@@ -1,0 +1,268 @@
+"""States of a server's data for its pages, written straight into its database by the program's own services.
+
+The rows are those that the program itself would write: gains are proposed by the strategy, judged by the gate, and
+flown by the simulated vehicle. Every flight is one transaction together with the proposal that follows it, so that the
+worker of a running server finds nothing to do; browsers are told of it as of any other change.
+"""
+
+import io
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from sqlalchemy import delete
+from sqlalchemy.orm import Session
+
+from app.campaigns import landscapes, proposing, rehearsing
+from app.campaigns import service as campaigns
+from app.campaigns.computation import compute
+from app.campaigns.schemas import NewCampaign
+from app.controller_checks import service as controller_checks
+from app.core.landscape import foreseen, plan_survey
+from app.db.models import Base, EventRow, ProposalRow
+from app.db.session import Database
+from app.errors import StorageError
+from app.fleet import registering
+from app.fleet.control import NOBODY
+from app.fleet.schemas import NewVehicle
+from app.jobs import service as jobs
+from app.settings import Settings
+from app.studies import service as studies
+from app.studies.reproductions import get_reproduction
+from app.trials import flights, photos
+from app.trials import service as trials
+from app.trials.schemas import Classification, NewTrial
+from app.vehicles.base import FlightOrder
+from app.vehicles.open import open_vehicle, restore_safe_gains
+from tests.builders import WORKER
+
+T = TypeVar("T")
+Json = dict[str, Any]
+LEASE_S: Final = 60.0
+TRIES: Final = 5
+"""A writer waits five seconds for another one; what computes on a busy machine may take longer."""
+
+
+class States:
+    """What a server's database is to hold, written while it runs or before it does."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self._database = Database(Settings(data_dir=data_dir).database_file)
+
+    def close(self) -> None:
+        self._database.close()
+
+    # ---- campaigns and flights
+
+    def campaign(
+        self,
+        vehicle: str = "twin",
+        *,
+        name: str = "",
+        flights: int = 0,
+        options: Mapping[str, float] | None = None,
+        vehicle_id: int | None = None,
+        **definition: object,
+    ) -> int:
+        """A campaign with so many flights of its proposals, and the next one ready unless it has ended."""
+        new = NewCampaign.model_validate(
+            {
+                "name": name or f"On {vehicle}",
+                "vehicle": {"kind": vehicle, "options": dict(options or {}), "id": vehicle_id},
+                "definition": definition,
+            }
+        )
+
+        def create(session: Session) -> int:
+            made = campaigns.create_campaign(session, new).id
+            _propose(session, made)
+            return made
+
+        campaign_id = self._write(create)
+        self.fly(campaign_id, flights)
+        return campaign_id
+
+    def fly(self, campaign_id: int, flights: int = 1) -> list[int]:
+        """Fly the next proposals; the trials' ids."""
+        return [self._fly(campaign_id, None) for _ in range(flights)]
+
+    def fly_gains(self, campaign_id: int, gains: Mapping[str, float], *, overrule: str | None = None) -> int:
+        """Fly gains of one's own, also those that the gate refuses if there is a reason to; the trial's id."""
+        return self._fly(campaign_id, {"gains": dict(gains), "overrule": overrule})
+
+    def repeat(self, campaign_id: int) -> int:
+        """Fly the best gains again; the trial's id."""
+        return self._fly(campaign_id, {"variant": "repeat"})
+
+    def plan(self, campaign_id: int, gains: Mapping[str, float]) -> int:
+        """A trial that nobody has flown; its id."""
+        return self._write(lambda session: trials.create_trial(session, campaign_id, NewTrial(gains=dict(gains))).id)
+
+    def take_record(self, campaign_id: int, csv: Callable[[Mapping[str, float]], bytes]) -> int:
+        """The proposed gains, flown elsewhere: `csv` makes the record that these gains leave; the trial's id."""
+
+        def upload(session: Session) -> int:
+            proposal = _proposed(session, campaign_id)
+            trial = trials.create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
+            flown = trials.read_record(io.BytesIO(csv(proposal.gains)), name="flight.csv")
+            trials.import_record(session, trial.id, flown)
+            _propose(session, campaign_id)
+            return trial.id
+
+        return self._write(upload)
+
+    def classify(self, trial_id: int, outcome: str, reason: str) -> None:
+        """A person's word on a flight, and the gains that follow from it."""
+
+        def say(session: Session) -> None:
+            trial = trials.get_trial(session, trial_id)
+            said = Classification.model_validate({"version": trial.version, "outcome": outcome, "reason": reason})
+            trials.classify_trial(session, trial_id, said)
+            _propose(session, trial.campaign_id)
+
+        self._write(say)
+
+    def photograph(self, trial_id: int, picture: bytes) -> None:
+        self._write(lambda session: photos.add_photo(session, trial_id, picture))
+
+    def rehearse(self, campaign_id: int) -> None:
+        """Fly the campaign on its simulation until its rehearsal has passed."""
+        rehearsal = self._write(lambda session: _rehearsal(session, campaign_id))
+        while self._rehearsed(campaign_id) == "under way":
+            self.fly(rehearsal)
+        assert self._rehearsed(campaign_id) == "passed"
+
+    def survey(self, campaign_id: int) -> None:
+        """Compute the error landscape of the latest proposal."""
+        with self._database.read() as session:
+            order: Json = {"name": f"campaign {campaign_id}", "proposal_id": _proposed(session, campaign_id).id}
+            plan = landscapes.read_plan(session, campaign_id, order)
+        survey = plan_survey(plan)
+        assert survey is not None, "there is nothing to draw"
+        found = survey.landscape(foreseen(survey.foresee, survey.points()))
+
+        def store(session: Session) -> None:
+            landscapes.request_landscape(session, campaign_id)
+            _finish(session, landscapes.LANDSCAPE_JOB, campaign_id, landscapes.as_json(found, order))
+
+        self._write(store)
+
+    # ---- the rest
+
+    def vehicle(self, name: str, **fields: object) -> int:
+        """A registered vehicle that nobody has connected yet."""
+        new = NewVehicle.model_validate({"name": name, "kind": "mavlink", **fields})
+        return self._write(lambda session: registering.register_vehicle(session, new, NOBODY).id)
+
+    def vehicle_of(self, campaign_id: int) -> int:
+        with self._database.read() as session:
+            return campaigns.get_row(session, campaign_id).vehicle_id
+
+    def check_of_the_example(self) -> int:
+        """A controller check."""
+        result = controller_checks.examine_example()
+        return self._write(lambda session: controller_checks.store_example(session, result).id)
+
+    def reproduce(self, name: str) -> None:
+        """A reproduction that was run."""
+        result = get_reproduction(name).run(lambda _share, _doing: None, False).as_json()
+
+        def store(session: Session) -> None:
+            studies.request_run(session, name, full=False)
+            _finish(session, studies.REPRODUCTION_JOB, None, result)
+
+        self._write(store)
+
+    def propose_again(self, campaign_id: int, times: int) -> None:
+        """As many jobs that are done."""
+
+        def compute(session: Session) -> None:
+            campaigns.compute_proposal(session, campaign_id)
+            _propose(session, campaign_id)
+
+        for _ in range(times):
+            self._write(compute)
+
+    def clear(self) -> None:
+        """Take everything out, as if the server had been started with a new folder. What is told to browsers stays, in
+        order that those connected learn of what comes; ids are never used twice."""
+
+        def empty(session: Session) -> None:
+            for table in reversed(Base.metadata.sorted_tables):
+                if table.name != EventRow.__tablename__:
+                    session.execute(delete(table))
+
+        self._write(empty)
+
+    # ---- one transaction each
+
+    def _write(self, work: Callable[[Session], T]) -> T:
+        for _ in range(TRIES):
+            with suppress(StorageError), self._database.write() as session:
+                return work(session)
+        raise AssertionError("the database was busy for too long")
+
+    def _fly(self, campaign_id: int, chosen: Json | None) -> int:
+        def fly(session: Session) -> int:
+            what = {"proposal_id": _proposed(session, campaign_id).id} if chosen is None else chosen
+            new = NewTrial.model_validate({**what, "fly": {"speed": None}})
+            trial = trials.create_trial(session, campaign_id, new)
+            _carry_out(session, trial.id)
+            _propose(session, campaign_id)
+            return trial.id
+
+        return self._write(fly)
+
+    def _rehearsed(self, campaign_id: int) -> str:
+        with self._database.read() as session:
+            return campaigns.get_campaign(session, campaign_id).rehearsal.state
+
+
+def _rehearsal(session: Session, campaign_id: int) -> int:
+    made = rehearsing.rehearse(session, campaign_id).id
+    _propose(session, made)
+    return made
+
+
+def _proposed(session: Session, campaign_id: int) -> ProposalRow:
+    """The proposal that holds now."""
+    return proposing.latest_fresh(session, campaigns.get_row(session, campaign_id))
+
+
+def _carry_out(session: Session, trial_id: int) -> None:
+    """What a worker does with the flight that was asked for."""
+    task = flights.claim_flight(session, WORKER)
+    assert task is not None
+    assert task.trial_id == trial_id, "another flight waits"
+    with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
+        flights.record_staged(session, task.flight_id, vehicle.stage(task.gains))
+        flights.record_lift_off(session, task.flight_id)
+        order = FlightOrder(seed=task.seed)
+        record = vehicle.fly(order, on_sample=lambda _sample: None, should_stop=lambda: None)
+        restored = restore_safe_gains(vehicle)
+    flights.record_landing(session, task.flight_id, record)
+    flights.record_restored(session, task.flight_id, restored)
+
+
+def _propose(session: Session, campaign_id: int) -> None:
+    """Carry out the campaign's waiting proposal job, if there is one, as a worker does."""
+    waiting = jobs.latest_job(session, campaign_id, proposing.PROPOSAL_JOB)
+    if waiting is None or waiting.state != "queued":
+        return
+    computed = compute(proposing.read_history(session, campaign_id))
+    _finish(session, proposing.PROPOSAL_JOB, campaign_id)
+    proposing.store_proposal(session, campaign_id, computed)
+
+
+def _finish(session: Session, kind: str, campaign_id: int | None, result: Json | None = None) -> None:
+    """The waiting job of that kind is done; others that wait are left to the server's own worker."""
+    others = []
+    while (job := jobs.claim_job(session, worker=WORKER, kinds=(kind,), lease_s=LEASE_S)) is not None:
+        if job.campaign_id == campaign_id:
+            jobs.finish_job(session, job.id, worker=WORKER, result=result)
+            break
+        others.append(job.id)
+    assert job is not None, f"no {kind} job of campaign {campaign_id} waits"
+    for other in others:
+        jobs.put_back_job(session, other, worker=WORKER)
