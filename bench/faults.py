@@ -1,4 +1,4 @@
-"""Whole trials over UDP, each with something wrong with the vehicle, the link or the wire, and an abort in between.
+"""Whole trials in lockstep, each with something wrong with the vehicle, the link or the wire, and an abort in between.
 
     ./dev exec python -m bench.faults                                 a sample, as .ci/run has it
     ./dev exec python -m bench.faults --runs 500 --seed 20261121 --results FILE --out docs

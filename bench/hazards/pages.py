@@ -112,9 +112,9 @@ flies one run again and prints all that is known of it. This page is written by 
 
 A run is drawn from its seed: autopilot, gains, what sets in, in which state of the trial, how long after its
 beginning and for how long (a fifth of a second to for good). Consecutive seeds go through everything in every state.
-The vehicle is the simulated drone behind a UDP socket on the loopback interface, in the body of `twin` with its
-scatter; the program is `MavlinkVehicle` as it flies. Both live in the drone's time, which waits for the program's
-threads, so a busy machine changes nothing but the duration; a run that is flown again differs by some milliseconds.
+The vehicle is the simulated drone in the body of `twin` with its scatter; the program is `MavlinkVehicle` as it flies.
+They are in lockstep: the drone's time passes only while the program waits, so a run that is flown again is the same,
+whatever else the machine does. Real sockets and threads are for the tests of the link.
 
 What the program does is judged without asking it. A tap at the drone's antenna reads every packet that the ground
 sends, whether the drone hears it or not, and knows the drone's true height at that moment. The states in the tables
