@@ -22,6 +22,7 @@ TEXT = DOCUMENT.read_text()
 SCRIPTS = re.findall(r"^```python\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 
 
+@pytest.mark.complete
 def test_the_scripts_work_against_a_real_server(tmp_path: Path) -> None:
     assert len(SCRIPTS) == 2
     with Serving(tmp_path / "data") as server:

@@ -43,6 +43,7 @@ class Watching:
                     return
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("kind", ["twin", "jsbsim"])
 def test_a_watched_flight_at_the_speed_of_life_is_computed_in_step_and_ends_by_its_abort(
     serving: Serving, kind: str

@@ -75,6 +75,7 @@ def test_a_worker_killed_in_mid_flight_leaves_a_lost_trial_and_a_free_vehicle(se
     require_sound_database(serving.data_dir)
 
 
+@pytest.mark.complete
 def test_a_flight_whose_own_process_is_killed_is_lost_and_the_worker_goes_on(serving: Serving) -> None:
     campaign_id = serving.campaign(kind="jsbsim")
     worker = serving.worker_pid()
@@ -86,6 +87,7 @@ def test_a_flight_whose_own_process_is_killed_is_lost_and_the_worker_goes_on(ser
     assert serving.worker_pid() == worker
 
 
+@pytest.mark.complete
 def test_a_killed_fork_server_costs_no_flight_and_there_is_another_for_the_next(serving: Serving) -> None:
     campaign_id = serving.campaign()
     worker = serving.worker_pid()
@@ -103,6 +105,7 @@ def test_a_killed_fork_server_costs_no_flight_and_there_is_another_for_the_next(
     assert fork_server(worker) != killed
 
 
+@pytest.mark.complete
 def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> None:
     first = Serving(tmp_path / "data")
     campaign_id = first.campaign()
@@ -138,6 +141,7 @@ def test_a_flight_that_outlived_its_web_process_can_still_be_aborted(tmp_path: P
         assert second.trial(trial_id, "aborted")["reason"] == "enough"
 
 
+@pytest.mark.complete
 def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(serving: Serving) -> None:
     undisturbed = serving.proposal(serving.campaign())
     worker = serving.worker_pid()
@@ -166,6 +170,7 @@ def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(ser
     wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in crew))
 
 
+@pytest.mark.complete
 def test_stopping_the_server_in_mid_flight_lands_and_records_it(tmp_path: Path) -> None:
     serving = Serving(tmp_path / "data")
     worker = serving.worker_pid()

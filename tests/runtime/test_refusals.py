@@ -34,6 +34,7 @@ def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         yield one
 
 
+@pytest.mark.complete
 def test_a_busy_port_is_named_with_the_option_that_helps(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -44,6 +45,7 @@ def test_a_busy_port_is_named_with_the_option_that_helps(tmp_path: Path) -> None
     assert not (tmp_path / "data" / "gainline.sqlite3").exists(), "nothing was begun"
 
 
+@pytest.mark.complete
 def test_a_host_that_is_not_this_machine_is_refused(tmp_path: Path) -> None:
     refused = gainline("serve", "--host", "192.0.2.1", "--port", "0", "--data-dir", str(tmp_path))
     assert refused.returncode == 1
@@ -58,6 +60,7 @@ def test_a_second_server_on_the_same_database_is_refused_and_the_first_goes_on(s
     serving.trial(serving.fly(serving.campaign()), "valid")
 
 
+@pytest.mark.complete
 def test_a_second_worker_on_the_same_database_is_refused_and_the_first_goes_on(serving: Serving) -> None:
     worker = serving.worker_pid()
     refused = gainline("worker", "--data-dir", str(serving.data_dir))
@@ -89,6 +92,7 @@ def test_a_worker_of_its_own_serves_a_server_without_one(tmp_path: Path) -> None
             assert worker.wait(PATIENCE_S) == 0
 
 
+@pytest.mark.complete
 def test_a_server_with_open_streams_stops_by_itself_and_its_worker_with_it(tmp_path: Path) -> None:
     serving = Serving(tmp_path / "data")
     worker = serving.worker_pid()
@@ -124,6 +128,7 @@ def test_what_others_can_do_is_said_before_it_is_possible(host: str) -> None:
     assert "no accounts" in warning
 
 
+@pytest.mark.complete
 def test_a_server_that_others_reach_says_where_a_tablet_finds_it(tmp_path: Path) -> None:
     elsewhere = addresses_elsewhere("0.0.0.0", 8000)
     if not elsewhere:

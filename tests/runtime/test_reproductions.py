@@ -30,6 +30,7 @@ def running(serving: Serving, job_id: int) -> Any:
     return wait_for(f"job {job_id} to run", there)
 
 
+@pytest.mark.complete
 def test_a_reproduction_whose_worker_is_killed_runs_again_and_can_be_cancelled(serving: Serving) -> None:
     worker = serving.worker_pid()
     job_id = serving.post(f"/reproductions/{LONG}/run")["id"]
@@ -47,6 +48,7 @@ def test_a_reproduction_whose_worker_is_killed_runs_again_and_can_be_cancelled(s
     assert serving.get(f"/reproductions/{LONG}")["latest"] is None
 
 
+@pytest.mark.complete
 def test_proposals_and_flights_do_not_wait_behind_a_reproduction(serving: Serving) -> None:
     job_id = serving.post(f"/reproductions/{LONG}/run")["id"]
     running(serving, job_id)

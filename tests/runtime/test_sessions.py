@@ -48,6 +48,7 @@ def test_a_registered_vehicle_flies_and_holds_its_safe_gains_afterwards(serving:
         assert vehicle.seen()["state"] == "disconnected"
 
 
+@pytest.mark.complete
 def test_a_real_vehicle_waits_for_its_operator_and_for_a_persons_verdict(serving: Serving) -> None:
     with connected(serving, "Real one", real=True) as (vehicle, _):
         assert vehicle.in_state("ready")["is_real"]
@@ -75,6 +76,7 @@ def test_a_real_vehicle_waits_for_its_operator_and_for_a_persons_verdict(serving
         assert serving.trial(trial_id, "valid")["error"] < 0.5
 
 
+@pytest.mark.complete
 def test_an_abort_reaches_a_vehicle_in_the_air_while_the_database_is_locked(serving: Serving) -> None:
     with connected(serving, "Aborted") as (vehicle, _):
         trial_id = vehicle.planned(vehicle.campaign())
@@ -88,6 +90,7 @@ def test_an_abort_reaches_a_vehicle_in_the_air_while_the_database_is_locked(serv
         assert vehicle.in_state("ready")["held"] == SAFE
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_falls_silent_is_shown_as_gone_and_comes_back_by_itself(serving: Serving) -> None:
     with connected(serving, "Silent") as (vehicle, drone):
         drone.switch_off()
@@ -96,6 +99,7 @@ def test_a_vehicle_that_falls_silent_is_shown_as_gone_and_comes_back_by_itself(s
         assert vehicle.status(lambda status: status["state"] == "connected")["armed"] is False
 
 
+@pytest.mark.complete
 def test_a_vehicle_whose_session_is_killed_in_the_air_is_found_armed_and_only_told_to_land(serving: Serving) -> None:
     with connected(serving, "Orphan") as (vehicle, _):
         trial_id = vehicle.planned(vehicle.campaign())
@@ -122,6 +126,7 @@ def test_a_vehicle_whose_session_is_killed_in_the_air_is_found_armed_and_only_to
         assert vehicle.in_state("ready")["held"] == SAFE
 
 
+@pytest.mark.complete
 def test_a_vehicle_in_the_air_is_landed_when_the_worker_is_killed_and_is_there_again(serving: Serving) -> None:
     with connected(serving, "Left") as (vehicle, _):
         trial_id = vehicle.planned(vehicle.campaign())

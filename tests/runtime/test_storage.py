@@ -78,6 +78,7 @@ def land_in_the_spool(serving: Serving, trial_id: int) -> None:
     assert serving.trial(trial_id, "flying")["record"] is None
 
 
+@pytest.mark.complete
 def test_a_request_on_a_full_disk_is_refused_with_a_remedy_and_works_once_there_is_room(
     disk: Path, serving: Serving
 ) -> None:
@@ -92,6 +93,7 @@ def test_a_request_on_a_full_disk_is_refused_with_a_remedy_and_works_once_there_
     serving.trial(serving.fly(serving.campaign()), "valid")
 
 
+@pytest.mark.complete
 def test_a_flight_whose_record_would_not_fit_does_not_start(disk: Path, serving: Serving) -> None:
     campaign_id = serving.campaign()
     serving.worker_pid()
@@ -108,6 +110,7 @@ def test_a_flight_whose_record_would_not_fit_does_not_start(disk: Path, serving:
     serving.trial(trial_id, "valid")
 
 
+@pytest.mark.complete
 def test_a_disk_that_fills_up_in_mid_flight_costs_no_record(disk: Path, serving: Serving) -> None:
     trial_id = in_the_air(serving, serving.campaign())
     fill(disk)

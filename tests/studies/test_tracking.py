@@ -60,6 +60,7 @@ def test_a_method_is_told_by_the_share_that_comes_near_and_its_median_flights() 
     ]
 
 
+@pytest.mark.complete
 def test_the_long_form_identifies_again_at_every_perturbation_and_from_noisy_logs() -> None:
     brief, noisy, *further = _FULL
     assert (brief,) == _BRIEF

@@ -43,6 +43,7 @@ def test_cameras_are_recorded_beside_the_vehicle_aligned_and_in_agreement() -> N
     assert not find_glitches(Takeoff(), both)
 
 
+@pytest.mark.complete
 def test_cameras_can_be_the_ones_that_are_scored() -> None:
     record = flown(natnet(free_port()), scored_source="mocap")
     both = record.trajectory
@@ -61,6 +62,7 @@ def test_odometry_on_the_vehicle_s_own_link_is_a_second_source_too() -> None:
     np.testing.assert_allclose(record.trajectory["altitude_2_m"], record.trajectory["altitude_m"], atol=0.1)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("fault", ["mocap-lost@4", "mocap-frozen@4"])
 def test_cameras_that_see_nothing_new_land_the_vehicle_and_void_the_flight(fault: str) -> None:
     record = flown(natnet(free_port()), [fault])
@@ -70,6 +72,7 @@ def test_cameras_that_see_nothing_new_land_the_vehicle_and_void_the_flight(fault
     assert 4.0 < record.trajectory.time_s[-1] < 25.0
 
 
+@pytest.mark.complete
 def test_cameras_that_drift_away_land_the_vehicle_and_the_record_says_by_how_much() -> None:
     record = flown(natnet(free_port()), ["mocap-drift@4"])
     assert record.ending == "invalid"
@@ -79,6 +82,7 @@ def test_cameras_that_drift_away_land_the_vehicle_and_the_record_says_by_how_muc
     assert 4.0 < record.trajectory.time_s[-1] < 25.0
 
 
+@pytest.mark.complete
 def test_cameras_that_do_not_see_the_vehicle_on_the_ground_refuse_the_flight() -> None:
     mocap = natnet(free_port())
     with UdpRig(mocap=mocap) as rig:
@@ -89,6 +93,7 @@ def test_cameras_that_do_not_see_the_vehicle_on_the_ground_refuse_the_flight() -
         vehicle.close()
 
 
+@pytest.mark.complete
 def test_the_source_is_let_go_when_the_vehicle_cannot_be_opened() -> None:
     mocap = natnet(free_port())
     with UdpRig(mocap=mocap) as rig:

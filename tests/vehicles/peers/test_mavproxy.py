@@ -28,6 +28,7 @@ def typing_to(
         yield mavproxy, drone
 
 
+@pytest.mark.complete
 def test_mavproxy_tunes_and_flies_a_simulated_ardupilot(tmp_path: Path) -> None:
     modules = ("param", "mode", "arm", "misc", "cmdlong")
     with typing_to("ardupilot", tmp_path, dialect="ardupilotmega", mavlink=2, modules=modules) as (mavproxy, drone):
@@ -61,6 +62,7 @@ def block(number: int) -> tuple[str, str]:
     return message("MISSION_ACK", 0), message("SCRIPT_ITEM", number, b"")
 
 
+@pytest.mark.complete
 def test_mavproxy_tunes_and_flies_a_simulated_paparazzi(tmp_path: Path) -> None:
     """By the messages themselves, for its own commands do not fit: `param set` writes names in capitals, `arm` and
     `mode` ask for a COMMAND_ACK, which ends its listening where MAVLink 1 leaves out the target."""

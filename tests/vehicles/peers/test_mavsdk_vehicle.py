@@ -43,6 +43,7 @@ def met(*, armable: bool = True) -> Iterator[tuple[MavsdkVehicle, Vehicle]]:
         yield peer, ours
 
 
+@pytest.mark.complete
 def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back() -> None:
     with met() as (peer, ours):
         assert ours.stage(TUNED) == TUNED
@@ -59,6 +60,7 @@ def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back()
     np.testing.assert_allclose(flight["battery_v"], 12.3)
 
 
+@pytest.mark.complete
 def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_gains() -> None:
     with met(armable=False) as (peer, ours):
         ours.stage(TUNED)
@@ -67,6 +69,7 @@ def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_g
         assert (peer.flew_with, peer.gains, peer.stands) == ([], SAFE, True)
 
 
+@pytest.mark.complete
 def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters() -> None:
     port = free_port()
     assert MAVLINK.connect is not None

@@ -77,6 +77,7 @@ def test_mavsdk_sets_and_reads_parameters_of_both_kinds(autopilot: str, gain: st
     assert whole in [each.name for each in listed.int_params]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_mavsdk_flies_a_whole_flight(autopilot: str) -> None:
     with station(autopilot) as ground:
