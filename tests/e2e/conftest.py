@@ -222,7 +222,9 @@ class Tabs:
         if url not in self._contexts:
             self._contexts[url] = new_context(self._browser, url)
         if free := self._free.setdefault(url, []):
-            return free.pop()
+            page = free.pop()
+            page.bring_to_front()  # one behind others has less of the processor
+            return page
         page = self._contexts[url].new_page()
         watch(page, url, self.wrong)
         return page

@@ -29,7 +29,8 @@ gd => gd.data.map(trace => ({
 }))
 """
 
-_SETTLED: Final = """async ink => {
+SETTLES_WITHIN_MS: Final = 60_000
+_SETTLED: Final = """async ([ink, within]) => {
   const frame = () => new Promise(requestAnimationFrame);
   const all = (what, within = document) => Array.from(within.querySelectorAll(what));
   const isDrawn = plot => plot.dataset.drawn && (!ink || !plot.layout || plot.layout.font.color === ink);
@@ -50,9 +51,14 @@ _SETTLED: Final = """async ink => {
     await frame();
     await frame();
   }
+  const until = performance.now() + within;
   for (let same = 0, last = ""; same < 3;) {
     await frame();
     const late = waiting();
+    if (performance.now() > until) {
+      const moving = document.getAnimations().map(one => one.animationName ?? one.transitionProperty);
+      throw new Error(`not settled: ${late.map(one => one.outerHTML.slice(0, 300)).join("; ")} ${moving} ${last}`);
+    }
     late[0]?.scrollIntoView();
     const now = places();
     same = late.length === 0 && now === last && !isMoving() ? same + 1 : 0;
@@ -140,7 +146,7 @@ class Dashboard:
     def settled(self, theme: Theme | None = None) -> None:
         """Wait until nothing is being fetched or drawn any more, what is drawn once it is seen included, the charts in
         that theme's colours, and nothing moves."""
-        self.page.evaluate(_SETTLED, None if theme is None else PALETTES[theme].ink)
+        self.page.evaluate(_SETTLED, [None if theme is None else PALETTES[theme].ink, SETTLES_WITHIN_MS])
 
     # ---- the API's own word
 

@@ -162,6 +162,8 @@ WITH_LANDSCAPE = ("ready", "under-way", "finished", "elsewhere", "overruled", "p
 
 @pytest.fixture(scope="module")
 def pages(states: States) -> Pages:
+    """Of a server that holds nothing else."""
+    states.clear()
     return Pages(states)
 
 

@@ -21,6 +21,12 @@ WORN: Final = (0.68, *TWIN[1:])
 CALIBRATION, BATTERIES = "Calibration over the flights", "Batteries"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _no_other_flights(states: States) -> None:
+    """Campaigns share their simulated vehicles, and those that are flown elsewhere."""
+    states.clear()
+
+
 @pytest.fixture(scope="module")
 def worn(states: States) -> int:
     """Tuned in one campaign of two flights, flown once more after it has worn."""
