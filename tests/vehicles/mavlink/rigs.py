@@ -41,9 +41,9 @@ SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_D": 0.0, "PSC_ACCZ_I": 1.0},
     "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 2.0},
 }
-_TICKS_AT_ONCE: Final = 4
-_PATIENCE_S: Final = 0.05
-"""On the wall: for a thread that has ended its work, or a machine that is very busy."""
+_TICKS_AT_ONCE: Final = 8
+_PATIENCE_S: Final = 0.5
+"""On the wall: for a thread that has nothing to hear, or a machine that is very busy."""
 _SPEED: Final = 8.0
 _BYTEWISE: Final = 6
 _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
@@ -193,7 +193,7 @@ class UdpRig(_Heard):
     def vehicle(self, **options: OptionValue) -> MavlinkVehicle:
         chosen = self.options(**options)
         place = str(chosen["second_source"])
-        source = open_source(place, _Glances(self)) if place else None
+        source = open_source(place, self) if place else None
         return MavlinkVehicle(chosen, SAFE[self.autopilot], is_real=False, clock=self, source=source)
 
     # ---- the drone's thread
@@ -221,19 +221,3 @@ class UdpRig(_Heard):
             looked or not thread.is_alive() for thread, looked in tuple(self._lookers.items())
         ):
             time.sleep(0.0002)
-
-
-class _Glances:
-    """The drone's time for somebody whom the drone does not wait for."""
-
-    def __init__(self, drone: UdpRig) -> None:
-        self._drone = drone
-
-    def now_s(self) -> float:
-        return self._drone.drone.time_s
-
-    def wait_s(self, seconds: float) -> None:
-        self._drone.wait_s(seconds)
-
-    def wall_s(self, seconds: float) -> float:
-        return self._drone.wall_s(seconds)
