@@ -136,6 +136,7 @@ class VehicleActRow(Base, Reported):
             "vehicle_id",
             unique=True,
             sqlite_where=text(_ACT_UNDER_WAY_SQL),
+            postgresql_where=text(_ACT_UNDER_WAY_SQL),
         ),
         _NEVER_REUSE_IDS,
     )
@@ -327,6 +328,7 @@ class FlightRow(Base, Reported):
             "vehicle_id",
             unique=True,
             sqlite_where=text(_UNDER_WAY_SQL),
+            postgresql_where=text(_UNDER_WAY_SQL),
         ),
         _NEVER_REUSE_IDS,
     )
