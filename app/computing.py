@@ -9,12 +9,9 @@ from dataclasses import dataclass
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from traceback import format_exc
-from typing import Final, Generic, TypeVar
+from typing import Generic, TypeVar
 
 T = TypeVar("T")
-
-IDLE_S: Final = 2.0
-"""Without a task for so long, a new process loads what later ones need."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,20 +26,13 @@ class Refused:
     error: Exception
 
 
-def nothing() -> None:
-    """Nothing to prepare."""
-
-
-def compute(pipe: Connection, prepare: Callable[[], object], afterwards: Callable[[], object], niceness: int) -> None:
+def compute(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
     """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(niceness)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
     with suppress(EOFError, OSError):  # the parent is gone
-        while pipe.poll(IDLE_S):
-            pipe.send(_outcome(pipe.recv()))
-        afterwards()
         while True:
             pipe.send(_outcome(pipe.recv()))
 

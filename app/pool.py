@@ -12,7 +12,7 @@ from typing import Final, ParamSpec, Self, TypeVar
 
 import structlog
 
-from app.computing import Done, Refused, compute, nothing
+from app.computing import Done, Refused, compute
 from app.core.errors import GainlineError
 from app.processes import process_context
 
@@ -36,18 +36,10 @@ class Pool:
     `concurrent.futures.ProcessPoolExecutor` waits for in vain (docs/decisions/0014).
     """
 
-    def __init__(
-        self,
-        processes: int,
-        *,
-        prepare: Callable[[], object],
-        afterwards: Callable[[], object] = nothing,
-        niceness: int = 0,
-    ) -> None:
-        """`prepare()` runs in every new process before its first task, to load and compile what the first tasks need;
-        `afterwards()` once it has had nothing to do for a while, for what others need; `niceness`, from 0 to 19, is how
-        far they give way to other processes of the machine."""
-        self._computers = [_Computer(prepare, afterwards, niceness) for _ in range(processes)]
+    def __init__(self, processes: int, *, prepare: Callable[[], object], niceness: int = 0) -> None:
+        """`prepare()` runs in every new process before its first task, to load and compile what tasks need; `niceness`,
+        from 0 to 19, is how far they give way to other processes of the machine."""
+        self._computers = [_Computer(prepare, niceness) for _ in range(processes)]
         self._free: queue.LifoQueue[_Computer] = queue.LifoQueue()
         for computer in self._computers:
             self._free.put(computer)
@@ -90,9 +82,8 @@ class _Computer:
     """A process, started when it is needed, and the pipe to it. It performs for one thread at a time; any may close
     it."""
 
-    def __init__(self, prepare: Callable[[], object], afterwards: Callable[[], object], niceness: int) -> None:
+    def __init__(self, prepare: Callable[[], object], niceness: int) -> None:
         self._prepare = prepare
-        self._afterwards = afterwards
         self._niceness = niceness
         self._lock = threading.Lock()
         self._closed = False
@@ -128,10 +119,7 @@ class _Computer:
         context = process_context()
         ours, theirs = context.Pipe()
         process = context.Process(
-            target=compute,
-            args=(theirs, self._prepare, self._afterwards, self._niceness),
-            name="computing",
-            daemon=True,
+            target=compute, args=(theirs, self._prepare, self._niceness), name="computing", daemon=True
         )
         process.start()
         theirs.close()

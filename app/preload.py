@@ -1,7 +1,7 @@
-"""Imported by the server that processes are forked from (`app.processes`): what a flight and a first proposal need."""
+"""Imported by the server that processes are forked from (`app.processes`): what a flight and a proposal need."""
 
 import app.fleet.seat
 import app.trials.cockpit  # noqa: F401
-from app.campaigns.computation import prepare_first
+from app.campaigns.computation import prepare
 
-prepare_first()
+prepare()

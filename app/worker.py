@@ -22,7 +22,7 @@ from typing import Final
 import structlog
 
 from app import __version__
-from app.campaigns.computation import prepare, prepare_first
+from app.campaigns.computation import prepare
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.tasks import Proposer, Surveyor
@@ -160,7 +160,7 @@ class Worker:
             stack.callback(sessions.close)
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
-            pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare_first, afterwards=prepare))
+            pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
             surveying = stack.enter_context(Pool(LANDSCAPES_AT_ONCE, prepare=prepare, niceness=LANDSCAPE_NICENESS))
             desks = self._desks(database, pool, surveying)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))

@@ -70,11 +70,6 @@ def compute(past: History) -> Computed:
     )
 
 
-def prepare_first() -> None:
-    """Load and compile what the first proposal of a takeoff campaign needs."""
-    compute(History(campaign_id=0, definition=Definition(), flights=(), digest=""))
-
-
 def prepare() -> None:
     """Load and compile what a proposal needs, so that the first one is as quick as the others."""
     definition, experiment = Definition(), Takeoff()
