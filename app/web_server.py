@@ -17,8 +17,6 @@ from app.qr import qr_text
 from app.settings import Settings
 
 STREAMS_END_WITHIN_S: Final = 3
-COLLECT_EVERY: Final = 50_000
-"""New objects between two searches for garbage in cycles: a large answer is made of several such portions."""
 NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
 NUMERICS_AFTER_S: Final = 5.0
 """How long after it is ready the server loads what charts and judgements need, if nobody has asked for any by then."""
@@ -80,7 +78,6 @@ def _spare_what_stays() -> None:
     """The loaded program is never garbage: the collector need not go through all of it while an answer is made."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(COLLECT_EVERY)
 
 
 def _announce_elsewhere(host: str, port: int, announce: Callable[[str], None]) -> None:
