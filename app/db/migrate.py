@@ -6,10 +6,10 @@ Alembic is imported when there is something to migrate: most starts find the dat
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from sqlalchemy import inspect, text
+from sqlalchemy import text
 
 from app.data_dir import prepare_data_dir
-from app.db.revision import REVISION
+from app.db.revision import REVISION, read_revision
 from app.db.session import open_engine, translated
 from app.errors import SchemaError
 
@@ -52,7 +52,7 @@ def migrate(database_file: Path) -> None:
 
 def require_current(database_file: Path) -> None:
     """Raises SchemaError, with the command to run, unless the database is at the program's revision."""
-    held = revision_of(database_file) if database_file.exists() else None
+    held = revision_of(database_file)
     if held == REVISION:
         return
     if held is not None and held not in _known_revisions():
@@ -65,15 +65,8 @@ def require_current(database_file: Path) -> None:
 
 def revision_of(database_file: Path) -> str | None:
     """The revision that the database is at; None for an empty one. Raises StorageError when it cannot be read."""
-    engine = open_engine(database_file)
-    try:
-        with translated(database_file), engine.connect() as connection:
-            if not inspect(connection).has_table("alembic_version"):
-                return None
-            revision: str | None = connection.scalar(text("SELECT version_num FROM alembic_version"))
-            return revision
-    finally:
-        engine.dispose()
+    with translated(database_file):
+        return read_revision(database_file)
 
 
 def _known_revisions() -> set[str]:

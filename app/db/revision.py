@@ -9,12 +9,22 @@ REVISION: Final = "0004"
 """The newest of the migrations."""
 
 
+def read_revision(database_file: Path) -> str | None:
+    """The revision that the database is at; None for an empty one, or none. Raises sqlite3.Error when it cannot be
+    read."""
+    if not database_file.exists():
+        return None
+    with closing(sqlite3.connect(f"{database_file.resolve().as_uri()}?mode=ro", uri=True)) as connection:
+        if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'alembic_version'").fetchall():
+            return None
+        held: tuple[str] | None = connection.execute("SELECT version_num FROM alembic_version").fetchone()
+    return None if held is None else held[0]
+
+
 def is_current(database_file: Path) -> bool:
     """Whether the database is there, can be read, and is at this revision. What else there may be is for
     `app.db.migrate` to tell."""
     try:
-        with closing(sqlite3.connect(f"{database_file.resolve().as_uri()}?mode=ro", uri=True)) as connection:
-            held: object = connection.execute("SELECT version_num FROM alembic_version").fetchall()
+        return read_revision(database_file) == REVISION
     except sqlite3.Error:
         return False
-    return held == [(REVISION,)]
