@@ -28,13 +28,11 @@ from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
-from app.vehicles.simdrone.autopilots.registry import get_autopilot
-from app.vehicles.simdrone.body import TICK_S, new_body
-from app.vehicles.simdrone.cameras import Outlet, open_outlet
-from app.vehicles.simdrone.drone import Drone
-from app.vehicles.simdrone.faults import parse_fault
+from app.vehicles.simdrone.body import TICK_S
+from app.vehicles.simdrone.cameras import open_outlet
 from app.vehicles.simdrone.lockstep import Lockstep
 from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
+from tests.vehicles.simdrone.ground import switched_on
 
 SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 283, "ki": 13, "kd": 82},
@@ -51,15 +49,6 @@ _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
     "px4": (("NAV_DLL_ACT", _BYTEWISE, 3), ("GF_ACTION", _BYTEWISE, 3), ("GF_MAX_VER_DIST", 9, 10)),
 }
 """Name, MAVLink's type, value."""
-
-
-def switch_on(
-    autopilot: str, faults: Sequence[str], body: Mapping[str, OptionValue] | None, outlet: Outlet | None = None
-) -> Drone:
-    """One whose flights do not scatter."""
-    kind = get_autopilot(autopilot)
-    built = new_body("twin", {"scatter": 0.0, **(body or {})}, seed=1)
-    return Drone(built, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults], outlet)
 
 
 class _Heard:
@@ -92,7 +81,9 @@ class LockstepRig(Lockstep, _Heard):
         mocap: str = "",
     ) -> None:
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
-        Lockstep.__init__(self, switch_on(release or autopilot, faults, body, self._outlet))
+        options = {"scatter": 0.0, **(body or {})}
+        drone = switched_on(release or autopilot, options=options, faults=faults, outlet=self._outlet)
+        Lockstep.__init__(self, drone)
         _Heard.__init__(self, autopilot)
 
     def __enter__(self) -> Self:
@@ -146,7 +137,7 @@ class UdpRig(_Heard):
     def __init__(self, autopilot: str = "paparazzi", faults: Sequence[str] = (), *, mocap: str = "") -> None:
         super().__init__(autopilot)
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
-        self.drone = switch_on(autopilot, faults, None, self._outlet)
+        self.drone = switched_on(autopilot, options={"scatter": 0.0}, faults=faults, outlet=self._outlet)
         self._ports = free_port(), free_port()
         self._transport: Transport = open_transport(UdpAddress(LOOPBACK, self._ports[0], self._ports[1]))
         self.problem: BaseException | None = None

@@ -18,6 +18,7 @@ from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import TICK_S, new_body
+from app.vehicles.simdrone.cameras import Outlet
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
 from app.vehicles.simdrone.lockstep import Lockstep
@@ -195,10 +196,11 @@ def switched_on(
     options: Mapping[str, OptionValue] = STILL,
     faults: Sequence[str] = (),
     seed: int = 1,
+    outlet: Outlet | None = None,
 ) -> Drone:
     kind = get_autopilot(autopilot)
     body = new_body(vehicle, options, seed=seed)
-    return Drone(body, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults])
+    return Drone(body, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults], outlet)
 
 
 @contextlib.contextmanager
