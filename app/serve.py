@@ -51,25 +51,16 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         sign(web_address(settings.host, listener.getsockname()[1]))
         configure_logs(settings.data_dir, "web", settings.log_level)
         if not is_current(settings.database_file):
-            _migrate(settings)
+            from app.db.migrate import migrate  # noqa: PLC0415
+
+            migrate(settings.database_file)
         if with_worker:
             stack.enter_context(Supervisor(run_worker_process, settings, name="worker"))
         if (exposed := exposure(settings.host)) is not None:
             announce(exposed)
-        _answer(settings, listener, announce)
+        from app.web_server import run  # noqa: PLC0415 - while the worker imports its own half
 
-
-def _migrate(settings: Settings) -> None:
-    from app.db.migrate import migrate  # noqa: PLC0415
-
-    migrate(settings.database_file)
-
-
-def _answer(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
-    """Import the application while the worker imports its own half, then serve."""
-    from app.web_server import run  # noqa: PLC0415
-
-    run(settings, listener, announce)
+        run(settings, listener, announce)
 
 
 def listen(host: str, port: int) -> socket.socket:

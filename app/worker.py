@@ -94,9 +94,8 @@ def run_worker(settings: Settings) -> None:
 
 def run_supervised_worker(settings: Settings) -> None:
     """The worker beside a web process: it stands by while an older worker ends, and does not outlive its parent by
-    more than the flights under way. Ctrl-C is left to the parent."""
+    more than the flights under way."""
     airspace, ending = Airspace(), Ending()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _end_on(signal.SIGTERM, ending=ending, airspace=airspace)
     threading.Thread(target=_end_with_parent, args=(ending,), daemon=True).start()
     with suppress(LockedError):  # asked to end while it stood by

@@ -6,9 +6,9 @@
 
 A run is drawn from its seed; the seeds count up from `--seed`, and so go through every mishap in every state of a
 trial. The vehicle is a simulated drone in lockstep with the program; a tap at its antenna reads every packet that the
-program sends. What the program did is judged from the wire and from what the drone truly holds,
-by what docs/real-flight.md asks for (bench/hazards/expected.py). Prints what went wrong and a table; with `--out`
-writes faults.md there. Exits 1 when a single run is not as asked.
+program sends. What the program did is judged from the wire and from what the drone truly holds, by what
+docs/real-flight.md asks for (bench/hazards/expected.py). Prints what went wrong and a table; with `--out` writes
+faults.md there. Exits 1 when a single run is not as asked.
 """
 
 import argparse

@@ -177,12 +177,12 @@ class States:
     def propose_again(self, campaign_id: int, times: int) -> None:
         """As many jobs that are done."""
 
-        def compute(session: Session) -> None:
+        def ask(session: Session) -> None:
             campaigns.compute_proposal(session, campaign_id)
             _propose(session, campaign_id)
 
         for _ in range(times):
-            self._write(compute)
+            self._write(ask)
 
     def clear(self) -> None:
         """Take everything out, as if the server had been started with a new folder. What is told to browsers stays, in

@@ -137,7 +137,7 @@ class Link:
         self._next_heartbeat_s = self._attended_s = self._opened_s
         self._listeners = 0
         self._inbox: deque[Received] = deque()
-        self._news = threading.Condition(threading.RLock())
+        self._news = threading.Condition()
         self._sending = threading.Lock()
         self._is_closing = self._is_closed = False
         self._failure: Exception | None = None

@@ -34,8 +34,8 @@ def open_radio(
     transport: Transport | None = None,
 ) -> Radio:
     """`clock` is the vehicle's time, by default that of its options; `transport` is read by whoever listens, in place
-    of a thread that reads the address. Raises LinkError when its link or its log cannot
-    be opened, InputError for a signing key that cannot be read or used."""
+    of a thread that reads the address. Raises LinkError when its link or its log cannot be opened, InputError for a
+    signing key that cannot be read or used."""
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
     key_file = str(options["signing_key_file"])
