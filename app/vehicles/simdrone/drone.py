@@ -65,6 +65,7 @@ class Drone:
     def reboot(self) -> None:
         """Start the autopilot anew, in whatever state the body is; what is wrong with it stays wrong."""
         before, self.autopilot = self.autopilot, self._switch_on(self.body)
+        self.autopilot.survive(before)
         self.autopilot.refuses_arming = before.refuses_arming
         self.autopilot.ignores_parameters = before.ignores_parameters
         self._codecs.clear()

@@ -17,7 +17,6 @@ class Lockstep:
     """
 
     remote: Final = PEER
-    foreign: Final = 0
 
     def __init__(self, drone: Drone) -> None:
         self.drone: Final = drone

@@ -49,7 +49,8 @@ class Server:
         for data, peer in self._transport.read(max(wait_s, _SHORTEST_WAIT_S) if wait_s > 0.0 else 0.0):
             if self._transport.remote is None:
                 self._transport.adopt(peer)
-            self._drone.receive(data)
+            if peer == self._transport.remote:
+                self._drone.receive(data)
 
     def _send(self, frames: list[bytes]) -> None:
         for frame in frames:

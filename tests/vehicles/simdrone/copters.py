@@ -61,7 +61,13 @@ class Pilot:
 
     def words(self) -> list[str]:
         """What it said so far."""
-        return [each.text for each in self.ground.heard if each.get_type() == "STATUSTEXT"]
+        said: list[tuple[int, str]] = []
+        for each in self.ground.heard:
+            if each.get_type() == "STATUSTEXT" and each.id and said and said[-1][0] == each.id:
+                said[-1] = (each.id, said[-1][1] + each.text)
+            elif each.get_type() == "STATUSTEXT":
+                said.append((each.id, each.text))
+        return [text for _, text in said]
 
     def is_armed(self) -> bool:
         self.ground.listen(0.1)

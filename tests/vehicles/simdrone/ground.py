@@ -16,7 +16,7 @@ from app.core.clock import Clock, ScaledClock
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.transports import open_transport
-from app.vehicles.simdrone.autopilots.registry import get_autopilot
+from app.vehicles.simdrone.autopilots.registry import Make, get_autopilot
 from app.vehicles.simdrone.body import TICK_S, new_body
 from app.vehicles.simdrone.cameras import Outlet
 from app.vehicles.simdrone.drone import Drone
@@ -197,10 +197,13 @@ def switched_on(
     faults: Sequence[str] = (),
     seed: int = 1,
     outlet: Outlet | None = None,
+    make: Make | None = None,
 ) -> Drone:
+    """`make` takes the place of what the autopilot of that name is made by."""
     kind = get_autopilot(autopilot)
     body = new_body(vehicle, options, seed=seed)
-    return Drone(body, lambda fresh: kind.make(fresh, kind.system), [parse_fault(text) for text in faults], outlet)
+    switch_on = make or kind.make
+    return Drone(body, lambda fresh: switch_on(fresh, kind.system), [parse_fault(text) for text in faults], outlet)
 
 
 @contextlib.contextmanager
@@ -224,8 +227,13 @@ def dialect_of(autopilot: str) -> Any:
 
 
 def flying(autopilot: str, **settings: Any) -> Ground:
-    """A ground station in lockstep with a drone, with the settings of `switched_on`."""
-    return Ground(dialect_of(autopilot), LockstepWire(Lockstep(switched_on(autopilot, **settings))))
+    """A ground station in lockstep with a drone, with the settings of `switched_on`, and the telemetry that ground
+    stations ask an ArduPilot for."""
+    ground = Ground(dialect_of(autopilot), LockstepWire(Lockstep(switched_on(autopilot, **settings))))
+    if autopilot.startswith("ardupilot"):
+        rate = {"req_stream_id": 0, "req_message_rate": 4, "start_stop": 1}
+        ground.send("REQUEST_DATA_STREAM", target_system=1, target_component=1, **rate)
+    return ground
 
 
 def free_port() -> int:

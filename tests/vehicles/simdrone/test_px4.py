@@ -68,7 +68,7 @@ def test_every_failsafe_is_off_until_it_is_switched_on(pilot: Px4) -> None:
 
 def test_before_it_knows_where_it_is_it_refuses_to_arm_and_says_why(pilot: Px4) -> None:
     assert pilot.command(ARM, 1.0) == 1
-    assert pilot.words() == ["Arming denied: resolve system health failures"]
+    assert pilot.words() == ["Arming denied: resolve system health failures first"]
 
 
 def test_it_takes_off_above_its_place_waits_there_lands_and_disarms(pilot: Px4) -> None:

@@ -77,18 +77,16 @@ _MANNERS: Final = Manners(
     version=0x040600FF,
     parameters=_COMMON + _gains(NAMES_4_6, 1.0),
     coding=BY_VALUE,
-    periods_s=MappingProxyType(
-        {
-            "HEARTBEAT": 1.0,
-            "LOCAL_POSITION_NED": 0.25,
-            "GLOBAL_POSITION_INT": 0.25,
-            "ATTITUDE": 0.25,
-            "VFR_HUD": 0.25,
-            "SYS_STATUS": 0.5,
-            "GPS_RAW_INT": 0.5,
-            "BATTERY_STATUS": 0.5,
-            "SYSTEM_TIME": 0.5,
-        }
+    periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
+    streams=(
+        "LOCAL_POSITION_NED",
+        "GLOBAL_POSITION_INT",
+        "ATTITUDE",
+        "VFR_HUD",
+        "SYS_STATUS",
+        "GPS_RAW_INT",
+        "BATTERY_STATUS",
+        "SYSTEM_TIME",
     ),
     modes=(
         FlightMode("STABILIZE", 0, _MANUAL),
@@ -102,6 +100,7 @@ _MANNERS: Final = Manners(
     land="LAND",
     hold="BRAKE",
     refused=FAILED,
+    unready="Pre",
     no_estimate="Arm: Need Position Estimate",
     not_armable="Arm: Mode not armable",
     not_landed="Disarm: not landed",

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Final, Protocol, Self
 
 from app.vehicles.mavlink.dialects import Dialect, FieldValue
 from app.vehicles.simdrone.body import TICK_S
@@ -53,6 +53,10 @@ class Autopilot(Protocol):
 
     def receive(self, data: bytes) -> None:
         """Take in what the radio received."""
+        ...
+
+    def survive(self, before: Self) -> None:
+        """Take over what outlives a reboot from itself as it was."""
         ...
 
     def tick(self) -> list[Letter]:

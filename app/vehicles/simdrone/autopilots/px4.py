@@ -69,6 +69,7 @@ class Px4(Copter):
                 "HOME_POSITION": 2.0,
             }
         ),
+        streams=(),
         modes=(
             FlightMode("POSCTL", custom_mode(3), _MANUAL),
             FlightMode("MANUAL", custom_mode(1), _MANUAL),
@@ -76,12 +77,13 @@ class Px4(Copter):
             FlightMode(_TAKEOFF, custom_mode(4, 2), _AUTO, Behaviour.TAKE_OFF),
             FlightMode("AUTO.LOITER", custom_mode(4, 3), _AUTO),
             FlightMode("AUTO.RTL", custom_mode(4, 5), _AUTO, Behaviour.LAND),
-            FlightMode("AUTO.LAND", custom_mode(4, 6), _AUTO, Behaviour.LAND),
+            FlightMode("AUTO.LAND", custom_mode(4, 6), _AUTO, Behaviour.LAND, may_arm=False),
         ),
         land="AUTO.LAND",
         hold="AUTO.LOITER",
         refused=TEMPORARILY_REJECTED,
-        no_estimate="Arming denied: resolve system health failures",
+        unready="Preflight Fail: ",
+        no_estimate="Arming denied: resolve system health failures first",
         not_armable="Arming denied: Mode not suitable for takeoff",
         not_landed="Disarming denied: not landed",
         link_lost="GCS connection lost",
@@ -94,8 +96,12 @@ class Px4(Copter):
         super().__init__(body, self._cascade, system=system)
 
     def tick(self) -> list[Letter]:
-        """Once at its height of takeoff it waits there."""
+        """Once at its height of takeoff it waits there. Once it has landed and stopped its motors it is ready to hold;
+        told to land once more then, it stays in that mode, and does not arm."""
+        was_armed = self.armed
         letters = super().tick()
+        if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
+            self.mode = self.find_mode(self.manners.hold)
         if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING:
             self.mode = self.find_mode(self.manners.hold)
         return letters

@@ -10,6 +10,7 @@ from app.vehicles.simdrone.autopilots.ardupilot import ArduPilot, ArduPilot47
 from app.vehicles.simdrone.autopilots.base import Autopilot
 from app.vehicles.simdrone.autopilots.copter.copter import Copter
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
+from app.vehicles.simdrone.autopilots.paparazzi.settings import NEWER_KILL_SETTING
 from app.vehicles.simdrone.autopilots.px4 import Px4
 from app.vehicles.simdrone.body import Body
 
@@ -68,6 +69,10 @@ def _bare_paparazzi(body: Body, system: int) -> Autopilot:
     return Paparazzi(body, system=system, tuned_telemetry=False)
 
 
+def _paparazzi_510(body: Body, system: int) -> Autopilot:
+    return Paparazzi(body, system=system, kill_setting=NEWER_KILL_SETTING)
+
+
 AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
     {
         kind.name: kind
@@ -87,6 +92,14 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
                 link="udp:127.0.0.1:4244@4245",
                 make=_bare_paparazzi,
                 set_up=_bare_paparazzi,
+            ),
+            AutopilotKind(
+                name="paparazzi-5.10",
+                title="Paparazzi of 2017, whose setting that kills the throttle has another name",
+                system=31,
+                link="udp:127.0.0.1:4244@4245",
+                make=_paparazzi_510,
+                set_up=_paparazzi_510,
             ),
             AutopilotKind(
                 name="ardupilot",

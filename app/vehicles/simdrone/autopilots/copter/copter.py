@@ -2,10 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Self
 
 from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
-from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, Letter, Timetable
+from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, Letter, Timetable, whole_ticks
 from app.vehicles.simdrone.autopilots.copter import telemetry
 from app.vehicles.simdrone.autopilots.copter.cascade import Cascade
 from app.vehicles.simdrone.autopilots.copter.flyer import Flyer, Phase
@@ -21,6 +21,9 @@ ESTIMATE_AFTER_S: Final = 3.0
 """Since the start, until the position is known well enough to arm."""
 _GROUND_STATION: Final = 6
 _LIST_EVERY_TICKS: Final = 2
+_TELL_TICKS: Final = whole_ticks(30.0)
+_TEXT_LENGTH: Final = 50
+_LAST_TEXT: Final = 65535
 _ACTIVE: Final = 4
 _STANDBY: Final = 3
 _ALTITUDE_BREACH: Final = 2
@@ -60,6 +63,7 @@ class Copter(ABC):
         self._is_breached = False
         self._breaches = 0
         self._listing: int | None = None
+        self._texts = 0
         self._timetable = Timetable.of(self.manners.periods_s)
         self._out: list[Letter] = []
         self.tune()
@@ -119,8 +123,14 @@ class Copter(ABC):
         self._watch_link()
         self._watch_fence()
         self._report()
+        self._tell_readiness()
         out, self._out = self._out, []
         return out
+
+    def survive(self, before: Self) -> None:
+        """A reboot: parameters are stored."""
+        self.parameters = before.parameters
+        self.tune()
 
     # ------------------------------------------------------------ flying
 
@@ -189,6 +199,11 @@ class Copter(ABC):
             self.send("FENCE_STATUS")
             self._react(reaction, self.manners.fence_breached)
 
+    def _tell_readiness(self) -> None:
+        reason = None if self.armed or self._ticks % _TELL_TICKS else self._arming_refusal()
+        if reason is not None:
+            self.say(self.manners.unready + reason)
+
     def _react(self, reaction: Reaction, reason: str) -> None:
         self.say(reason)
         if reaction is Reaction.LAND:
@@ -199,8 +214,12 @@ class Copter(ABC):
     # ------------------------------------------------------------ sending
 
     def say(self, words: str) -> None:
-        """STATUSTEXT, as critical."""
-        self._out.append(Letter("STATUSTEXT", {"severity": 2, "text": words}))
+        """STATUSTEXT, as critical; what does not fit into one goes in several, under one number."""
+        self._texts = self._texts % _LAST_TEXT + 1 if len(words) > _TEXT_LENGTH else self._texts
+        for chunk, start in enumerate(range(0, len(words), _TEXT_LENGTH)):
+            number = self._texts if len(words) > _TEXT_LENGTH else 0
+            text = words[start : start + _TEXT_LENGTH]
+            self._out.append(Letter("STATUSTEXT", {"severity": 2, "text": text, "id": number, "chunk_seq": chunk}))
 
     def send(self, kind: str) -> None:
         """One of the reports, now."""
@@ -233,6 +252,7 @@ class Copter(ABC):
             version=manners.version,
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
+            ready=self._arming_refusal() is None,
         )
 
     def _send_parameter(self, place: int) -> None:
@@ -287,6 +307,12 @@ class Copter(ABC):
         mode = next((mode for mode in self.manners.modes if mode.custom_mode == custom), None)
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
             self.enter(mode)
+
+    def _hear_data_stream(self, message: Message) -> None:
+        """The older way to ask for telemetry, all of it at one rate."""
+        rate_hz = number(message, "req_message_rate") if number(message, "start_stop") else 0.0
+        for kind in self.manners.streams:
+            self._timetable.set(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
 
     def _hear_command(self, message: Message) -> None:
         command = int(number(message, "command"))
@@ -362,6 +388,7 @@ _HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
     "PARAM_REQUEST_LIST": Copter._hear_param_list,
     "PARAM_REQUEST_READ": Copter._hear_param_read,
     "PARAM_SET": Copter._hear_param_set,
+    "REQUEST_DATA_STREAM": Copter._hear_data_stream,
     "SET_MODE": Copter._hear_set_mode,
     "COMMAND_LONG": Copter._hear_command,
 }

@@ -47,10 +47,15 @@ class Manners:
     parameters: tuple[Parameter, ...]
     coding: Coding
     periods_s: Mapping[str, float]
+    """Of the messages that it sends unasked."""
+    streams: tuple[str, ...]
+    """Those that REQUEST_DATA_STREAM asks for; none where it is not heeded."""
     modes: tuple[FlightMode, ...]
     land: str
     hold: str
     refused: int
+    unready: str
+    """Says, every now and then, why it would not arm; the reason follows."""
     no_estimate: str
     not_armable: str
     not_landed: str

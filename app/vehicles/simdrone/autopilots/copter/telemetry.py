@@ -18,7 +18,8 @@ TAKING_OFF: Final = 3
 LANDING: Final = 4
 """MAV_LANDED_STATE."""
 
-_SENSORS: Final = 1 | 2 | 4 | 8 | 32 | (1 << 10) | (1 << 11) | (1 << 15) | (1 << 25) | (1 << 28)
+_PREARM: Final = 1 << 28
+_SENSORS: Final = 1 | 2 | 4 | 8 | 32 | (1 << 10) | (1 << 11) | (1 << 15) | (1 << 25) | _PREARM
 """Gyroscope, accelerometer, magnetometer, pressure, GPS, attitude and yaw control, motors, battery, prearm check."""
 
 
@@ -41,6 +42,8 @@ class Snapshot:
     version: int
     breach_type: int
     breaches: int
+    ready: bool
+    """Whether its own checks let it be armed."""
 
     @property
     def boot_ms(self) -> int:
@@ -99,6 +102,7 @@ def vfr_hud(now: Snapshot) -> Fields:
 def sys_status(now: Snapshot) -> Fields:
     sensors = dict.fromkeys((f"onboard_control_sensors_{word}" for word in ("present", "enabled", "health")), _SENSORS)
     errors = dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
+    sensors["onboard_control_sensors_health"] -= 0 if now.ready else _PREARM
     return {
         **sensors,
         "load": 200,

@@ -6,7 +6,7 @@ included: it obeys what stops motors in the air, never asks whether a gain makes
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Final, Self
 
 from app.core.control.fixed_point import fix
 from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, SPEED_BITS
@@ -25,13 +25,14 @@ from app.vehicles.simdrone.autopilots.paparazzi import telemetry
 from app.vehicles.simdrone.autopilots.paparazzi.plan import (
     BLOCKS,
     DESCENT_M_S,
+    LANDED_AFTER_S,
     TAKEOFF,
     WAYPOINTS,
     Engine,
     FlightPlan,
     Vertical,
 )
-from app.vehicles.simdrone.autopilots.paparazzi.settings import SETTINGS, Settings, find
+from app.vehicles.simdrone.autopilots.paparazzi.settings import KILL_SETTING, Settings
 from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, vertical_command
 
 KILL: Final = 0
@@ -61,6 +62,7 @@ _LIST_TICKS: Final = whole_ticks(0.2)
 
 _IDLE_THRUST: Final = 500 / 9600
 _GROUNDED_S: Final = 1.0
+_FLYING_S: Final = 1.0
 _TOUCHES_BELOW_M: Final = 0.03
 _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
 """By how much the reference (ζ 0.85, 100 °/s) trails a set point that moves, over its speed."""
@@ -68,9 +70,18 @@ _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
 
 class Paparazzi:
     """One autopilot from switching on; see `Autopilot`. `tuned_telemetry` says whether it was built with a telemetry
-    file that sends the position at 51 Hz; otherwise it comes at 1.25 Hz."""
+    file that sends the position at 51 Hz; otherwise it comes at 1.25 Hz. `kill_setting` and `landed_after_s` as in its
+    settings and its flight plan."""
 
-    def __init__(self, body: Body, *, system: int, tuned_telemetry: bool = True) -> None:
+    def __init__(
+        self,
+        body: Body,
+        *,
+        system: int,
+        tuned_telemetry: bool = True,
+        kill_setting: str = KILL_SETTING,
+        landed_after_s: float = LANDED_AFTER_S,
+    ) -> None:
         self.dialect = PAPARAZZI
         self.system, self.component = system, COMPONENT
         self.refuses_arming = False
@@ -80,12 +91,16 @@ class Paparazzi:
         self._codec = PAPARAZZI.codec(system=system, component=COMPONENT)
         self._radio = _Radio()
         self._ticks = 0
-        self._settings = Settings()
-        self._plan = FlightPlan()
+        self._kill_setting = kill_setting
+        self._settings = Settings(kill_setting)
+        self._plan = FlightPlan(landed_after_s=landed_after_s)
+        self._motors_on = False
         self._reported_seq: int | None = None
         self._listing: int | None = None
         self._transaction_ends_s = 0.0
         self._idle_s = 0.0
+        self._thrust_s = 0.0
+        self._flies = False
         self._touched_s: float | None = None
         self._touched_m = 0.0
         self._timetable = Timetable.of(telemetry.PERIODS_S)
@@ -98,6 +113,9 @@ class Paparazzi:
 
     def receive(self, data: bytes) -> None:
         self._radio.put(data)
+
+    def survive(self, before: Self) -> None:
+        """Its settings are those that were compiled in."""
 
     def tick(self) -> list[Letter]:
         self._ticks += 1
@@ -126,7 +144,7 @@ class Paparazzi:
 
     @property
     def armed(self) -> bool:
-        return self._settings["kil_thr"] == 0.0
+        return self._motors_on
 
     def held(self, parameter: str) -> float:
         return self._settings[parameter]
@@ -134,7 +152,9 @@ class Paparazzi:
     # ------------------------------------------------------------ flying
 
     def _set_motors(self, *, on: bool) -> None:
-        self._settings["kil_thr"] = 0.0 if on and self.mode != KILL and not self.refuses_arming else 1.0
+        self._motors_on = on and self.mode != KILL and not self.refuses_arming
+        if self._kill_setting:
+            self._settings[self._kill_setting] = 0.0 if self._motors_on else 1.0
 
     def _set_mode(self, mode: int) -> None:
         """Modes that the airframe does not know are passed over."""
@@ -155,8 +175,7 @@ class Paparazzi:
     def _navigate(self) -> None:
         if self.mode in (KILL, FAILSAFE):
             return
-        flies = not self._body.is_resting and self._idle_s < _GROUNDED_S
-        following = self._plan.next(_NAV_TICKS * TICK_S, self.height_m, flies=flies)
+        following = self._plan.next(_NAV_TICKS * TICK_S, self.height_m, flies=self._flies)
         if following is not None:
             self._enter(following)
 
@@ -192,14 +211,21 @@ class Paparazzi:
         return vertical_command(mode, target, kp, ki, kd)
 
     def _watch_thrust(self) -> None:
-        self._idle_s = 0.0 if self._body.thrust > _IDLE_THRUST else self._idle_s + TICK_S
+        """It counts as flying once its motors have pushed for a while, and until they have not for as long."""
+        pushes = self._body.thrust > _IDLE_THRUST
+        self._thrust_s = self._thrust_s + TICK_S if pushes else 0.0
+        self._idle_s = 0.0 if pushes else self._idle_s + TICK_S
+        if self._thrust_s >= _FLYING_S:
+            self._flies = True
+        elif self._body.is_resting or self._idle_s >= _GROUNDED_S:
+            self._flies = False
 
     # ------------------------------------------------------------ sending
 
     def _report(self) -> None:
         if self._listing is not None and self._ticks % _LIST_TICKS == 0:
             self._send_setting(self._listing)
-            self._listing = self._listing + 1 if self._listing + 1 < len(SETTINGS) else None
+            self._listing = self._listing + 1 if self._listing + 1 < len(self._settings) else None
         if self._ticks % _BLOCK_TICKS == 0 and self._plan.seq != self._reported_seq:
             self._reported_seq = self._plan.seq
             self._send("SCRIPT_CURRENT", counter="mission", seq=self._plan.seq)
@@ -225,13 +251,13 @@ class Paparazzi:
 
     def _send_setting(self, index: int) -> None:
         """A number past the end shows whatever lies behind the table."""
-        name, value = self._settings.at(index) if index < len(SETTINGS) else ("", math.nan)
+        name, value = self._settings.at(index) if index < len(self._settings) else ("", math.nan)
         self._send(
             "PARAM_VALUE",
             param_id=name,
             param_value=value,
             param_type=_REAL32,
-            param_count=len(SETTINGS),
+            param_count=len(self._settings),
             param_index=index,
         )
 
@@ -250,14 +276,14 @@ class Paparazzi:
 
     def _hear_param_read(self, message: Message) -> None:
         index = int(number(message, "param_index"))
-        place = find(text(message, "param_id")) if index < 0 else index
+        place = self._settings.find(text(message, "param_id")) if index < 0 else index
         if place is not None:
             self._send_setting(place)
 
     def _hear_param_set(self, message: Message) -> None:
         """Wrong types, values that are no numbers and names that are not found are met with silence."""
         name, value = text(message, "param_id"), number(message, "param_value")
-        place = find(name)
+        place = self._settings.find(name)
         if place is None or self.ignores_parameters or math.isnan(value):
             return
         if number(message, "param_type") != _REAL32:
@@ -269,7 +295,7 @@ class Paparazzi:
         match name:
             case "aut_mod":
                 self._set_mode(math.trunc(value) if math.isfinite(value) else -1)
-            case "kil_thr":
+            case _ if name == self._kill_setting:
                 self._set_motors(on=math.isfinite(value) and math.trunc(value) == 0)
             case _:
                 self._settings[name] = value

@@ -5,6 +5,9 @@ from enum import Enum
 from typing import Final
 
 DESCENT_M_S: Final = 0.8
+LANDED_AFTER_S: Final = 3.0
+"""By this program's flight plan. Plans without such a guard stop the thrust of a vehicle that is told to land in the
+first second, before it counts as flying."""
 DEFAULT_ALTITUDE_M: Final = 2.0
 
 CLIMB: Final = 2
@@ -75,7 +78,9 @@ HOLDING_POINT: Final = BY_NAME["Holding point"]
 class FlightPlan:
     """Where in the plan the vehicle is."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, landed_after_s: float) -> None:
+        """`landed_after_s`: how long it descends before it may believe to have landed."""
+        self._landed_after_s = landed_after_s
         self.seq = HOLDING_POINT
         self.time_s = 0.0
         """Since the block was entered."""
@@ -103,7 +108,7 @@ class FlightPlan:
         block = self.block
         if block.after is not None:
             return BY_NAME[block.after]
-        if block.landed is not None and not flies:
+        if block.landed is not None and not flies and self.time_s > self._landed_after_s:
             return BY_NAME[block.landed]
         if self.time_s > block.max_time_s or height_m > block.max_height_m:
             return LAND_HERE

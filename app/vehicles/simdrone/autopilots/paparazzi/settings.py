@@ -4,12 +4,15 @@ A name is what 16 characters hold of the C variable's; longer ones end alike, an
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.core.control.fixed_point import INT32_MAX, INT32_MIN
 
 NAME_LIMIT: Final = 16
+KILL_SETTING: Final = "kil_thr"
+NEWER_KILL_SETTING: Final = "aut_kil_thr"
+"""The same in a tree of 2017 that calls itself 5.10, whose variables are those of one structure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,34 +32,40 @@ class Setting:
 class Settings:
     """The values held, from the defaults on."""
 
-    def __init__(self) -> None:
-        self._values: list[float] = [float(setting.default) for setting in SETTINGS]
+    def __init__(self, kill_setting: str) -> None:
+        """`kill_setting`: what this release calls the one that kills the throttle; empty where there is none."""
+        named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
+        self._settings = tuple(setting for setting in named if setting.name)
+        self._values: list[float] = [float(setting.default) for setting in self._settings]
+        self._places = {setting.name: place for place, setting in reversed(list(enumerate(self._settings)))}
+
+    def __len__(self) -> int:
+        return len(self._settings)
 
     def __getitem__(self, name: str) -> float:
-        return self._values[_PLACES[name]]
+        return self._values[self._places[name]]
 
     def __setitem__(self, name: str, value: float) -> None:
-        place = _PLACES[name]
-        self._values[place] = SETTINGS[place].held(value)
+        place = self._places[name]
+        self._values[place] = self._settings[place].held(value)
 
     def count(self, name: str) -> int:
         """A setting that is an integer in the autopilot."""
         return int(self[name])
 
     def at(self, index: int) -> tuple[str, float]:
-        return SETTINGS[index].name, self._values[index]
+        return self._settings[index].name, self._values[index]
 
-
-def find(name: str) -> int | None:
-    """The place of the setting that this name finds, if any; case matters."""
-    return _PLACES.get(name) if len(name) < NAME_LIMIT else None
+    def find(self, name: str) -> int | None:
+        """The place of the setting that this name finds first, if any; case matters."""
+        return self._places.get(name) if len(name) < NAME_LIMIT else None
 
 
 SETTINGS: Final = (
     Setting("tel_mod_Mav", 0),
     Setting("tel_mod_Mai", 0),
     Setting("aut_mod_aut", 13),
-    Setting("kil_thr", 1),
+    Setting(KILL_SETTING, 1),
     Setting("aut_pow_swi", 0),
     Setting("aut_mod", 13),
     Setting("gui_v_kp", 283),
@@ -130,6 +139,3 @@ SETTINGS: Final = (
     Setting("dat_mav_per_sta", 1),
     Setting("dat_mav_per_tel_", 1),
 )
-
-_PLACES: Final = {setting.name: place for place, setting in reversed(list(enumerate(SETTINGS)))}
-"""Where each name is first found."""
