@@ -77,10 +77,6 @@ class Counting:
     def remote(self) -> Peer | None:
         return self._transport.remote
 
-    @property
-    def foreign(self) -> int:
-        return self._transport.foreign
-
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         return self._transport.read(timeout_s)
 

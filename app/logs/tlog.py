@@ -319,7 +319,7 @@ class _Conversation:
             self._settings.append(Setting(self._now_s, gain, value))
             if self._asked.get(gain) == value:
                 del self._asked[gain]
-        elif name == "kil_thr" and value:
+        elif name in ("kil_thr", "aut_kil_thr") and value:
             self._landings.append(Moment(self._now_s, "motors off"))
 
     def _parameter_asked(self, message: _Message) -> None:

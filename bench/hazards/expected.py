@@ -26,6 +26,8 @@ HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "
 BATTERY_S: Final[Mapping[str, float]] = {"paparazzi": 1.2, "ardupilot": 0.5, "px4": 0.2}
 LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "px4": 8.0}
 
+IMPACT_M_S: Final = 1.9
+"""At more than this it has truly come to the ground in a fall."""
 DRIFT_M_S: Final = 0.1
 SLACK_S: Final = 0.35
 """Of the rig's clock, and of a packet under way."""
@@ -103,6 +105,7 @@ class _Judgement:
             ("preflight", SILENT, 0.15),
             ("preflight", ("frozen-position", "jumping-position", "low-battery"), 0.0),
             ("preflight", MOCAP, 0.0),
+            ("preflight", ("arm-refused",), 0.0),
             ("F2", ("param-unconfirmed",), 0.0),
             ("F10", ("reboot", OTHER_MODE), 0.0),
         ):
@@ -146,8 +149,8 @@ class _Judgement:
             ("F9a", self.of("mocap-frozen"), 0.15, 0.25 + SLACK_S),
             ("F9a", self.of("mocap-lost"), 1.0 - SLACK_S, 1.0 + SLACK_S),
             ("F9c", self.of("mocap-drift"), 2.0, 0.3 / DRIFT_M_S + 0.3 + 1.0 + SLACK_S),
-            ("F10", self.of_flight(OTHER_MODE), 0.0, 1.0 + 2.0 * self.heartbeat_s + SLACK_S),
-            ("F11", self.of_flight(OTHER_LANDING), 0.0, 1.0 + 2.0 * self.heartbeat_s + SLACK_S),
+            ("F10", self.of_flight(OTHER_MODE), 0.0, 1.0 + 4.0 * self.heartbeat_s + SLACK_S),
+            ("F11", self.of_flight(OTHER_LANDING), 0.0, 1.0 + 4.0 * self.heartbeat_s + SLACK_S),
         ):
             watched = AIR if self.took_off_s is None else (Stage.ARM, *AIR)
             lasted_s = self.within(spans, *watched)
@@ -220,6 +223,7 @@ class _Judgement:
         mute = self.of("param-unconfirmed")
         yield any(each.stage not in (Stage.CONNECT, *GROUND) for each in self._kinds("reboot", OTHER_MODE))
         yield any(each.kind == OTHER_MODE for each in self.flown.struck)
+        yield self.flown.impact_m_s > IMPACT_M_S
         for lost_s, _ in self.stages.spans(Stage.LINK_LOST):
             yield any(end_s > lost_s + 60.0 - SLACK_S for _, end_s in self.beatless)
         for begun_s, _ in self.stages.spans(Stage.LAND, Stage.ABORT_LAND):

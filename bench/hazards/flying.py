@@ -16,7 +16,8 @@ from bench.hazards.stages import Stages
 class Flown:
     """What came of a case. `outcome`: completed, aborted, invalid (a record was left) or refused (nothing flew).
     `vehicle`: what the program says of it afterwards: safe, quarantined, or unopened (it never had control).
-    `flew_on`: the gains that it truly held when it left the ground."""
+    `flew_on`: the gains that it truly held when it left the ground; `impact_m_s`: the fastest that it truly sank within
+    half a metre of the ground."""
 
     outcome: str
     vehicle: str
@@ -26,6 +27,7 @@ class Flown:
     flew_on: Mapping[str, float] | None
     armed: bool
     height_m: float
+    impact_m_s: float
     packets: int
     stops: tuple[Stopping, ...]
     struck: tuple[Struck, ...]
@@ -78,6 +80,7 @@ def _end(rig: Rig, outcome: str, vehicle: str, reason: str) -> Flown:
         flew_on=rig.flew_on,
         armed=drone.autopilot.armed,
         height_m=drone.body.altitude_m,
+        impact_m_s=rig.impact_m_s,
         packets=rig.heard,
         stops=tuple(rig.stops),
         struck=tuple(rig.struck),

@@ -20,6 +20,7 @@ from bench.hazards.wire import DIALECTS, GAINS, Order, order, stops_motors
 SILENCING: Final = frozenset({"link-lost", "wrong-system", "no-heartbeat", "reboot"})
 _LONGEST_S: Final = 400.0
 """Of the drone's time: nothing that a trial may wait for takes as long."""
+_NEAR_GROUND_M: Final = 0.5
 _OTHER_STATION: Final = 254
 _AUTO_LAND: Final = 4 << 16 | 6 << 24
 _INTERFERENCE: Final[Mapping[tuple[str, str], tuple[str, Mapping[str, FieldValue]]]] = {
@@ -64,6 +65,7 @@ class Rig(Lockstep):
         self.stops: list[Stopping] = []
         self.heard: int = 0
         self.flew_on: Mapping[str, float] | None = None
+        self.impact_m_s = 0.0
         self.wanted: Stop | None = None
         self._waiting = list(case.mishaps)
         self._kind = get_autopilot(case.autopilot)
@@ -76,6 +78,8 @@ class Rig(Lockstep):
     def tick(self) -> None:
         """Raises TimeoutError when nothing that a trial may wait for takes as long."""
         super().tick()
+        if 0.0 < self.drone.body.altitude_m < _NEAR_GROUND_M:
+            self.impact_m_s = max(self.impact_m_s, -self.drone.body.climb_rate_m_s)
         self._watch()
         if self.drone.time_s > _LONGEST_S:
             raise TimeoutError(f"the trial was not over after {_LONGEST_S:g} s")

@@ -33,6 +33,7 @@ _BLOCKS: Final = {3: Order.ARM, 4: Order.TAKE_OFF, 13: Order.LAND, 14: Order.LAN
 """Of the stock flight plan."""
 _STOPPING_BLOCKS: Final = frozenset({0, 1, 2, 3, 16})
 """Those that kill the motors or hold their thrust at none."""
+_KILL_SETTINGS: Final = frozenset({"kil_thr", "aut_kil_thr"})
 _ARMED: Final = 128
 _ARM_DISARM: Final = 400
 _TERMINATE: Final = 185
@@ -64,7 +65,7 @@ def stops_motors(autopilot: str, message: Message) -> bool:
             return int(number(message, "seq")) in _STOPPING_BLOCKS
         case "PARAM_SET" if autopilot == "paparazzi":
             name, value = text(message, "param_id"), number(message, "param_value")
-            return (name == "kil_thr" and int(value) != 0) or (name == "aut_mod" and int(value) == 0)
+            return (name in _KILL_SETTINGS and int(value) != 0) or (name == "aut_mod" and int(value) == 0)
         case _:
             return False
 

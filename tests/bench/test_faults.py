@@ -114,6 +114,7 @@ def flown(*struck: Struck, **differently: object) -> Flown:
         flew_on=GAINS["paparazzi"],
         armed=False,
         height_m=0.0,
+        impact_m_s=0.8,
         packets=100,
         stops=(Stopping(51.0, 0.0),),
         struck=struck,

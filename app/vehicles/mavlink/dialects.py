@@ -19,6 +19,7 @@ FieldValue = float | int | str | bytes | Sequence[float]
 
 BAD_DATA: Final = "BAD_DATA"
 UNKNOWN: Final = "UNKNOWN_"
+NO_AUTOPILOT: Final = 8
 _MAVLINK_1: Final = 0xFE
 _SPENT_BYTES: Final = 4096
 
@@ -52,6 +53,11 @@ def text(message: Message, field: str) -> str:
 def is_known(message: Message) -> bool:
     """Whether the dialect knows the message: it is neither noise nor a newer id, whose checksum cannot be judged."""
     return message.get_type() != BAD_DATA and not message.get_type().startswith(UNKNOWN)
+
+
+def is_autopilots_heartbeat(message: Message) -> bool:
+    """Not that of a gimbal, a companion computer or another ground station."""
+    return message.get_type() == "HEARTBEAT" and number(message, "autopilot") != NO_AUTOPILOT
 
 
 def source_system(message: Message) -> int:
@@ -164,15 +170,28 @@ class Codec:
         return message
 
 
+_FROM_CAMERAS: Final = ("ODOMETRY", "VISION_", "ATT_POS_MOCAP")
+"""What a bridge may say in the vehicle's name, by numbers of its own."""
+
 PAPARAZZI: Final = Dialect(
     name="paparazzi",
     module="pymavlink.dialects.v10.paparazzi",
     mavlink=1,
     heeds_heartbeats=False,
-    uncounted=("SCRIPT_", "MISSION_"),
+    uncounted=("SCRIPT_", "MISSION_", *_FROM_CAMERAS),
 )
-ARDUPILOTMEGA: Final = Dialect(name="ardupilotmega", module="pymavlink.dialects.v20.ardupilotmega", mavlink=2)
-COMMON: Final = Dialect(name="common", module="pymavlink.dialects.v20.common", mavlink=2)
+ARDUPILOTMEGA: Final = Dialect(
+    name="ardupilotmega",
+    module="pymavlink.dialects.v20.ardupilotmega",
+    mavlink=2,
+    uncounted=_FROM_CAMERAS,
+)
+COMMON: Final = Dialect(
+    name="common",
+    module="pymavlink.dialects.v20.common",
+    mavlink=2,
+    uncounted=_FROM_CAMERAS,
+)
 
 DIALECTS: Final[Mapping[str, Dialect]] = MappingProxyType(
     {dialect.name: dialect for dialect in (PAPARAZZI, ARDUPILOTMEGA, COMMON)}

@@ -28,8 +28,13 @@ class Failure(StrEnum):
     FROZEN = "F9a"
     GLITCHES = "F9b"
     DISAGREEMENT = "F9c"
-    UNEXPECTED = "F10"
+    LOST_POSITION = "F9d"
+    SLOW_CLOCK = "F9e"
+    TAKEN_OVER = "F10a"
+    UNEXPECTED = "F10b"
     OWN_LANDING = "F11"
+    DOUBLED = "F12"
+    FALL = "F13"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,17 +98,47 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         Failure.DISAGREEMENT: Response(
             "two sources more than 0.3 m apart for 0.3 s", "land", "invalid", "Two sources of altitude disagree."
         ),
-        Failure.UNEXPECTED: Response(
-            "a mode, a disarming or a reboot that was not asked for",
+        Failure.LOST_POSITION: Response(
+            "none of its positions could be believed for 0.5 s, or more than 15 a second are doubted",
+            "land",
+            "invalid",
+            "The vehicle's position was lost.",
+        ),
+        Failure.SLOW_CLOCK: Response(
+            "the record not whole 3 s after it had to be, by the ground's clock",
+            "land",
+            "invalid",
+            "The vehicle's clock goes slower than its clock_speed says.",
+        ),
+        Failure.TAKEN_OVER: Response(
+            "a mode in which a person flies it, in heartbeats that agree",
             "cease",
             "quarantine",
-            "The vehicle changed its state without being asked; it was left alone.",
+            "Somebody took the vehicle over by hand; it was left alone.",
+        ),
+        Failure.UNEXPECTED: Response(
+            "another mode or block, a disarming or a reboot that was not asked for, in messages that agree",
+            "land",
+            "quarantine",
+            "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.",
         ),
         Failure.OWN_LANDING: Response(
             "a landing that was not asked for: its own failsafe, or an exception of its flight plan",
             "land",
             "invalid",
             "The vehicle began to land by itself.",
+        ),
+        Failure.DOUBLED: Response(
+            "sequence numbers that come twice with other contents, or two clocks by turns, under one system id",
+            "land",
+            "quarantine",
+            "Two vehicles speak under one system id; both were told to land, and no motors were stopped.",
+        ),
+        Failure.FALL: Response(
+            "the ground met at more than 2 m/s",
+            "note",
+            "quarantine",
+            "The vehicle fell.",
         ),
     }
 )

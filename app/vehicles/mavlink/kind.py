@@ -29,14 +29,16 @@ def _may_simulate(address: addresses.Address, simulation_hosts: Hosts) -> bool:
 
 
 def _open(options: Options, safe_gains: Gains) -> Vehicle:
-    return _vehicle(options, safe_gains, None, observes=False)
+    return _vehicle(options, safe_gains, None, observes=False, decided=False)
 
 
 def _connect(options: Options, safe_gains: Gains, identity: Identity | None) -> ConnectedVehicle:
-    return _vehicle(options, safe_gains, identity, observes=True)
+    return _vehicle(options, safe_gains, identity, observes=True, decided=identity is not None)
 
 
-def _vehicle(options: Options, safe_gains: Gains, identity: Identity | None, *, observes: bool) -> "MavlinkVehicle":
+def _vehicle(
+    options: Options, safe_gains: Gains, identity: Identity | None, *, observes: bool, decided: bool
+) -> "MavlinkVehicle":
     """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows.
 
     What speaks to a vehicle is imported here, by the process that opens one: those that only know its settings do not.
@@ -55,6 +57,7 @@ def _vehicle(options: Options, safe_gains: Gains, identity: Identity | None, *, 
             clock=clock,
             identity=identity,
             observes=observes,
+            decided=decided,
             source=source,
         )
     except BaseException:

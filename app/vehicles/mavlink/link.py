@@ -17,16 +17,19 @@ from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.dialects import (
     BAD_DATA,
+    NO_AUTOPILOT,
     Codec,
     Dialect,
     FieldValue,
     Message,
+    is_autopilots_heartbeat,
     is_known,
     number,
     sequence,
     source_component,
     source_system,
 )
+from app.vehicles.mavlink.speakers import Speakers
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
@@ -42,9 +45,14 @@ STEP_S: Final = 1.0 / 256.0
 """How far the clock is advanced between two looks at a transport that no thread reads."""
 OLDER: Final = 128
 """A sequence number so far ahead is one from the past: packets may overtake each other."""
+GONE_AFTER_S: Final = 1.5
+"""A peer that has said nothing for so long may have moved to another port of the same host."""
+RIVAL_S: Final = 3.0
+"""How long the heartbeat of another peer with the vehicle's own system id is remembered."""
+STRANGERS_EVERY_S: Final = 0.2
+"""How often a datagram of another peer is looked into: a flood of them costs nothing."""
 
 MAV_TYPE_GCS: Final = 6
-MAV_AUTOPILOT_INVALID: Final = 8
 MAV_STATE_ACTIVE: Final = 4
 
 
@@ -99,9 +107,10 @@ class LossCounter:
 class Link:
     """Sends to and hears one vehicle; safe to use from any thread.
 
-    `target_system` is the vehicle's system id; None takes the first autopilot that is heard. With `tlog`, both
-    directions are appended to that file. With `signing_key`, everything is signed. With `transport`, that one is used
-    and no thread is started: `receive` reads it, letting the clock advance while nothing comes.
+    `target_system` is the vehicle's system id; None takes the first autopilot that is heard, `make` its make (MAVLink's
+    number), None any. Its other components are handed on, too; they are no sign of the autopilot's life. With `tlog`,
+    both directions are appended to that file. With `signing_key`, everything is signed. With `transport`, that one is
+    used and no thread is started: `receive` reads it, letting the clock advance while nothing comes.
     """
 
     def __init__(
@@ -111,6 +120,7 @@ class Link:
         *,
         clock: Clock,
         target_system: int | None = None,
+        make: int | None = None,
         system: int = 255,
         component: int = 190,
         tlog: Path | None = None,
@@ -129,7 +139,11 @@ class Link:
             self._transport.close()
             raise
         self._opened_s, self._opened_unix_us = clock.now_s(), time.time_ns() // 1000
-        self._vehicle_system = target_system
+        self._vehicle_system, self._make = target_system, make
+        self._vehicle_component: int | None = None
+        self._speakers = Speakers()
+        self._looked_s = self._rival_s = float("-inf")
+        self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
         self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
         self._last_packet_s: float | None = None
@@ -160,6 +174,20 @@ class Link:
         return self._vehicle_system
 
     @property
+    def doubled(self) -> str:
+        """Why it is believed that two vehicles speak under the one system id; empty while one does."""
+        now_s = self._clock.now_s()
+        with self._news:
+            if now_s - self._rival_s < RIVAL_S:
+                return "Another vehicle with its system id speaks from another port."
+            return self._speakers.doubt(now_s)
+
+    @property
+    def other_makes(self) -> frozenset[int]:
+        """Autopilots that were heard and are not of the make that this link is for, by MAVLink's numbers."""
+        return frozenset(self._other_makes)
+
+    @property
     def log_problem(self) -> str | None:
         """Why the telemetry log is not complete, None while it is."""
         return self._tlog.problem if self._tlog else None
@@ -171,7 +199,7 @@ class Link:
                 received=self._received,
                 lost=self._losses.lost,
                 bad=self._bad,
-                foreign=self._foreign + self._transport.foreign,
+                foreign=self._foreign,
                 overrun=self._overrun,
                 sent=self._sent,
                 unsent=self._unsent,
@@ -292,10 +320,20 @@ class Link:
             self._unsent += 1
 
     def _take_in(self, data: bytes, peer: Peer) -> None:
-        if self._transport.remote is not None:
+        remote = self._transport.remote
+        if remote == peer:
             self._hear(self._codec.parse(data))
-            return
-        # A codec of its own: what a stranger sends must not stand in the way of the vehicle's first packet.
+        elif remote is None:
+            self._take_in_stranger(data, peer)
+        else:
+            self._foreign += 1
+            now_s = self._clock.now_s()
+            if peer[0] == remote[0] and now_s - self._looked_s >= STRANGERS_EVERY_S:
+                self._looked_s = now_s
+                self._look_at_rival(data, peer, now_s)
+
+    def _take_in_stranger(self, data: bytes, peer: Peer) -> None:
+        """With a codec of its own: what a stranger sends must not stand in the way of the vehicle's first packet."""
         messages = self._new_codec().parse(data)
         if any(self._is_vehicle(message) for message in messages):
             self._transport.adopt(peer)
@@ -303,11 +341,27 @@ class Link:
         else:
             self._foreign += 1
 
+    def _look_at_rival(self, data: bytes, peer: Peer, now_s: float) -> None:
+        """The vehicle, come back from another port of its host; or another one while it is still heard."""
+        if not any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
+            return
+        since_s = self._last_packet_s if self._last_packet_s is not None else self._opened_s
+        if now_s - since_s > GONE_AFTER_S:
+            self._transport.adopt(peer)
+        elif self._last_packet_s is not None:
+            self._rival_s = now_s
+
     def _is_vehicle(self, message: Message) -> bool:
         """Whether the message shows its sender to be the vehicle that this link is for."""
-        if self._vehicle_system is None:
-            return _is_autopilots_heartbeat(message)
-        return is_known(message) and source_system(message) == self._vehicle_system
+        if not is_known(message) or not is_autopilots_heartbeat(message):
+            return False
+        make = int(number(message, "autopilot"))
+        if self._make not in (None, make):
+            self._other_makes.add(make)
+            return False
+        system, component = self._vehicle_system, self._vehicle_component
+        is_it = system is None or source_system(message) == system
+        return is_it and (component is None or source_component(message) == component)
 
     def _hear(self, messages: list[Message]) -> None:
         now_s = self._clock.now_s()
@@ -327,18 +381,23 @@ class Link:
         if message.get_type() == BAD_DATA:
             self._bad += 1
             return False
-        if self._vehicle_system is None and self._is_vehicle(message):
-            self._vehicle_system = source_system(message)
+        is_autopilot = self._is_vehicle(message)
+        if is_autopilot:
+            self._vehicle_system, self._vehicle_component = source_system(message), source_component(message)
         if source_system(message) != self._vehicle_system:
             self._foreign += 1
             return False
+        frame = bytes(message.get_msgbuf())
         self._losses.count(message.get_type(), source_component(message), sequence(message))
-        self._record(bytes(message.get_msgbuf()))
+        self._record(frame)
         if not is_known(message):  # neither its checksum nor its signature was looked at: no sign of life
             return False
         self._received += 1
-        self._last_packet_s = now_s
-        if _is_autopilots_heartbeat(message):
+        if self._vehicle_component in (None, source_component(message)):
+            self._last_packet_s = now_s
+            if not message.get_type().startswith(self._dialect.uncounted):
+                self._speakers.hear(frame, sequence(message), now_s, _boot_s(message))
+        if is_autopilot:
             self._last_heartbeat_s = now_s
         return True
 
@@ -354,7 +413,7 @@ class Link:
 
 _GROUND_STATION: Final[dict[str, FieldValue]] = {
     "type": MAV_TYPE_GCS,
-    "autopilot": MAV_AUTOPILOT_INVALID,
+    "autopilot": NO_AUTOPILOT,
     "base_mode": 0,
     "custom_mode": 0,
     "system_status": MAV_STATE_ACTIVE,
@@ -362,6 +421,6 @@ _GROUND_STATION: Final[dict[str, FieldValue]] = {
 }
 
 
-def _is_autopilots_heartbeat(message: Message) -> bool:
-    """Not that of a gimbal or another ground station."""
-    return message.get_type() == "HEARTBEAT" and number(message, "autopilot") != MAV_AUTOPILOT_INVALID
+def _boot_s(message: Message) -> float | None:
+    """The vehicle's own time by the one kind of message whose time counts: others may go on when that stands still."""
+    return number(message, "time_boot_ms") / 1000.0 if message.get_type() == "LOCAL_POSITION_NED" else None

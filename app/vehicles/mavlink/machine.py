@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from app.vehicles.mavlink import agreement
-from app.vehicles.mavlink import limits as watching
+from app.vehicles.mavlink import agreement, findings
+from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import Watch
-from app.vehicles.mavlink.measurements import Heartbeat
+from app.vehicles.mavlink.measurements import DISARMING, Heartbeat, Parameter, Reply
 from app.vehicles.mavlink.moves import (
     Plan,
     Step,
@@ -31,6 +30,7 @@ from app.vehicles.mavlink.signals import (
     Action,
     Command,
     Done,
+    Doubled,
     Event,
     Heard,
     Keep,
@@ -42,6 +42,7 @@ from app.vehicles.mavlink.signals import (
     Sighted,
 )
 from app.vehicles.mavlink.states import COMMANDED, State
+from app.vehicles.mavlink.watch import Watch
 
 __all__ = ["Plan", "Trial", "advance", "begin"]
 
@@ -74,18 +75,29 @@ def advance(trial: Trial, event: Event) -> Step:
         trial, kept = _hear(trial, event)
     elif isinstance(event, Sighted):
         trial = replace(trial, watch=watching.sight(trial.watch, event))
-    trial, commands = _react(trial, event)
+    elif isinstance(event, Doubled):
+        trial = replace(trial, watch=replace(trial.watch, doubled=event.why))
+    trial = replace(trial, watch=watching.settle(trial.watch, event.now_s, trial.plan.ground_m))
+    trial, commands = _react(_with_fall(trial), event)
     return trial, (*kept, *commands)
 
 
 def _hear(trial: Trial, event: Heard) -> Step:
     watch, positions = watching.hear(trial.watch, event.measurement, event.now_s, trial.plan.limits)
     trial = replace(trial, watch=watch)
-    if trial.armed_s is None or trial.state not in _RECORDED:
+    if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
         return trial, ()
     to_m = trial.plan.ground_m if trial.state not in _HOLDING else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(Keep(position, to_m, watch.battery_v, second_m) for position in positions)
+
+
+def _with_fall(trial: Trial) -> Trial:
+    """A fall is noted wherever it happens, unless a person has asked for it."""
+    if trial.stopped or trial.commanded_s is None or trial.doubt:
+        return trial
+    fall = findings.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
+    return trial if fall is None else note(trial, fall)
 
 
 def _react(trial: Trial, event: Event) -> Step:
@@ -102,7 +114,7 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, asked_s=now_s)
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
-    if finding := watching.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
+    if finding := findings.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(trial, finding, now_s)
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or trial.watch.last is None:
         return trial, ()
@@ -115,7 +127,7 @@ def _not_armed(trial: Trial, event: Event) -> Finding | None:
     why = ""
     if isinstance(event, Refused):
         why = event.why
-    elif trial.armed_s is not None and not trial.watch.armed:
+    elif trial.armed_s is not None and watching.is_disarmed(trial.watch, trial.plan.limits):
         why = "It disarmed itself."
     elif trial.armed_s is None:
         late = trial.asked_s is not None and event.now_s - trial.asked_s > ARMED_WITHIN_S
@@ -144,12 +156,27 @@ def _record(trial: Trial, event: Event) -> Step:
     trial = _resting(trial, now_s)
     if _rests_for(trial, DOWN_S, now_s):
         return fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
-    last, start_s = trial.watch.last, trial.commanded_boot_s
-    if last is None or start_s is None or last.time_boot_s - start_s < trial.plan.record_s:
-        return trial, ()
+    if not _is_whole(trial):
+        return _overtime(trial, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
     return land(trial, State.LAND, now_s)
+
+
+def _is_whole(trial: Trial) -> bool:
+    last, start_s = trial.watch.last, trial.commanded_boot_s
+    return last is not None and start_s is not None and last.time_boot_s - start_s >= trial.plan.record_s
+
+
+def _overtime(trial: Trial, now_s: float) -> Step:
+    """The ground's own clock ends a record, too, that the vehicle's does not."""
+    plan, last, start_s = trial.plan, trial.watch.last, trial.commanded_boot_s
+    commanded_s = trial.commanded_s if trial.commanded_s is not None else now_s
+    passed_s = now_s - commanded_s
+    if passed_s <= plan.record_s + plan.limits.slow_s or last is None or start_s is None:
+        return trial, ()
+    why = f"By its clock {last.time_boot_s - start_s:.1f} s had passed of {passed_s:.1f} s."
+    return fail(trial, Finding(failure=Failure.SLOW_CLOCK, why=why), now_s)
 
 
 def _landing(trial: Trial, event: Event) -> Step:
@@ -157,11 +184,15 @@ def _landing(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if trial.awaited is not None:
         return send_gains(trial, event)
-    if finding := _taken_over(trial) or (_envelope(trial) if trial.gains_since_s is None else None):
+    if finding := (
+        _taken_over(trial)
+        or (_envelope(trial) if trial.gains_since_s is None else None)
+        or (_changed(trial) if trial.state is State.LAND else None)
+    ):
         return fail(trial, finding, now_s)
-    trial = _resting(trial, now_s)
+    trial = _doubting(_resting(trial, now_s))
     if _has_landed(trial, now_s):
-        return disarm(trial, now_s)
+        return _come_down(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
         return quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
     if now_s - trial.repeated_s >= REPEAT_S and not _obeys(trial, now_s):
@@ -169,15 +200,28 @@ def _landing(trial: Trial, event: Event) -> Step:
     return trial, ()
 
 
+def _doubting(trial: Trial) -> Trial:
+    """While it lands for another reason, what puts it in doubt is remembered."""
+    finding = _changed(trial) if trial.commanded_s is not None else findings.find_doubled(trial.watch)
+    return trial if finding is None else note(trial, finding)
+
+
+def _come_down(trial: Trial, now_s: float) -> Step:
+    """Its motors are stopped, unless nobody knows any more whose they are."""
+    if trial.doubt and trial.failure is not Failure.FALL and _changed(trial):
+        return quarantine(trial, "", now_s)
+    return disarm(trial, now_s)
+
+
 def _resting(trial: Trial, now_s: float) -> Trial:
-    """Note since when it has been at rest: on the ground by height and speed, or by speed alone once its motors are
-    off, for some autopilots' altitude drifts. A lone sample that jumps says nothing either way."""
-    if trial.watch.doubted is not None:
+    """Note since when it has been at rest: on the ground by every witness, or near it by speed alone once its motors
+    are off, for some autopilots' altitude drifts. A lone sample that jumps says nothing either way."""
+    if trial.watch.doubted is not None and watching.is_fresh(trial.watch, now_s):
         return trial
-    if trial.watch.armed:
-        rests = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+    if not watching.is_disarmed(trial.watch, trial.plan.limits):
+        rests = trial.watch.grounded_since_s is not None
     else:
-        rests = watching.is_still(trial.watch, now_s)
+        rests = watching.is_still(trial.watch, now_s, trial.plan.ground_m)
     since_s = trial.resting_since_s if trial.resting_since_s is not None else now_s
     return replace(trial, resting_since_s=since_s if rests else None)
 
@@ -189,11 +233,15 @@ def _rests_for(trial: Trial, seconds: float, now_s: float) -> bool:
 def _has_landed(trial: Trial, now_s: float) -> bool:
     """At rest for 2 s; or it has disarmed itself near the ground, as some autopilots do."""
     near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-    return _rests_for(trial, LANDED_S, now_s) or (near and not trial.watch.armed)
+    disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
+    return _rests_for(trial, LANDED_S, now_s) or (near and disarmed)
 
 
 def _link_lost(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
+    trial = _doubting(trial)
+    if finding := _taken_over(trial):
+        return fail(trial, finding, now_s)
     if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat):
         return land(trial, State.ABORT_LAND, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
@@ -205,19 +253,41 @@ def _link_lost(trial: Trial, event: Event) -> Step:
 
 def _disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
-    if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat) and not event.measurement.armed:
-        return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
+    trial = _answered(_doubting(trial), event)
+    if _is_stopped(trial, event):
+        said = " Its motors have stopped, it says." if trial.stopped else ""
+        return enter(replace(trial, why=trial.why + said), State.RESTORE, now_s), (RestoreGains(),)
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     if airborne and not trial.stopped:
         why = "It was found in the air while its motors were to be stopped."
         return abort(note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
-        return quarantine(trial, f"It has not disarmed within {DISARMED_WITHIN_S:g} s.", now_s)
-    may_stop = trial.stopped or watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
+        return quarantine(trial, f"It has not said within {DISARMED_WITHIN_S:g} s that its motors stopped.", now_s)
+    may_stop = trial.stopped or watching.may_stop(trial.watch, now_s)
     if may_stop and now_s - trial.repeated_s >= REPEAT_S:
         action = Action.KILL if trial.stopped else Action.MOTORS_OFF
         return replace(trial, repeated_s=now_s), (Perform(action),)
     return trial, ()
+
+
+def _answered(trial: Trial, event: Event) -> Trial:
+    """Note that it has answered the order to stop its motors: with what its heartbeat says, a second witness."""
+    heard = event.measurement if isinstance(event, Heard) else None
+    match heard:
+        case Reply(to=to, accepted=True) if to == DISARMING:
+            yes = True
+        case Parameter(name=name, value=value):
+            yes = name in trial.plan.stop_settings and value != 0.0
+        case _:
+            yes = False
+    return replace(trial, answered=trial.answered or (yes and trial.repeated_s >= trial.since_s))
+
+
+def _is_stopped(trial: Trial, event: Event) -> bool:
+    """By two heartbeats, or by one and its answer to the order."""
+    if not isinstance(event, Heard) or not isinstance(event.measurement, Heartbeat) or event.measurement.armed:
+        return False
+    return trial.answered or watching.is_disarmed(trial.watch, trial.plan.limits)
 
 
 def _restoring(trial: Trial, event: Event) -> Step:
@@ -225,6 +295,8 @@ def _restoring(trial: Trial, event: Event) -> Step:
         return trial, ()
     if event.problem:
         return quarantine(trial, f"Its safe gains could not be verified: {event.problem}", event.now_s)
+    if trial.doubt:
+        return quarantine(trial, "", event.now_s)
     return enter(trial, State.IDLE, event.now_s), ()
 
 
@@ -246,23 +318,34 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     """The gravest limit that is not kept between the command and the end of the record."""
     plan, watch = trial.plan, trial.watch
     return (
-        watching.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
-        or watching.find_link(watch, plan.limits, now_s)
-        or watching.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
-        or watching.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
-        or watching.find_frozen(watch, plan.limits, now_s)
+        _taken_over(trial)
+        or findings.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
+        or findings.find_doubled(watch)
+        or findings.find_link(watch, plan.limits, now_s)
+        or findings.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
+        or findings.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
+        or findings.find_frozen(watch, plan.limits, now_s)
+        or findings.find_lost_position(watch, plan.limits, now_s)
         or agreement.find_disagreement(watch.second)
-        or watching.find_battery(watch, now_s)
+        or findings.find_battery(watch, now_s)
     )
 
 
 def _envelope(trial: Trial) -> Finding | None:
-    return watching.find_envelope(trial.watch, trial.plan.limits, ground_m=trial.plan.ground_m, settling=False)
+    return findings.find_envelope(trial.watch, trial.plan.limits, ground_m=trial.plan.ground_m, settling=False)
 
 
 def _taken_over(trial: Trial) -> Finding | None:
-    """A reboot, or a mode that is neither flight nor landing: both end in disarming on the ground."""
-    return watching.find_unexpected(replace(trial.watch, armed=True), trial.plan.limits, _modes(trial), _blocks(trial))
+    """By a person, as heartbeats show that have certainly seen the command."""
+    return findings.find_taken_over(trial.watch, trial.plan.limits) if _modes(trial) else None
+
+
+def _changed(trial: Trial) -> Finding | None:
+    """What is not told of a vehicle that lands; that its motors stop then is no surprise."""
+    watch = replace(trial.watch, armed=True)
+    return findings.find_doubled(watch) or findings.find_unexpected(
+        watch, trial.plan.limits, _modes(trial), _blocks(trial)
+    )
 
 
 def _modes(trial: Trial) -> frozenset[str]:

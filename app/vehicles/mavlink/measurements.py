@@ -1,6 +1,10 @@
 """What a vehicle's messages mean, whichever autopilot sent them: SI, altitude and climb positive up."""
 
 from dataclasses import dataclass, field
+from typing import Final
+
+DISARMING: Final = "command 400"
+"""What an answer to arming and disarming refers to (`Reply.to`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,24 +20,32 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """`mode` in the autopilot's own numbers, as text; `autopilot` is MAVLink's number of its make."""
+    """Of an autopilot, by its MAVLink `system` and `component`. `mode` in its own numbers, as text; `autopilot` is
+    MAVLink's number of its make."""
 
     autopilot: int
     armed: bool
     mode: str
     system: int = 0
+    component: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    voltage_v: float
+    """None where the vehicle does not know. `may_arm`: whether its own checks would let it be armed, told beside."""
+
+    voltage_v: float | None
+    may_arm: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Spoken:
-    """A line of text from the vehicle."""
+    """A line of text from the vehicle; of a longer one (with a `number`) the piece that has this `place`."""
 
     text: str
+    number: int = 0
+    place: int = 0
+    is_last: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +70,13 @@ class Reply:
 @dataclass(frozen=True, slots=True)
 class Breach:
     """The vehicle's own fence was crossed."""
+
+
+@dataclass(frozen=True, slots=True)
+class LandedState:
+    """Whether the vehicle itself believes to be on the ground."""
+
+    on_ground: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,5 +109,16 @@ class Version:
 
 
 Measurement = (
-    Position | Heartbeat | Battery | Spoken | Parameter | Reply | Breach | BlockCount | Block | BlockEntered | Version
+    Position
+    | Heartbeat
+    | Battery
+    | Spoken
+    | Parameter
+    | Reply
+    | Breach
+    | LandedState
+    | BlockCount
+    | Block
+    | BlockEntered
+    | Version
 )

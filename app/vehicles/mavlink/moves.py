@@ -5,12 +5,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.vehicles.mavlink import limits as watching
+from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Finding, Outcome, Reaction
-from app.vehicles.mavlink.limits import Limits, Watch
+from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.measurements import Parameter
 from app.vehicles.mavlink.signals import Action, Command, Event, Heard, Perform, SendGain, Setting
 from app.vehicles.mavlink.states import MOVES, OVER, State
+from app.vehicles.mavlink.watch import Watch
 
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
@@ -28,12 +29,14 @@ class Plan:
     datum_m: float = 0.0
     record_s: float = 33.0
     lift_off_s: float = 1.5
+    stop_settings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
-    `failure` is the first that happened; `stopped`: a person has had its motors stopped."""
+    `failure` is the first that happened; `stopped`: a person has asked for its motors to be stopped, `answered`: it
+    has answered an order to stop them. `doubt`: why it is quarantined in the end, however it lands."""
 
     plan: Plan
     state: State
@@ -52,6 +55,8 @@ class Trial:
     repeated_s: float = 0.0
     resting_since_s: float | None = None
     stopped: bool = False
+    answered: bool = False
+    doubt: str = ""
 
     @property
     def is_over(self) -> bool:
@@ -75,11 +80,11 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     """What a failure leads to, from a state in which the vehicle obeys."""
     trial = note(trial, finding)
     if trial.state is State.ARM:
-        return disarm(trial, now_s)
+        return disarm(trial, now_s) if finding.failure is not Failure.DOUBLED else _abort_landing(trial, now_s)
     reaction = RESPONSES[finding.failure].reaction
     if reaction == "cease":
         return quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
-    if trial.state is State.ABORT_LAND:
+    if trial.state in (State.ABORT_LAND, State.LINK_LOST):
         return save(trial, now_s) if finding.failure in SUSPECT and trial.gains_since_s is None else (trial, ())
     return _REACTIONS[reaction](trial, now_s)
 
@@ -99,6 +104,9 @@ def _abort_landing(trial: Trial, now_s: float) -> Step:
 
 
 def note(trial: Trial, finding: Finding) -> Trial:
+    """The first failure is the trial's; one that puts the vehicle in doubt is remembered beside it."""
+    if RESPONSES[finding.failure].outcome == "quarantine" and not trial.doubt:
+        trial = replace(trial, doubt=finding.why)
     if trial.failure is not None:
         return trial
     return replace(trial, failure=finding.failure, why=finding.why)
@@ -127,10 +135,9 @@ def land(trial: Trial, state: State, now_s: float) -> Step:
 
 
 def disarm(trial: Trial, now_s: float) -> Step:
-    """Motors off at once where the vehicle is on the ground by height and speed; else only once it is."""
-    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
-    trial = enter(trial, State.DISARM, now_s)
-    if not grounded:
+    """Motors off at once where every witness has had the vehicle on the ground for a second; else only once it has."""
+    trial = replace(enter(trial, State.DISARM, now_s), answered=False)
+    if not watching.may_stop(trial.watch, now_s):
         return trial, ()
     return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
 
@@ -139,16 +146,20 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
     """At once, wherever the vehicle is; the trial is aborted, whatever came before. It is repeated from disarm."""
     if trial.stopped:
         return trial, ()
-    why = " ".join(part for part in (trial.why, f"The motors were stopped: {reason}") if part)
-    trial = replace(trial, failure=Failure.OPERATOR, why=why, stopped=True, awaited=None, unsent=())
+    why = joined(trial.why, f"Motors off was asked for: {reason}.")
+    trial = replace(trial, failure=Failure.OPERATOR, why=why, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
     return replace(trial, repeated_s=now_s), (Perform(Action.KILL),)
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:
-    whole = " ".join(part for part in (trial.why, why) if part)
-    return replace(enter(trial, State.QUARANTINE, now_s), why=whole), ()
+    parts = (trial.why, *(part for part in (trial.doubt, why) if part not in trial.why))
+    return replace(enter(trial, State.QUARANTINE, now_s), why=joined(*parts)), ()
+
+
+def joined(*parts: str) -> str:
+    return " ".join(part for part in parts if part)
 
 
 def send_gains(trial: Trial, event: Event) -> Step:

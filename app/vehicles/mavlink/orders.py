@@ -3,10 +3,13 @@
 from typing import Final
 
 from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.measurements import DISARMING, Parameter, Reply
 from app.vehicles.mavlink.radio import Radio
-from app.vehicles.mavlink.signals import Action
+from app.vehicles.mavlink.signals import Action, Heard
 
 REPEAT_S: Final = 1.0
+STOPPING_S: Final = 5.0
+"""For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""
 _DESCENDING_M_S: Final = -0.2
 
 
@@ -17,13 +20,17 @@ class StandingOrder:
         """Sends it. Raises VehicleError when it takes a block of a flight plan that is not known."""
         self._radio, self._action = radio, action
         self._asked_s = radio.clock.now_s()
+        self._answered = False
         self._is_over = False
         self._send()
 
-    def proceed(self) -> None:
-        """Send it again when it is due."""
-        self._is_over = self._is_over or self._is_obeyed()
-        if not self._is_over and self._radio.clock.now_s() - self._sent_s >= REPEAT_S:
+    def proceed(self, heard: list[Heard]) -> None:
+        """Take in what came, and send it again when it is due."""
+        self._answered = self._answered or any(self._is_answer(each) for each in heard)
+        now_s = self._radio.clock.now_s()
+        is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
+        self._is_over = self._is_over or is_late or self._is_obeyed()
+        if not self._is_over and now_s - self._sent_s >= REPEAT_S:
             self._send()
 
     def _send(self) -> None:
@@ -39,13 +46,24 @@ class StandingOrder:
         for step in steps:
             self._radio.send(*step.sends)
 
+    def _is_answer(self, heard: Heard) -> bool:
+        match heard.measurement:
+            case Reply(to=to, accepted=True) if to == DISARMING:
+                return self._action is Action.KILL
+            case Parameter(name=name, value=value):
+                return name in self._radio.profile.stop_settings and value != 0.0
+            case _:
+                return False
+
     def _is_obeyed(self) -> bool:
-        """By what came since it was given: the motors stand, or, where it was to land, it does."""
+        """By what came since it was given: the motors stand, by two heartbeats or by one and an answer; or, where it
+        was to land, it does."""
         seen = self._radio.seen
-        is_new = seen.heartbeat is not None and seen.heartbeat_s > self._asked_s
-        if seen.heartbeat is not None and is_new and not seen.heartbeat.armed:
+        if seen.heartbeat is None or seen.heartbeat_s <= self._asked_s:
+            return False
+        if not seen.heartbeat.armed and (self._answered or self._radio.is_disarmed):
             return True
-        return self._action is Action.LAND and self._lands(seen.heartbeat.mode if seen.heartbeat and is_new else "")
+        return self._action is Action.LAND and self._lands(seen.heartbeat.mode)
 
     def _lands(self, mode: str) -> bool:
         seen, profile = self._radio.seen, self._radio.profile

@@ -68,9 +68,9 @@ def read_gains(radio: Radio, gain_set: GainSet, asked: Gains | None = None) -> d
     return held_now
 
 
-def read_parameter(radio: Radio, parameter: str) -> float | None:
+def read_parameter(radio: Radio, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     """None when the vehicle does not answer: it has no such parameter, or no ears."""
-    return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter)
+    return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter, attempts=attempts)
 
 
 def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str, float]:
@@ -129,11 +129,11 @@ def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
     return tuple(Setting(gain.parameter, gain.sent(gains[gain.gain])) for gain in ordered)
 
 
-def _ask(radio: Radio, request: Outgoing, parameter: str) -> float | None:
+def _ask(radio: Radio, request: Outgoing, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     def fits(heard: Measurement) -> bool:
         return isinstance(heard, Parameter) and heard.name == parameter
 
-    answer = radio.ask(request, fits)
+    answer = radio.ask(request, fits, attempts=attempts)
     return answer.value if isinstance(answer, Parameter) else None
 
 

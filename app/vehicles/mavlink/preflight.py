@@ -11,8 +11,9 @@ from typing import Final
 from app.vehicles.base import CheckItem, Identity
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.measurements import Heartbeat, Position
+from app.vehicles.mavlink.measurements import DISARMING, Heartbeat, Position, Reply
 from app.vehicles.mavlink.parameters import read_parameter
+from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Requirement
 from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.sources import Lookout
@@ -28,6 +29,8 @@ _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
 _DISARMED: Final = "disarmed"
 _VERSION_ATTEMPTS: Final = 2
+_NAME_ATTEMPTS: Final = 2
+_NO_POSITION: Final = "Wait until it knows where it is (GPS, cameras or its own sensors), then check again."
 _LAND_FIRST: Final = "Land it, see that its motors have stopped, then verify its gains and release it."
 
 
@@ -47,6 +50,8 @@ class Watched:
     positions: tuple[Position, ...]
     seconds: float
     seen_m: tuple[float, ...] = ()
+    disarmed: bool = False
+    """By every heartbeat of that time, of which there were some."""
 
     @property
     def ground(self) -> Ground:
@@ -63,15 +68,13 @@ def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
     within 5 s (longer where the vehicle's clock is fast), or another vehicle's than the `pinned` one's."""
     within_s = HEARTBEAT_S * radio.patience
     until_s = radio.clock.now_s() + within_s
-    makes: set[int] = set()
     while radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
         heartbeat = radio.seen.heartbeat
         if heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot:
             return _take_aim(radio, heartbeat, pinned)
-        if heartbeat is not None:
-            makes.add(heartbeat.autopilot)
-    others = f" Others were heard: MAVLink's autopilots {sorted(makes)}." if makes else ""
+    makes = sorted(radio.link.other_makes)
+    others = f" Others were heard: MAVLink's autopilots {makes}." if makes else ""
     raise VehicleError(
         f"{RESPONSES[Failure.NO_HEARTBEAT].text} Listened {within_s:g} s at {address} for {radio.profile.title} "
         f"(dialect {radio.profile.dialect.name}).{others}",
@@ -85,7 +88,12 @@ def _take_aim(radio: Radio, heartbeat: Heartbeat, pinned: Identity | None) -> No
             f"Another vehicle answers: system {heartbeat.system} instead of {pinned.system_id}.",
             hint="Connect the vehicle that was registered, or register this one.",
         )
-    radio.aim = replace(radio.aim, system=heartbeat.system, aircraft=radio.aim.aircraft or heartbeat.system)
+    radio.aim = replace(
+        radio.aim,
+        system=heartbeat.system,
+        component=heartbeat.component,
+        aircraft=radio.aim.aircraft or heartbeat.system,
+    )
 
 
 def learn(radio: Radio) -> str:
@@ -99,7 +107,25 @@ def learn(radio: Radio) -> str:
     asking = radio.profile.ask_version(radio.aim)
     if asking is not None:
         radio.ask(asking, lambda _: bool(radio.seen.version), attempts=_VERSION_ATTEMPTS)
+    has = tuple(name for name in radio.profile.stop_settings if _has(radio, name))
+    radio.aim = replace(radio.aim, stop_settings=has)
     return problem
+
+
+def _has(radio: Radio, parameter: str) -> bool:
+    return read_parameter(radio, parameter, attempts=_NAME_ATTEMPTS) is not None
+
+
+def confirm_stop(radio: Radio, watched: Watched) -> None:
+    """Find out whether a vehicle without a setting that stops its motors obeys the command that does. It is asked only
+    of one that was just watched standing, disarmed by every heartbeat: in the air, the command would drop it."""
+    if radio.aim.stop_settings or not radio.profile.stop_settings or radio.link.doubled:
+        return
+    stands = watched.disarmed and _moved_m(watched.positions) <= _STANDS_WITHIN_M and bool(watched.positions)
+    if stands:
+        obeyed = radio.ask(base.disarm(radio.aim), lambda it: isinstance(it, Reply) and it.to == DISARMING)
+        accepted = isinstance(obeyed, Reply) and obeyed.accepted
+        radio.aim = replace(radio.aim, stops_by_command=accepted)
 
 
 def changed(radio: Radio, pinned: Identity | None) -> str:
@@ -121,7 +147,7 @@ def require_disarmed(radio: Radio) -> None:
 
 
 def prepare(radio: Radio, telemetry_hz: float) -> None:
-    """Ask for telemetry, and set what a take-off needs. Raises VehicleError when it is refused."""
+    """Ask for telemetry. Raises VehicleError when it is refused."""
     if why := radio.set_up(radio.profile.prepare(radio.aim, telemetry_hz)):
         raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
 
@@ -130,25 +156,38 @@ def prepare(radio: Radio, telemetry_hz: float) -> None:
 
 
 def watch(radio: Radio, lookout: Lookout | None, *, watched_s: float = WATCHED_S) -> Watched:
-    """Listen for so long, and up to 10 s for the battery's voltage."""
+    """Listen for so long, and up to 10 s for the battery's voltage and a heartbeat that is late."""
     radio.listen(0.0)
     radio.seen.positions.clear()
     if lookout is not None:
         lookout.forget()
     begun_s = radio.clock.now_s()
+    armed: list[bool] = []
     while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
-        radio.seen.battery_v is None and now_s < begun_s + _BATTERY_S
+        (radio.seen.battery_v is None or not armed) and now_s < begun_s + _BATTERY_S
     ):
-        radio.listen(_LISTEN_S)
+        heard = radio.listen(_LISTEN_S)
+        armed += [each.measurement.armed for each in heard if isinstance(each.measurement, Heartbeat)]
     seen_m = () if lookout is None else lookout.stand()
-    return Watched(tuple(position for _, position in radio.seen.positions), now_s - begun_s, seen_m)
+    positions = tuple(position for _, position in radio.seen.positions)
+    return Watched(positions, now_s - begun_s, seen_m, disarmed=bool(armed) and not any(armed))
 
 
 def judge(radio: Radio, watched: Watched, *, min_battery_v: float, plan_problem: str) -> tuple[CheckItem, ...]:
     """All but the gains and the second source. Asks for the parameters that switch failsafes on."""
-    items = [_heartbeat(radio), _disarmed(radio), *_motion(watched), _battery(radio.seen.battery_v, min_battery_v)]
+    items = [
+        _heartbeat(radio),
+        _alone(radio),
+        _disarmed(radio),
+        *_motion(watched),
+        _battery(radio.seen.battery_v, min_battery_v),
+    ]
     if radio.profile.flying_blocks:
         items.append(_flight_plan(plan_problem))
+    if radio.profile.stop_settings:
+        items.append(_stopping(radio))
+    if radio.seen.may_arm is not None:
+        items.append(_own_checks(radio))
     return (*items, *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
 
 
@@ -194,6 +233,44 @@ def _heartbeat(radio: Radio) -> CheckItem:
     )
 
 
+def _alone(radio: Radio) -> CheckItem:
+    doubled = radio.link.doubled
+    return CheckItem(
+        name="alone",
+        title="Its system id",
+        passed=not doubled,
+        found=doubled.removesuffix(".") or f"one vehicle speaks as system {radio.aim.system}",
+        needed="one vehicle under one system id",
+        hint="Switch the other vehicle off, or give each an id of its own." if doubled else "",
+    )
+
+
+def _stopping(radio: Radio) -> CheckItem:
+    ways = [f"the setting {name}" for name in radio.aim.stop_settings]
+    ways += ["the command to disarm"] if radio.aim.stops_by_command else []
+    return CheckItem(
+        name="motors_off",
+        title="Motors off",
+        passed=bool(ways),
+        found=" and ".join(ways) or "it answers to no way to stop its motors",
+        needed="a way to stop its motors that it confirms",
+        hint="" if ways else "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
+    )
+
+
+def _own_checks(radio: Radio) -> CheckItem:
+    ready = bool(radio.seen.may_arm)
+    said = " / ".join(radio.seen.spoken)
+    return CheckItem(
+        name="own_checks",
+        title="Its own checks before arming",
+        passed=ready,
+        found="they pass" if ready else f"they do not pass; it said: {said or 'nothing'}",
+        needed="that it would arm",
+        hint="" if ready else "See to what it says; a vehicle that has just started may still be settling.",
+    )
+
+
 def _disarmed(radio: Radio) -> CheckItem:
     armed = is_armed(radio)
     return CheckItem(
@@ -210,8 +287,7 @@ def _motion(watched: Watched) -> tuple[CheckItem, ...]:
     positions = watched.positions
     passed_s = positions[-1].time_boot_s - positions[0].time_boot_s if positions else 0.0
     rate_hz = (len(positions) - 1) / passed_s if passed_s > 0.0 else 0.0
-    altitudes = [position.altitude_m for position in positions]
-    moved_m = max(altitudes) - min(altitudes) if altitudes else 0.0
+    moved_m = _moved_m(positions)
     return (
         CheckItem(
             name="position",
@@ -219,25 +295,30 @@ def _motion(watched: Watched) -> tuple[CheckItem, ...]:
             passed=rate_hz >= POSITIONS_HZ,
             found=f"{rate_hz:.1f} times a second",
             needed=f"{POSITIONS_HZ:g} times a second or more",
-            hint="Set its telemetry up for tuning (docs/real-flight.md).",
+            hint="Set its telemetry up for tuning (docs/real-flight.md)." if positions else _NO_POSITION,
         ),
         CheckItem(
             name="clock",
             title="Its clock",
             passed=passed_s > 0.0,
-            found=f"{passed_s:.2f} s passed in {watched.seconds:.2f} s",
+            found=f"{passed_s:.2f} s passed in {watched.seconds:.2f} s" if positions else "waiting for a position",
             needed="time that passes",
-            hint="Restart the vehicle.",
+            hint="Restart the vehicle." if positions else _NO_POSITION,
         ),
         CheckItem(
             name="still",
             title="Standing still",
-            passed=bool(altitudes) and moved_m <= _STANDS_WITHIN_M,
-            found=f"its altitude moved by {moved_m:.2f} m" if altitudes else "no position",
+            passed=bool(positions) and moved_m <= _STANDS_WITHIN_M,
+            found=f"its altitude moved by {moved_m:.2f} m" if positions else "waiting for a position",
             needed=f"{_STANDS_WITHIN_M:g} m or less",
-            hint="Put it on firm ground and let its position settle.",
+            hint="Put it on firm ground and let its position settle." if positions else _NO_POSITION,
         ),
     )
+
+
+def _moved_m(positions: Sequence[Position]) -> float:
+    altitudes = [position.altitude_m for position in positions]
+    return max(altitudes) - min(altitudes) if altitudes else 0.0
 
 
 def _battery(battery_v: float | None, min_battery_v: float) -> CheckItem:

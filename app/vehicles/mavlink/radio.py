@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from app.core.clock import Clock
+from app.vehicles.mavlink.dialects import Message, source_component
+from app.vehicles.mavlink.limits import WITNESSES_APART
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.measurements import (
     Battery,
@@ -34,33 +36,50 @@ class Seen:
 
     heartbeat: Heartbeat | None = None
     heartbeat_s: float = float("-inf")
+    disarmed_since_s: float | None = None
+    """Since when every heartbeat has said so."""
     version: str = ""
     block: int | None = None
     battery_v: float | None = None
+    may_arm: bool | None = None
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
     spoken: deque[str] = field(default_factory=lambda: deque(maxlen=_SPOKEN))
+    _piece_of: int = 0
+    _pieces: str = ""
 
     def note(self, measurement: Measurement | None, now_s: float) -> None:
         match measurement:
-            case Heartbeat():
+            case Heartbeat(armed=armed):
                 self.heartbeat, self.heartbeat_s = measurement, now_s
+                since_s = now_s if self.disarmed_since_s is None else self.disarmed_since_s
+                self.disarmed_since_s = None if armed else since_s
             case Version(version=version):
                 self.version = version
             case BlockEntered(number=number):
                 self.block = number
-            case Battery(voltage_v=volts):
-                self.battery_v = volts
+            case Battery(voltage_v=volts, may_arm=may_arm):
+                self.battery_v = volts if volts is not None else self.battery_v
+                self.may_arm = may_arm
             case Position():
                 self.positions.append((now_s, measurement))
-            case Spoken(text=text):
-                self.spoken.append(text)
+            case Spoken():
+                self._hear(measurement)
             case _:
                 pass
 
+    def _hear(self, said: Spoken) -> None:
+        """Pieces are put together in their order; one that is lost is not waited for."""
+        if said.number != self._piece_of or said.place == 0:
+            self._piece_of, self._pieces = said.number, ""
+        self._pieces += said.text
+        if said.is_last:
+            self.spoken.append(self._pieces)
+            self._piece_of, self._pieces = 0, ""
+
 
 class Radio:
-    """A link with a profile; an answer is waited for `patience_s`. `overhear` gets every message besides. For one
-    thread."""
+    """A link with a profile; an answer is waited for `patience_s`. Only the autopilot's own component is listened to;
+    `overhear` gets every message besides, of whichever. For one thread."""
 
     def __init__(
         self,
@@ -86,6 +105,12 @@ class Radio:
         return self.patience_s / PATIENCE_S
 
     @property
+    def is_disarmed(self) -> bool:
+        """By two heartbeats at least, and none between them that says otherwise."""
+        seen, apart_s = self.seen, WITNESSES_APART * self.profile.heartbeat_s * self.patience
+        return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= apart_s
+
+    @property
     def block(self) -> str:
         """The block of its flight plan that the vehicle is in, by name; empty where it does not tell."""
         names = {number: name for name, number in self.aim.blocks.items()}
@@ -102,10 +127,18 @@ class Radio:
         if self._overhear is not None:
             for message in messages:
                 self._overhear(message)
-        heard = [Heard(self.profile.measure(received.message), received.received_s) for received in messages]
+        heard = [
+            Heard(self.profile.measure(received.message), received.received_s)
+            for received in messages
+            if self._is_autopilots(received.message)
+        ]
         for each in heard:
             self.seen.note(each.measurement, each.now_s)
         return heard
+
+    def _is_autopilots(self, message: Message) -> bool:
+        """Not of another component on board; of any while the autopilot's is not known."""
+        return self.aim.component in (0, source_component(message))
 
     def ask(
         self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
@@ -145,7 +178,7 @@ class Conversation:
         """Take in what came and send what is due; how it ended, once it has."""
         for each in heard:
             if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
-                if not accepted:
+                if not accepted and self._steps[0].needed:
                     return self._refused(each.measurement)
                 self._next()
         now_s = self._radio.clock.now_s()
@@ -154,9 +187,12 @@ class Conversation:
         if not self._steps:
             return Done(self._action, now_s)
         if self._steps[0].awaits and now_s - self._sent_s >= self._radio.patience_s:
-            if self._attempts >= self._steps[0].attempts:
-                return None if self._steps[0].attempts == 1 else self._unanswered()
-            self._send()
+            if self._attempts < self._steps[0].attempts:
+                self._send()
+            elif not self._steps[0].needed:
+                self._next()
+            elif self._steps[0].attempts > 1:
+                return self._unanswered()
         return None
 
     def _next(self) -> None:

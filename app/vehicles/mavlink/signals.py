@@ -64,6 +64,14 @@ class Sighted:
 
 
 @dataclass(frozen=True, slots=True)
+class Doubled:
+    """Two vehicles speak under one system id; `why` says how that shows."""
+
+    why: str
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Done:
     """The vehicle has taken what an action sends."""
 
@@ -86,7 +94,7 @@ class Restored:
     problem: str = ""
 
 
-Event = Tick | Heard | AbortWanted | MotorsOffWanted | Sighted | Done | Refused | Restored
+Event = Tick | Heard | AbortWanted | MotorsOffWanted | Sighted | Doubled | Done | Refused | Restored
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,16 +49,12 @@ class Transport(Protocol):
 
     @property
     def remote(self) -> Peer | None:
-        """The peer that is written to and listened to; None while it is not known (`adopt`), and all are heard."""
-        ...
-
-    @property
-    def foreign(self) -> int:
-        """How often something came from another peer, and was dropped."""
+        """The peer that is written to; None while it is not known (`adopt`)."""
         ...
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
-        """What has come in, a datagram or a piece of a stream each; waits at most so long for the first, or `wake`."""
+        """What has come in, a datagram or a piece of a stream each, from whomever: over UDP anybody can send. Waits at
+        most so long for the first, or `wake`."""
         ...
 
     def write(self, data: bytes) -> bool:
@@ -66,7 +62,7 @@ class Transport(Protocol):
         ...
 
     def adopt(self, peer: Peer) -> None:
-        """From now on hear and write to `peer` alone."""
+        """From now on write to `peer`."""
         ...
 
     def wake(self) -> None:
@@ -106,27 +102,17 @@ class UdpTransport:
         self._waiter = _Waiter()
         self._waiter.watch(self._socket.fileno())
         self._remote = remote
-        self._foreign = 0
 
     @property
     def remote(self) -> Peer | None:
         return self._remote
 
-    @property
-    def foreign(self) -> int:
-        return self._foreign
-
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         heard: list[tuple[bytes, Peer]] = []
-        if not self._waiter.wait(timeout_s):
-            return heard
-        with contextlib.suppress(BlockingIOError):
-            for _ in range(BATCH):
-                data, peer = self._socket.recvfrom(LARGEST_READ)
-                if self._remote is None or peer == self._remote:
-                    heard.append((data, peer))
-                else:
-                    self._foreign += 1
+        if self._waiter.wait(timeout_s):
+            with contextlib.suppress(BlockingIOError):
+                while len(heard) < BATCH:
+                    heard.append(self._socket.recvfrom(LARGEST_READ))
         return heard
 
     def write(self, data: bytes) -> bool:
@@ -177,10 +163,6 @@ class StreamTransport:
     @property
     def remote(self) -> Peer | None:
         return self._peer
-
-    @property
-    def foreign(self) -> int:
-        return 0
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
         if self._is_broken:

@@ -6,7 +6,6 @@ from typing import Final
 
 from app.vehicles.base import Sample, ShouldStop, Stop
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.limits import Watch
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.measurements import Position
 from app.vehicles.mavlink.radio import Conversation, Radio
@@ -14,6 +13,7 @@ from app.vehicles.mavlink.signals import (
     AbortWanted,
     Action,
     Command,
+    Doubled,
     Event,
     Heard,
     Keep,
@@ -27,6 +27,7 @@ from app.vehicles.mavlink.signals import (
 )
 from app.vehicles.mavlink.states import State
 from app.vehicles.mavlink.transports import LinkError
+from app.vehicles.mavlink.watch import Watch
 
 LISTEN_S: Final = 0.01
 """How long the loop is deaf to an abort, at the most."""
@@ -111,6 +112,8 @@ class Flight:
             if isinstance(each, Heard) and isinstance(each.measurement, Position):
                 self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
             self._advance(each)
+        if why := self._radio.link.doubled:
+            self._advance(Doubled(why, self._radio.clock.now_s()))
         if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
             self._conversation = None
             self._advance(ended)

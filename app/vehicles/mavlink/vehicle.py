@@ -1,6 +1,7 @@
 """A vehicle that speaks MAVLink, between opening and closing."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -10,19 +11,21 @@ from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Condition, FlightOrder, FlightRecord, Identity, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import limits, parameters, preflight, records
+from app.vehicles.mavlink import parameters, preflight, records
+from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.gains import GainStore
+from app.vehicles.mavlink.gains import GainStore, written
 from app.vehicles.mavlink.gauges import Gauges
 from app.vehicles.mavlink.machine import Plan
 from app.vehicles.mavlink.opening import limits_of, open_radio
 from app.vehicles.mavlink.orders import StandingOrder
 from app.vehicles.mavlink.preflight import Ground
-from app.vehicles.mavlink.signals import Action, Keep
+from app.vehicles.mavlink.signals import Action, Heard, Keep
 from app.vehicles.mavlink.sources import Lookout, Source
 from app.vehicles.mavlink.states import IN_DOUBT, MOVES, State
-from app.vehicles.mavlink.transports import Transport
+from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import Flight, Flown
+from app.vehicles.mavlink.trial_parameters import TrialParameters
 from app.vehicles.mocap.recording import Recorded, Scored, with_second
 
 STAND_S: Final = 1.0
@@ -52,13 +55,16 @@ class MavlinkVehicle:
         clock: Clock | None = None,
         identity: Identity | None = None,
         observes: bool = False,
+        decided: bool = True,
         source: Source | None = None,
         transport: Transport | None = None,
     ) -> None:
         """Connect, wait for the vehicle (the one of that `identity`, where it is given), and write the safe gains, once
-        it is known to be disarmed. `clock` is the vehicle's time, by default that of its options; `source` is a second
-        source of altitude, which is closed with the vehicle; `transport` takes the place of the address, and of the
-        thread that reads it.
+        it is known to be disarmed. Unless they were `decided` by a person for this very vehicle, they are only compared
+        with what it holds, which may be its owner's; where that differs, nothing is written.
+
+        `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
+        closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
         without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
@@ -78,6 +84,8 @@ class MavlinkVehicle:
         self._gauges = Gauges(self._radio)
         try:
             self._gains = GainStore(self._radio, safe_gains)
+            self._decided = decided
+            self._parameters = TrialParameters(self._radio)
             self._connect()
             if not observes:
                 self._require_ready()
@@ -137,6 +145,11 @@ class MavlinkVehicle:
         if stop is not None:
             self._give_back()
             return self._not_begun(ground, stop.reason)
+        try:
+            self._parameters.set()
+        except BaseException:
+            self._give_back()
+            raise
         flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
@@ -183,9 +196,9 @@ class MavlinkVehicle:
         asked for is repeated every second until telemetry agrees. Raises LinkError when the link is closed."""
         until_s = self._radio.clock.now_s() + timeout_s
         while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
-            self._listen(min(left_s, _LISTEN_S))
+            heard = self._listen(min(left_s, _LISTEN_S))
             if self._order is not None:
-                self._order.proceed()
+                self._order.proceed(heard)
 
     def check(self) -> tuple[CheckItem, ...]:
         """Everything that has to be so before a flight; what is not so is an item, not an error. It takes two seconds
@@ -203,12 +216,22 @@ class MavlinkVehicle:
         SafeGainsError when it is armed or does not take them."""
         self._listen(0.0)
         preflight.require_disarmed(self._radio)
-        if problem := self._gains.give_back():
-            raise SafeGainsError(f"The vehicle does not take its safe gains: {problem}", hint=_SET_BY_HAND)
+        if problem := self._put_back():
+            raise SafeGainsError(f"The vehicle does not take what it had: {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
 
+    def _put_back(self) -> str:
+        """The safe gains, and what a trial set beside them; what is wrong with them, or nothing."""
+        return self._gains.give_back() or self._parameters.put_back()
+
     def land(self, reason: str) -> None:
-        """Tell it to land, at once and whatever state it is in. Raises VehicleError when it cannot be told."""
+        """Tell it to land, at once and whatever state it is in. Raises VehicleError when it cannot be told, or when its
+        motors stand: some do not arm any more after that."""
+        if self._radio.is_disarmed:
+            raise VehicleError(
+                "Its motors stand already, it says; it was not told to land.",
+                hint="If it flies all the same, it is another vehicle that says so: use the remote control.",
+            )
         self._asked = f"Land was asked for: {reason}."
         self._order = StandingOrder(self._radio, Action.LAND)
 
@@ -227,6 +250,7 @@ class MavlinkVehicle:
         gains, read back. Raises VehicleError when it is not heard, is armed, or does not hold them; it stays as it was
         then."""
         self._await_heartbeat()
+        self._decided = True
         self._set_up()
         if self._state in IN_DOUBT:
             self._enter(State.IDLE)
@@ -246,15 +270,23 @@ class MavlinkVehicle:
         try:
             self._set_up()
         except VehicleError as error:
-            self._observe(f"Its safe gains could not be verified: {error}")
+            self._observe(str(error) if not self._decided else f"Its safe gains could not be verified: {error}")
             return
+        self._decided = True
         self._enter(State.SET_GAINS)
         self._enter(State.IDLE)
 
     def _set_up(self) -> None:
-        """Raises VehicleError when the vehicle is armed, refuses, or does not take its safe gains."""
+        """Raises VehicleError when the vehicle is armed, refuses, does not take its safe gains, or holds others that
+        nobody decided to write over."""
         preflight.require_disarmed(self._radio)
         preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
+        if not self._decided and (found := self._gains.read()) != self._gains.safe:
+            raise SafeGainsError(
+                f"It holds {written(found)}, and {written(self._gains.safe)} are named as its safe gains; nothing was "
+                "written.",
+                hint="If what it holds is safe, name that as its safe gains. Else release it, which writes the others.",
+            )
         self.restore()
 
     def _require_ready(self) -> None:
@@ -274,13 +306,14 @@ class MavlinkVehicle:
                 raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
             self._listen(_LISTEN_S)
 
-    def _listen(self, timeout_s: float) -> None:
+    def _listen(self, timeout_s: float) -> list[Heard]:
         """Between flights: a vehicle that somebody else arms, or that tells another version than the pinned one, is
         only observed from then on."""
-        self._radio.listen(timeout_s)
+        heard = self._radio.listen(timeout_s)
         why = preflight.ARMED if preflight.is_armed(self._radio) else preflight.changed(self._radio, self._pinned)
         if why and self._state not in IN_DOUBT:
             self._observe(why)
+        return heard
 
     # ---- flying
 
@@ -296,6 +329,8 @@ class MavlinkVehicle:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
         watched = preflight.watch(self._radio, self._lookout, watched_s=watched_s)
         self._listen(0.0)
+        if self._state not in IN_DOUBT:
+            preflight.confirm_stop(self._radio, watched)
         minimum_v = float(self._options["min_battery_v"])
         items = preflight.judge(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if self._lookout is not None:
@@ -309,14 +344,16 @@ class MavlinkVehicle:
         plan = self._plan(ground)
         self._gains.staged = self._order = None
         self._datum_m = plan.datum_m
-        watch = limits.begin(self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v)
+        watch = watching.begin(
+            self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STAND_S
+        )
         if self._lookout is not None:
             self._lookout.begin(ground.seen_m, ground.altitude_m)
         self._flight = Flight(
             self._radio,
             plan,
             watch,
-            restore=self._gains.give_back,
+            restore=self._put_back,
             on_sample=on_sample,
             should_stop=should_stop,
             channels=lambda kept: records.channels_of(kept, plan.datum_m, self._scored),
@@ -327,7 +364,18 @@ class MavlinkVehicle:
         finally:
             self._flight = None
         self._state, self._why = flown.trial.state, flown.trial.why
+        if self._state is State.QUARANTINE:
+            self._land_on()
         return flown
+
+    def _land_on(self) -> None:
+        """A vehicle that could not be landed within its trial is told to land all the same, as long as it is armed and
+        no person flies it."""
+        heartbeat = self._radio.seen.heartbeat
+        by_hand = heartbeat is not None and heartbeat.mode in self._radio.profile.manual_modes
+        if not by_hand and not self._radio.is_disarmed:
+            with suppress(LinkError):
+                self._order = StandingOrder(self._radio, Action.LAND)
 
     def _plan(self, ground: Ground) -> Plan:
         profile = self._radio.profile
@@ -337,6 +385,7 @@ class MavlinkVehicle:
             ground_m=ground.altitude_m,
             datum_m=datum_m,
             lift_off_s=profile.lift_off_s,
+            stop_settings=profile.stop_settings,
             limits=limits_of(self._options, self._radio, datum_m=datum_m),
         )
 

@@ -161,6 +161,8 @@ class StreamSource:
 
     def _take_in(self, data: bytes, peer: Peer) -> None:
         is_stranger = self._transport.remote is None
+        if self._transport.remote not in (None, peer):
+            return
         codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT) if is_stranger else self._codec
         messages = [message for message in codec.parse(data) if is_known(message)]
         if is_stranger and any(message.get_type() in READERS for message in messages):

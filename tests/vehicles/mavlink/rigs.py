@@ -28,6 +28,7 @@ from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
+from app.vehicles.simdrone.autopilots.registry import Make
 from app.vehicles.simdrone.body import TICK_S
 from app.vehicles.simdrone.cameras import open_outlet
 from app.vehicles.simdrone.lockstep import Lockstep
@@ -77,12 +78,13 @@ class LockstepRig(Lockstep, _Heard):
         faults: Sequence[str] = (),
         *,
         release: str = "",
+        make: Make | None = None,
         body: Mapping[str, OptionValue] | None = None,
         mocap: str = "",
     ) -> None:
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
         options = {"scatter": 0.0, **(body or {})}
-        drone = switched_on(release or autopilot, options=options, faults=faults, outlet=self._outlet)
+        drone = switched_on(release or autopilot, options=options, faults=faults, outlet=self._outlet, make=make)
         Lockstep.__init__(self, drone)
         _Heard.__init__(self, autopilot)
 

@@ -273,7 +273,7 @@ def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() ->
             vehicle.stage(OWN_SAFE["ardupilot"])
             record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
             assert record.ending == "aborted"
-            assert record.reason == "The motors were stopped: people below"
+            assert record.reason == "Motors off was asked for: people below. Its motors have stopped, it says."
             forced = [
                 at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
             ]
@@ -294,7 +294,7 @@ def test_a_flight_plan_that_lands_by_its_own_exception_is_landed_with() -> None:
         vehicle.stage(TUNED)
         record = vehicle.fly(ORDER, on_sample=leave, should_stop=never)
         assert (record.ending, vehicle.concern, vehicle.read_gains()) == ("invalid", "", SAFE)
-        assert "The vehicle began to land by itself. Its flight plan went to the block “land”." in record.reason
+        assert "The vehicle began to land by itself. Its flight plan went to the block “land" in record.reason
         assert rig.drone.body.stands
 
 

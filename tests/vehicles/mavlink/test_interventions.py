@@ -38,7 +38,7 @@ def test_motors_off_is_sent_at_once_in_every_state_and_the_trial_is_aborted(stat
     assert walk.when(Action.KILL) == [slid_s]
     assert walk.state is (State.RESTORE if state is State.RESTORE else State.DISARM)
     assert (walk.trial.failure, walk.trial.outcome) == (Failure.OPERATOR, "aborted")
-    assert walk.trial.why.endswith("The motors were stopped: it flies towards people")
+    assert walk.trial.why.endswith("Motors off was asked for: it flies towards people.")
 
 
 def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_says_so() -> None:
@@ -60,7 +60,7 @@ def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -
     for _ in range(55):
         slide(walk).pass_s(STEP_S)
     assert len(walk.when(Action.KILL)) == 2
-    assert walk.trial.why == "too high The motors were stopped: it flies towards people"
+    assert walk.trial.why == "too high Motors off was asked for: it flies towards people."
 
 
 def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void() -> None:
@@ -81,11 +81,12 @@ def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains(
     assert walk.gains_sent[0] == walk.plan.safe_gains[0]
 
 
-def test_a_flight_plan_that_goes_where_nobody_sent_it_is_left_alone() -> None:
+def test_a_flight_plan_that_goes_where_nobody_sent_it_is_told_to_land() -> None:
     walk = Walk(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
-    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.UNEXPECTED)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
     assert walk.trial.why == "Its flight plan went to the block “Standby”."
+    assert walk.actions[-1] is Action.LAND
 
 
 def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
@@ -103,7 +104,7 @@ def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
 def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
     walk = Walk(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
     walk.mode = "land"
-    walk.pass_s(0.6)
+    walk.pass_s(1.6)
     assert (walk.state, walk.trial.failure, walk.trial.why) == (
         State.ABORT_LAND,
         Failure.OWN_LANDING,

@@ -7,8 +7,8 @@ from itertools import pairwise
 import pytest
 
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.measurements import Breach, Parameter, Position
-from app.vehicles.mavlink.signals import AbortWanted, Action, Perform, Refused, RestoreGains, SendGain
+from app.vehicles.mavlink.measurements import Breach, Heartbeat, Measurement, Parameter, Position
+from app.vehicles.mavlink.signals import AbortWanted, Action, Doubled, Perform, Refused, RestoreGains, SendGain
 from app.vehicles.mavlink.states import MOVES, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, Walk
 
@@ -112,18 +112,40 @@ def freeze(walk: Walk) -> None:
 
 
 def reboot(walk: Walk) -> None:
-    walk.hear(Position(0.1, walk.altitude_m, 0.0))
-    walk.pass_s(STEP_S)
+    walk.boot_s = 0.1
+    walk.pass_s(0.7)
+
+
+def go_astray(walk: Walk) -> None:
+    walk.mode = "0"
+    walk.pass_s(2.1)
 
 
 def be_taken_over(walk: Walk) -> None:
-    walk.mode = "0"
-    walk.pass_s(1.6)
+    walk.mode = "64"
+    walk.pass_s(2.1)
 
 
 def stop_by_itself(walk: Walk) -> None:
     walk.armed = False
+    walk.pass_s(1.6)
+
+
+def lose_its_position(walk: Walk) -> None:
+    """Beside a position that is no number, and so measures nothing, the rest is heard."""
+    walk.blind = True
     walk.pass_s(0.6)
+
+
+def jump_about(walk: Walk) -> None:
+    for _ in range(40):
+        walk.pass_s(STEP_S)
+        walk.boot_s += 0.01
+        walk.hear(Position(round(walk.boot_s, 6), walk.altitude_m + 1.5, walk.climb_rate_m_s))
+
+
+def be_one_of_two(walk: Walk) -> None:
+    walk.give(Doubled("Its sequence numbers come twice, with other contents.", walk.now_s))
 
 
 WALK: list[tuple[State, Callable[[Walk], None], State, Failure | None]] = [
@@ -137,8 +159,9 @@ WALK: list[tuple[State, Callable[[Walk], None], State, Failure | None]] = [
     (State.TAKEOFF, cross_its_fence, State.ABORT_LAND, Failure.ENVELOPE),
     (State.TAKEOFF, press_abort, State.ABORT_LAND, Failure.OPERATOR),
     (State.TAKEOFF, freeze, State.ABORT_LAND, Failure.FROZEN),
-    (State.TAKEOFF, reboot, State.QUARANTINE, Failure.UNEXPECTED),
-    (State.TAKEOFF, stop_by_itself, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.ARM, be_one_of_two, State.ABORT_LAND, Failure.DOUBLED),
+    (State.TAKEOFF, reboot, State.ABORT_LAND, Failure.UNEXPECTED),
+    (State.TAKEOFF, be_one_of_two, State.ABORT_LAND, Failure.DOUBLED),
     (State.RECORD, fall_silent, State.LINK_LOST, Failure.LINK),
     (State.RECORD, lose_heartbeats, State.LINK_LOST, Failure.LINK),
     (State.RECORD, fly_too_high, State.ABORT_LAND, Failure.ENVELOPE),
@@ -147,18 +170,23 @@ WALK: list[tuple[State, Callable[[Walk], None], State, Failure | None]] = [
     (State.RECORD, drain, State.ABORT_LAND, Failure.BATTERY),
     (State.RECORD, press_abort, State.ABORT_LAND, Failure.OPERATOR),
     (State.RECORD, freeze, State.ABORT_LAND, Failure.FROZEN),
-    (State.RECORD, reboot, State.QUARANTINE, Failure.UNEXPECTED),
-    (State.RECORD, be_taken_over, State.QUARANTINE, Failure.UNEXPECTED),
-    (State.RECORD, stop_by_itself, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.RECORD, reboot, State.ABORT_LAND, Failure.UNEXPECTED),
+    (State.RECORD, go_astray, State.ABORT_LAND, Failure.UNEXPECTED),
+    (State.RECORD, be_taken_over, State.QUARANTINE, Failure.TAKEN_OVER),
+    (State.RECORD, stop_by_itself, State.ABORT_LAND, Failure.UNEXPECTED),
+    (State.RECORD, lose_its_position, State.ABORT_LAND, Failure.FROZEN),
+    (State.RECORD, jump_about, State.ABORT_LAND, Failure.LOST_POSITION),
+    (State.RECORD, be_one_of_two, State.ABORT_LAND, Failure.DOUBLED),
     (State.LAND, fall_silent, State.LAND, None),
     (State.LAND, fly_too_high, State.ABORT_LAND, Failure.ENVELOPE),
     (State.LAND, press_abort, State.ABORT_LAND, Failure.OPERATOR),
     (State.LAND, drain, State.LAND, None),
-    (State.LAND, reboot, State.QUARANTINE, Failure.UNEXPECTED),
-    (State.LAND, be_taken_over, State.QUARANTINE, Failure.UNEXPECTED),
+    (State.LAND, reboot, State.ABORT_LAND, Failure.UNEXPECTED),
+    (State.LAND, be_taken_over, State.QUARANTINE, Failure.TAKEN_OVER),
     (State.ABORT_LAND, fall_silent, State.ABORT_LAND, Failure.BATTERY),
     (State.ABORT_LAND, press_abort, State.ABORT_LAND, Failure.BATTERY),
-    (State.ABORT_LAND, reboot, State.QUARANTINE, Failure.BATTERY),
+    (State.ABORT_LAND, reboot, State.ABORT_LAND, Failure.BATTERY),
+    (State.ABORT_LAND, be_one_of_two, State.ABORT_LAND, Failure.BATTERY),
     (State.ABORT_LAND, be_taken_over, State.QUARANTINE, Failure.BATTERY),
     (State.LINK_LOST, press_abort, State.LINK_LOST, Failure.LINK),
     (State.LINK_LOST, fall_silent, State.LINK_LOST, Failure.LINK),
@@ -376,13 +404,96 @@ def test_safe_gains_that_cannot_be_verified_quarantine_the_vehicle() -> None:
 def test_a_quarantine_tells_what_came_later_too() -> None:
     walk = aborting()
     reboot(walk)
-    assert walk.trial.why == "The battery was at 10.0 V. The vehicle rebooted."
+    walk.touch_down()
+    assert (walk.state, walk.trial.why) == (State.QUARANTINE, "The battery was at 10.0 V. The vehicle rebooted.")
     walk = recording()
     reboot(walk)
-    assert walk.trial.why == "The vehicle rebooted."
+    walk.touch_down()
+    assert (walk.state, walk.trial.why) == (State.QUARANTINE, "The vehicle rebooted.")
 
 
-def test_after_something_unexpected_nothing_more_is_sent() -> None:
+@pytest.mark.parametrize("befall", [reboot, go_astray, stop_by_itself, be_one_of_two])
+def test_a_vehicle_that_nobody_understands_is_told_to_land_again_and_again_and_its_motors_are_left_alone(
+    befall: Callable[[Walk], None],
+) -> None:
+    walk = recording()
+    befall(walk)
+    walk.pass_s(5.0)
+    assert len(walk.when(Action.LAND)) >= 5
+    walk.pass_s(40.0)
+    assert walk.state is State.QUARANTINE
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Heartbeat(9, False, "4"),
+        Heartbeat(9, True, "64"),
+        Heartbeat(9, True, "0"),
+        Position(0.1, GROUND_M, 0.0),
+        Position(3640.0, GROUND_M, 0.0),
+        Position(40.0, GROUND_M, 0.0),
+    ],
+    ids=["disarmed", "by hand", "failsafe", "reboot", "an hour ahead", "late"],
+)
+def test_one_message_decides_nothing(message: Measurement) -> None:
+    walk = recording().hear(message).pass_s(2.0)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+    walk.hear(message)
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    walk.climb_rate_m_s = -0.8
+    walk.pass_s(0.5).touch_down().disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, None)
+
+
+def test_a_heartbeat_of_somebody_else_every_second_is_outvoted_by_the_vehicles_own() -> None:
+    walk = recording()
+    for _ in range(3):
+        walk.hear(Heartbeat(9, False, "64")).pass_s(1.0)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+
+
+def test_a_record_ends_by_the_grounds_clock_too() -> None:
+    walk = recording()
+    walk.tempo = 0.3
+    walk.pass_s(PLAN.record_s)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SLOW_CLOCK)
+    assert walk.trial.why.startswith("By its clock ")
+
+
+def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
+    """Seen: at 2 m, by the positions of another vehicle that stood on the ground."""
+    walk = recording()
+    press_abort(walk)
+    walk.pass_s(0.5)
+    walk.altitude_m, walk.climb_rate_m_s = GROUND_M, 0.0
+    walk.pass_s(60.0)
+    assert walk.state is State.QUARANTINE
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+
+
+@pytest.mark.parametrize("says_so", [True, False])
+def test_the_motors_are_stopped_only_when_what_the_vehicle_says_of_itself_agrees(says_so: bool) -> None:
+    walk = landing()
+    walk.landed = says_so
+    walk.touch_down()
+    assert (walk.state is State.DISARM, Action.MOTORS_OFF in walk.actions) == (says_so, says_so)
+
+
+def test_a_vehicle_that_falls_is_recorded_so_and_left_for_a_person_to_look_at() -> None:
+    walk = recording()
+    press_abort(walk)
+    walk.climb_rate_m_s = -3.5
+    walk.pass_s(0.8)
+    walk.climb_rate_m_s = 0.0
+    walk.touch_down().disarm().restore()
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.OPERATOR)
+    assert walk.trial.why == f"{ABORT} It came to the ground at 3.5 m/s."
+
+
+def test_after_a_person_has_taken_over_nothing_more_is_sent() -> None:
     walk = recording()
     told = len(walk.told)
     be_taken_over(walk)
@@ -397,7 +508,7 @@ def test_a_vehicle_that_disarms_itself_after_landing_has_landed() -> None:
         walk.pass_s(STEP_S)
     walk.climb_rate_m_s = 0.0
     walk.armed = False
-    walk.pass_s(1.2)
+    walk.pass_s(2.1)
     assert (walk.state, walk.trial.failure) == (State.RESTORE, None)
 
 

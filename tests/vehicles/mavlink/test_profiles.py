@@ -1,7 +1,9 @@
 """What messages mean and what is sent, held against recorded traffic of the real Paparazzi and the facts of others."""
 
+import math
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -25,7 +27,7 @@ from app.vehicles.mavlink.measurements import (
 from app.vehicles.mavlink.parameters import check_gains, settings
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile
-from app.vehicles.mavlink.signals import Action
+from app.vehicles.mavlink.signals import Action, Setting
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 
 PAPARAZZI, ARDUPILOT, PX4 = (PROFILES[name] for name in ("paparazzi", "ardupilot", "px4"))
@@ -106,7 +108,23 @@ def test_gains_and_the_kill_are_written_as_they_were_recorded(gains: tuple[int, 
         PAPARAZZI.set_parameter(whom, gain.parameter, gain.sent(value))
         for gain, value in zip(gain_set, gains, strict=True)
     ]
-    assert [on_the_wire(message) for message in [*writes, *sent(PAPARAZZI, Action.MOTORS_OFF, whom)]] == told
+    stops = [on_the_wire(message) for message in sent(PAPARAZZI, Action.MOTORS_OFF, whom)]
+    assert [*(on_the_wire(message) for message in writes), stops[1]] == told
+    assert (stops[0][0], stops[0][1]["command"], stops[0][1]["param1"]) == ("COMMAND_LONG", 400, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "written"),
+    [(("kil_thr",), {"kil_thr"}), (("aut_kil_thr",), {"aut_kil_thr"}), ((), {"kil_thr", "aut_kil_thr"})],
+)
+def test_the_motors_are_stopped_by_the_command_and_by_the_setting_that_was_found(
+    found: tuple[str, ...], written: set[str]
+) -> None:
+    for action in (Action.MOTORS_OFF, Action.KILL):
+        first, *others = sent(PAPARAZZI, action, replace(aim(), stop_settings=found))
+        assert (first.kind, first.fields["command"], first.fields["param1"]) == ("COMMAND_LONG", 400, 0.0)
+        assert {str(message.fields["param_id"]) for message in others} == written
+        assert {message.fields["param_value"] for message in others} == {1.0}
 
 
 def test_the_recorded_vehicle_is_paparazzi_armed_between_its_blocks_with_a_full_battery() -> None:
@@ -141,7 +159,7 @@ def test_blocks_go_by_the_system_id_and_the_rest_by_the_aircraft_id() -> None:
     by_kind = {
         message.kind: message.fields["target_system"] for action in Action for message in sent(PAPARAZZI, action, whom)
     }
-    assert by_kind == {"MISSION_ITEM": 7, "MISSION_ACK": 7, "SCRIPT_ITEM": 7, "PARAM_SET": 31}
+    assert by_kind == {"MISSION_ITEM": 7, "MISSION_ACK": 7, "SCRIPT_ITEM": 7, "PARAM_SET": 31, "COMMAND_LONG": 31}
 
 
 def answers(listed: Mapping[int, str], count: int) -> "Recorder":
@@ -287,12 +305,24 @@ def test_arducopter_takes_off_in_guided_mode_and_lands_in_its_own() -> None:
 
 
 def test_px4_takes_off_by_its_mode_to_the_altitude_of_its_parameter() -> None:
-    prepared = [message for step in PX4.prepare(Aim(system=1, aircraft=1), 125.0) for message in step.sends]
-    assert [prepared[0].fields[name] for name in ("command", "param1", "param2")] == [511, 32, 8000]
-    assert (prepared[1].fields["param_id"], prepared[1].fields["param_value"]) == ("MIS_TAKEOFF_ALT", 3.0)
-    assert commands(PX4, Action.ARM) == [(400, 1, 0, 0, 0, 0, 0, 0)]
+    assert PX4.take_off_settings(Aim(system=1, aircraft=1)) == (Setting("MIS_TAKEOFF_ALT", 3.0),)
+    assert commands(PX4, Action.ARM) == [(176, 1, 4, 3, 0, 0, 0, 0), (400, 1, 0, 0, 0, 0, 0, 0)]
     assert commands(PX4, Action.TAKE_OFF) == [(176, 1, 4, 2, 0, 0, 0, 0)]
     assert commands(PX4, Action.LAND) == [(176, 1, 4, 6, 0, 0, 0, 0)]
+
+
+@pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
+def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Profile) -> None:
+    steps = profile.prepare(Aim(system=1, aircraft=1), 125.0)
+    asked = [(step.sends[0].fields, step.needed) for step in steps]
+    assert {fields["command"] for fields, _ in asked} == {511}
+    assert [(fields["param1"], needed) for fields, needed in asked] == [
+        (32, True),
+        (1, True),
+        (245, False),
+        (162, False),
+    ]
+    assert asked[0][0]["param2"] == 8000
 
 
 @pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
@@ -318,10 +348,40 @@ def test_motors_off_at_any_height_is_the_one_command_that_is_forced() -> None:
 
 
 def test_a_gimbal_or_a_companion_computer_on_board_does_not_speak_for_the_autopilot() -> None:
-    said = {"type": 26, "base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3}
+    said: dict[str, FieldValue] = {"base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3}
     for profile in PROFILES.values():
-        assert heard(profile, "HEARTBEAT", autopilot=8, **said) is None
-        assert isinstance(heard(profile, "HEARTBEAT", autopilot=profile.autopilot, **said), Heartbeat)
+        for kind in (6, 18, 26, 30):
+            assert heard(profile, "HEARTBEAT", autopilot=8, type=kind, **said) is None
+            assert heard(profile, "HEARTBEAT", autopilot=profile.autopilot, type=kind, **said) is None
+        assert isinstance(heard(profile, "HEARTBEAT", autopilot=profile.autopilot, type=2, **said), Heartbeat)
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["x", "y", "z", "vz"])
+def test_what_is_no_number_is_no_position(field: str, nothing: float) -> None:
+    sample: dict[str, FieldValue] = {
+        "time_boot_ms": 1000,
+        "x": 0.0,
+        "y": 0.0,
+        "z": -1.0,
+        "vx": 0.0,
+        "vy": 0.0,
+        "vz": 0.0,
+    }
+    for profile in PROFILES.values():
+        assert isinstance(heard(profile, "LOCAL_POSITION_NED", **sample), Position)
+        assert heard(profile, "LOCAL_POSITION_NED", **sample | {field: nothing}) is None
+
+
+def test_what_is_no_number_is_no_parameter() -> None:
+    held: dict[str, FieldValue] = {
+        "param_id": "gui_v_kp",
+        "param_value": math.nan,
+        "param_type": 9,
+        "param_count": 76,
+        "param_index": 6,
+    }
+    assert heard(PAPARAZZI, "PARAM_VALUE", **held) is None
 
 
 def test_a_version_is_read_as_each_autopilot_writes_it() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
-from app.vehicles.mavlink import limits
+from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.measurements import Position
@@ -69,7 +69,7 @@ class Replay:
         self.told: list[tuple[float, Command]] = []
         self.states = [State.ARM]
         self.trial: Trial
-        self.trial, _ = begin(plan, limits.begin(arming, last=positions[-1], battery_v=12.4), arming)
+        self.trial, _ = begin(plan, watching.begin(arming, last=positions[-1], battery_v=12.4), arming)
         self.give(Done(Action.ARM, arming))
 
     def run(self) -> None:

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 
-from app.vehicles.mavlink import limits
+from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.measurements import Battery, Heartbeat, Measurement, Position
+from app.vehicles.mavlink.measurements import DISARMING, Battery, Heartbeat, LandedState, Measurement, Position, Reply
 from app.vehicles.mavlink.signals import (
     Action,
     Command,
@@ -30,6 +30,7 @@ LIMITS = Limits(
     min_battery_v=10.5,
     flying_modes=frozenset({"4"}),
     landing_modes=frozenset({"4"}),
+    manual_modes=frozenset({"64"}),
 )
 PLAN = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=GROUND_M, record_s=8.0)
 
@@ -48,6 +49,9 @@ class Walk:
     voltage_v: float = 12.4
     mute: bool = False
     frozen: bool = False
+    blind: bool = False
+    tempo: float = 1.0
+    landed: bool | None = None
     heartless: bool = False
     told: list[tuple[float, Command]] = field(default_factory=list)
     states: list[State] = field(default_factory=list)
@@ -56,7 +60,7 @@ class Walk:
     def __post_init__(self) -> None:
         here = Position(self.boot_s, self.altitude_m, 0.0)
         self.trial: Trial
-        watch = limits.begin(self.now_s, last=here, battery_v=self.voltage_v)
+        watch = watching.begin(self.now_s, last=here, battery_v=self.voltage_v, stood_s=1.0)
         self.trial, commands = begin(self.plan, watch, self.now_s)
         self._note(commands)
 
@@ -92,7 +96,7 @@ class Walk:
         for _ in range(round(seconds / STEP_S)):
             self.steps += 1
             self.now_s += STEP_S
-            self.boot_s += STEP_S * (not self.frozen)
+            self.boot_s += STEP_S * self.tempo * (not self.frozen)
             self.altitude_m += self.climb_rate_m_s * STEP_S
             if not self.mute:
                 self._speak()
@@ -100,7 +104,10 @@ class Walk:
         return self
 
     def _speak(self) -> None:
-        self.hear(Position(round(self.boot_s, 6), self.altitude_m, self.climb_rate_m_s))
+        here = Position(round(self.boot_s, 6), self.altitude_m, self.climb_rate_m_s)
+        self.hear(None if self.blind else here)
+        if self.landed is not None:
+            self.hear(LandedState(self.landed))
         if self.steps % 25 == 0 and not self.heartless:
             self.hear(Heartbeat(9, self.armed, self.mode))
         if self.steps % 50 == 0:
@@ -149,10 +156,10 @@ class Walk:
         return self
 
     def disarm(self) -> "Walk":
-        """From the landed vehicle to its gains being restored."""
+        """From the landed vehicle to its gains being restored: it answers, and its next heartbeat agrees."""
+        self.hear(Reply(DISARMING, accepted=True))
         self.armed = False
-        self.pass_s(0.6)
-        return self
+        return self.pass_s(0.6)
 
     def restore(self, problem: str = "") -> "Walk":
         return self.give(Restored(self.now_s, problem))

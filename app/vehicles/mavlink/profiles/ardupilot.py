@@ -5,20 +5,23 @@ from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
-from app.vehicles.mavlink.measurements import Measurement
+from app.vehicles.mavlink.measurements import DISARMING, Measurement
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
-from app.vehicles.mavlink.signals import Action
+from app.vehicles.mavlink.signals import Action, Setting
 
 GUIDED: Final = 4
 LAND: Final = 9
 
-_ARM: Final = 400
 _SET_MODE: Final = 176
 _TAKE_OFF: Final = 22
 _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
+_SYS_STATUS: Final = 1
 _LOCAL_POSITION_NED: Final = 32
+_FENCE_STATUS: Final = 162
+_EXTENDED_SYS_STATE: Final = 245
+_STATUS_HZ: Final = 4.0
 _AUTOPILOT_VERSION: Final = 148
 _CUSTOM_MODE: Final = 1.0
 
@@ -43,6 +46,7 @@ class ArduPilot:
             "17": "Brake", "18": "Throw", "20": "Guided_NoGPS", "21": "SmartRTL",
         }
     )  # fmt: skip
+    manual_modes: Final = frozenset({"0", "1", "2", "5", "7", "11", "13", "14", "16", "18"})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
@@ -62,6 +66,7 @@ class ArduPilot:
             GainParameter("PSC_ACCZ_I", "PSC_D_ACC_I", 0.0, 4.0, factor=0.1, integrates=True),
         ),
     )
+    stop_settings: Final[tuple[str, ...]] = ()
     requirements: Final = (
         Requirement("FS_GCS_ENABLE", "land when the ground station is lost (5)", frozenset({5.0})),
         Requirement("FENCE_ENABLE", "keep inside its fence (1)"),
@@ -77,7 +82,11 @@ class ArduPilot:
         return ()
 
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
-        return (request_positions(aim, telemetry_hz),)
+        """A direct link is told nothing but heartbeats unless it asks."""
+        return request_telemetry(aim, telemetry_hz)
+
+    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
+        return ()
 
     def ask_version(self, aim: Aim) -> Outgoing:
         return request_version(aim)
@@ -87,7 +96,7 @@ class ArduPilot:
             case Action.ARM:
                 return (
                     Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, GUIDED),), awaits="command 176"),
-                    Step((base.command(aim, _ARM, 1.0),), awaits="command 400"),
+                    Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),
                 )
             case Action.TAKE_OFF:
                 above = base.command(aim, _TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, aim.altitude_m)
@@ -95,9 +104,9 @@ class ArduPilot:
             case Action.LAND:
                 return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, LAND),)),)
             case Action.MOTORS_OFF:
-                return (Step((base.command(aim, _ARM, 0.0),)),)
+                return (Step((base.disarm(aim),)),)
             case Action.KILL:
-                return (Step((base.command(aim, _ARM, 0.0, base.FORCED),)),)
+                return (Step((base.disarm(aim, forced=True),)),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
@@ -106,11 +115,19 @@ class ArduPilot:
         return base.read_parameter(aim, parameter)
 
 
-def request_positions(aim: Aim, telemetry_hz: float) -> Step:
-    """LOCAL_POSITION_NED at this rate."""
-    interval_us = round(1e6 / telemetry_hz)
-    asked = base.command(aim, _SET_MESSAGE_INTERVAL, _LOCAL_POSITION_NED, interval_us)
-    return Step((asked,), awaits="command 511")
+def request_telemetry(aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+    """Every message that a trial listens to, positions at this rate. Not every autopilot has the last ones."""
+    return (
+        _request(aim, _LOCAL_POSITION_NED, telemetry_hz),
+        _request(aim, _SYS_STATUS, _STATUS_HZ),
+        _request(aim, _EXTENDED_SYS_STATE, _STATUS_HZ, needed=False),
+        _request(aim, _FENCE_STATUS, _STATUS_HZ, needed=False),
+    )
+
+
+def _request(aim: Aim, message: int, rate_hz: float, *, needed: bool = True) -> Step:
+    asked = base.command(aim, _SET_MESSAGE_INTERVAL, message, round(1e6 / rate_hz))
+    return Step((asked,), awaits="command 511", attempts=5 if needed else 2, needed=needed)
 
 
 def request_version(aim: Aim) -> Outgoing:

@@ -3,16 +3,26 @@
 import math
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Final, Protocol
 
 from app.core.policy import shortened
-from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message, number, text
+from app.vehicles.mavlink.dialects import (
+    Dialect,
+    FieldValue,
+    Message,
+    is_autopilots_heartbeat,
+    number,
+    source_component,
+    source_system,
+    text,
+)
 from app.vehicles.mavlink.measurements import (
     Battery,
     Breach,
     Heartbeat,
+    LandedState,
     Measurement,
     Parameter,
     Position,
@@ -20,16 +30,21 @@ from app.vehicles.mavlink.measurements import (
     Spoken,
     Version,
 )
-from app.vehicles.mavlink.signals import Action
+from app.vehicles.mavlink.signals import Action, Setting
 
 ARMED_BIT: Final = 128
-NO_AUTOPILOT: Final = 8
-"""In heartbeats of gimbals, companion computers and ground stations."""
+ARM_DISARM: Final = 400
+COPTERS: Final = frozenset({0, 2, 3, 4, 13, 14, 15, 29, 35, 43})
+"""MAV_TYPE of what hovers: quadrotor, coaxial, helicopter, 6, 8, 3, 12 and 10 rotors, any; or not told."""
 FORCED: Final = 21196.0
 """The second parameter of 400 that stops motors in the air."""
 REAL32: Final = 9
 AUTOPILOT: Final = 1
 """The component id that autopilots have unless somebody changed it."""
+_ON_GROUND: Final = 1
+_PREARM_CHECK: Final = 1 << 28
+"""Among the sensors of SYS_STATUS: MAV_SYS_STATUS_PREARM_CHECK."""
+_TEXT_LENGTH: Final = 50
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
 _RESULTS: Final = ("accepted", "temporarily rejected", "denied", "unsupported", "failed", "in progress", "cancelled")
@@ -94,23 +109,29 @@ class Outgoing:
 @dataclass(frozen=True, slots=True)
 class Step:
     """Messages that belong together, and the reply that ends the step (see `Reply.to`), asked for up to `attempts`
-    times; without one the step ends after `pause_s`."""
+    times; without one the step ends after `pause_s`. What is not `needed` may be refused, or not answered."""
 
     sends: tuple[Outgoing, ...]
     awaits: str = ""
     attempts: int = 5
     pause_s: float = 0.0
+    needed: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Aim:
-    """Whom messages go to, and what is known about it: `aircraft` is the number that Paparazzi matches most messages
-    with, `blocks` are its flight plan's by name, east and north say where it stands."""
+    """Whom messages go to, and what is known about it: `component` is its autopilot's, 0 until it is known; `aircraft`
+    is the number that Paparazzi matches most messages with, `blocks` are its flight plan's by name, `stop_settings`
+    those settings that stop its motors which it was found to have, `stops_by_command` whether it was heard to obey the
+    command that does; east and north say where it stands."""
 
     system: int
     aircraft: int
+    component: int = 0
     waypoint: int = 2
     blocks: Mapping[str, int] = field(default_factory=dict)
+    stop_settings: tuple[str, ...] = ()
+    stops_by_command: bool = False
     east_m: float = 0.0
     north_m: float = 0.0
     altitude_m: float = 3.0
@@ -156,6 +177,11 @@ class Profile(Protocol):
     @property
     def landing_modes(self) -> frozenset[str]: ...
     @property
+    def manual_modes(self) -> frozenset[str]:
+        """In which a person flies it."""
+        ...
+
+    @property
     def mode_names(self) -> Mapping[str, str]:
         """What people call its modes, by what a heartbeat names them; one that is not here goes by that."""
         ...
@@ -175,6 +201,11 @@ class Profile(Protocol):
         ...
 
     @property
+    def stop_settings(self) -> tuple[str, ...]:
+        """Settings that stop the motors, by the names that releases have for them; none where a command always does."""
+        ...
+
+    @property
     def requirements(self) -> tuple[Requirement, ...]: ...
     def measure(self, message: Message) -> Measurement | None: ...
     def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:
@@ -186,14 +217,21 @@ class Profile(Protocol):
         ...
 
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
-        """Set up telemetry and what a take-off needs, on the ground."""
+        """Ask for telemetry, which changes nothing that lasts."""
+        ...
+
+    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:
+        """Parameters that have to be so for a take-off to the altitude of `aim`."""
         ...
 
     def ask_version(self, aim: Aim) -> Outgoing | None:
         """None where it tells unasked, or never."""
         ...
 
-    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]: ...
+    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+        """Raises KeyError when it takes a block of the flight plan that `aim` does not have."""
+        ...
+
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing: ...
     def read_parameter(self, aim: Aim, parameter: str) -> Outgoing: ...
 
@@ -259,21 +297,26 @@ def position(message: Message) -> Position:
 
 
 def heartbeat(message: Message, mode: str) -> Heartbeat | None:
-    """None where it is not the autopilot's but that of something else on board."""
-    if number(message, "autopilot") == NO_AUTOPILOT:
+    """None where it is not a copter's autopilot's but that of something else on board."""
+    if not is_autopilots_heartbeat(message) or number(message, "type") not in COPTERS:
         return None
     return Heartbeat(
         autopilot=int(number(message, "autopilot")),
         armed=bool(int(number(message, "base_mode")) & ARMED_BIT),
         mode=mode,
-        system=message.get_srcSystem(),
+        system=source_system(message),
+        component=source_component(message),
     )
 
 
-def battery(message: Message) -> Battery | None:
-    """SYS_STATUS, whose voltage is in mV; None where the vehicle does not know it."""
+def battery(message: Message) -> Battery:
+    """SYS_STATUS, whose voltage is in mV."""
     millivolts = number(message, "voltage_battery")
-    return None if millivolts in _UNKNOWN_MV else Battery(millivolts / 1000.0)
+    told, health = (int(number(message, f"onboard_control_sensors_{word}")) for word in ("present", "health"))
+    return Battery(
+        voltage_v=None if millivolts in _UNKNOWN_MV else millivolts / 1000.0,
+        may_arm=bool(health & _PREARM_CHECK) if told & _PREARM_CHECK else None,
+    )
 
 
 def parameter(message: Message) -> Parameter:
@@ -291,13 +334,27 @@ def answer(message: Message) -> Reply | None:
     return Reply(f"command {number(message, 'command'):.0f}", result == _ACCEPTED, f"result {result}, {known}")
 
 
+def disarm(aim: Aim, *, forced: bool = False) -> Outgoing:
+    """`forced`: in the air too, where an autopilot would refuse it."""
+    return command(aim, ARM_DISARM, 0.0, FORCED if forced else 0.0)
+
+
 def spoken(message: Message) -> Spoken:
-    return Spoken(text(message, "text"))
+    """STATUSTEXT; in MAVLink 2 a long one comes in pieces, the last of which is not full."""
+    said = text(message, "text")
+    number_of, place = (int(getattr(message, field, 0)) for field in ("id", "chunk_seq"))
+    return Spoken(said, number_of, place, is_last=not number_of or len(said) < _TEXT_LENGTH)
 
 
 def breach(message: Message) -> Breach | None:
     """FENCE_STATUS."""
     return Breach() if number(message, "breach_status") else None
+
+
+def landed_state(message: Message) -> LandedState | None:
+    """EXTENDED_SYS_STATE; None where the vehicle does not know."""
+    told = int(number(message, "landed_state"))
+    return LandedState(on_ground=told == _ON_GROUND) if told else None
 
 
 def version(message: Message) -> Version | None:
@@ -325,6 +382,7 @@ READERS: Final[Readers] = MappingProxyType(
         "COMMAND_ACK": answer,
         "STATUSTEXT": spoken,
         "FENCE_STATUS": breach,
+        "EXTENDED_SYS_STATE": landed_state,
         "AUTOPILOT_VERSION": version,
     }
 )
@@ -332,5 +390,13 @@ READERS: Final[Readers] = MappingProxyType(
 
 
 def read(readers: Readers, message: Message) -> Measurement | None:
+    """None for a message that measures nothing, or holds what is no number: no vehicle can be there, and no value is
+    that."""
     reader = readers.get(message.get_type())
-    return None if reader is None else reader(message)
+    measurement = None if reader is None else reader(message)
+    return measurement if measurement is not None and _is_finite(measurement) else None
+
+
+def _is_finite(measurement: Measurement) -> bool:
+    values = (getattr(measurement, each.name) for each in fields(measurement))
+    return all(math.isfinite(value) for value in values if isinstance(value, float))

@@ -10,7 +10,7 @@ from app.vehicles.mavlink.dialects import Message, number, text
 from app.vehicles.mavlink.measurements import Block, BlockCount, BlockEntered, Measurement, Reply, Version
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
-from app.vehicles.mavlink.signals import Action
+from app.vehicles.mavlink.signals import Action, Setting
 
 HOLDING: Final = "Holding point"
 START_ENGINE: Final = "Start Engine"
@@ -40,6 +40,7 @@ class Paparazzi:
     flying_modes: Final = frozenset({_NAV})
     landing_modes: Final = frozenset({_NAV})
     mode_names: Final = MappingProxyType({_NAV: "Automatic", "8": "Guided", "64": "By hand", "80": "By hand"})
+    manual_modes: Final = frozenset({"64", "80"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
@@ -50,6 +51,7 @@ class Paparazzi:
             GainParameter("kd", "gui_v_kd", 0.0, 800.0, whole=True),
         ),
     )
+    stop_settings: Final = ("kil_thr", "aut_kil_thr")
     requirements: Final[tuple[Requirement, ...]] = ()
 
     def measure(self, message: Message) -> Measurement | None:
@@ -80,6 +82,9 @@ class Paparazzi:
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
         return ()
 
+    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
+        return ()
+
     def ask_version(self, aim: Aim) -> None:
         """It tells every few seconds."""
 
@@ -96,7 +101,8 @@ class Paparazzi:
             case Action.LAND:
                 return (Step(_block(aim, LAND)),)
             case Action.MOTORS_OFF | Action.KILL:
-                return (Step((self.set_parameter(aim, "kil_thr", 1.0),)),)
+                settings = aim.stop_settings or self.stop_settings
+                return (Step((base.disarm(aim), *(self.set_parameter(aim, name, 1.0) for name in settings))),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value)

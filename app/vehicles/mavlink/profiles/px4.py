@@ -6,15 +6,14 @@ from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import COMMON, Message, number
-from app.vehicles.mavlink.measurements import Measurement, Parameter
+from app.vehicles.mavlink.measurements import DISARMING, Measurement, Parameter
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.ardupilot import request_positions, request_version
+from app.vehicles.mavlink.profiles.ardupilot import request_telemetry, request_version
 from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
-from app.vehicles.mavlink.signals import Action
+from app.vehicles.mavlink.signals import Action, Setting
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
-_ARM: Final = 400
 _SET_MODE: Final = 176
 _CUSTOM_MODE: Final = 1.0
 _AUTO: Final = 4
@@ -43,6 +42,7 @@ class Px4:
             "4.4": "Mission", "4.5": "Return", "4.6": "Land", "5.0": "Acro", "6.0": "Offboard", "7.0": "Stabilized",
         }
     )  # fmt: skip
+    manual_modes: Final = frozenset({"1.0", "2.0", "3.0", "5.0", "7.0"})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
@@ -54,6 +54,7 @@ class Px4:
             GainParameter("MPC_Z_VEL_I_ACC", "MPC_Z_VEL_I_ACC", 0.2, 3.0, integrates=True),
         ),
     )
+    stop_settings: Final[tuple[str, ...]] = ()
     requirements: Final = (
         Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)", frozenset({3.0})),
         Requirement(
@@ -72,8 +73,10 @@ class Px4:
         return ()
 
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
-        altitude = self.set_parameter(aim, TAKE_OFF_ALTITUDE, aim.altitude_m)
-        return (request_positions(aim, telemetry_hz), Step((altitude,), awaits=TAKE_OFF_ALTITUDE))
+        return request_telemetry(aim, telemetry_hz)
+
+    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:
+        return (Setting(TAKE_OFF_ALTITUDE, aim.altitude_m),)
 
     def ask_version(self, aim: Aim) -> Outgoing:
         return request_version(aim)
@@ -81,16 +84,19 @@ class Px4:
     def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
-                return (Step((base.command(aim, _ARM, 1.0),), awaits="command 400"),)
+                return (
+                    Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),
+                    Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),
+                )
             case Action.TAKE_OFF:
                 mode = base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
                 return (Step((mode,), awaits="command 176", attempts=1),)
             case Action.LAND:
                 return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
             case Action.MOTORS_OFF:
-                return (Step((base.command(aim, _ARM, 0.0),)),)
+                return (Step((base.disarm(aim),)),)
             case Action.KILL:
-                return (Step((base.command(aim, _ARM, 0.0, base.FORCED),)),)
+                return (Step((base.disarm(aim, forced=True),)),)
 
     def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)

@@ -1,0 +1,136 @@
+"""The limits of a trial held against what is remembered of the vehicle: what is not kept, in words."""
+
+from typing import Final
+
+from app.vehicles.mavlink import agreement
+from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.limits import Limits
+from app.vehicles.mavlink.watch import Watch, is_disarmed, is_restless, mode_of
+
+_HEARTBEATS_MISSED: Final = 3.5
+_OWN_CEILING_M: Final = 0.5
+"""How far below our ceiling a vehicle's own may be."""
+_LOW_BATTERY_S: Final = 1.0
+_NO_BATTERY_S: Final = 10.0
+_IMPACT_BELOW_M: Final = 0.5
+
+
+def find_on_ground(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    """The gravest limit that a vehicle does not keep that has not been told to take off."""
+    if watch.rebooted:
+        return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
+    return (
+        find_doubled(watch)
+        or find_link(watch, limits, now_s)
+        or find_frozen(watch, limits, now_s)
+        or find_lost_position(watch, limits, now_s)
+        or find_battery(watch, now_s)
+    )
+
+
+def find_taken_over(watch: Watch, limits: Limits) -> Finding | None:
+    """A person flies it now."""
+    mode = mode_of(watch, limits)
+    if not watch.armed or mode not in limits.manual_modes:
+        return None
+    return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle went into mode {_named(mode, limits)}.")
+
+
+def find_unexpected(
+    watch: Watch, limits: Limits, modes: frozenset[str], blocks: frozenset[str] = frozenset()
+) -> Finding | None:
+    """`modes` and `blocks` are those that it may be in, empty where any will do."""
+    why, mode = "", mode_of(watch, limits)
+    if watch.rebooted:
+        why = "The vehicle rebooted."
+    elif is_disarmed(watch, limits):
+        why = "The vehicle disarmed itself in the air."
+    elif modes and mode and mode not in modes:
+        why = f"The vehicle went into mode {_named(mode, limits)}."
+    elif blocks and watch.block and watch.block not in blocks:
+        why = f"Its flight plan went to the block “{watch.block}”."
+    return Finding(failure=Failure.UNEXPECTED, why=why) if why else None
+
+
+def _named(mode: str, limits: Limits) -> str:
+    return limits.mode_names.get(mode, mode)
+
+
+def find_own_landing(watch: Watch, limits: Limits, ground_m: float, *, mode_known: bool) -> Finding | None:
+    """For a vehicle that should fly. `mode_known`: its mode is not the one from before the command. So high up it is
+    the vehicle's own ceiling, somewhat below ours, that was met."""
+    why = ""
+    if mode_known and (mode := mode_of(watch, limits)) in limits.landing_modes - limits.flying_modes:
+        why = f"It went into mode {_named(mode, limits)}."
+    elif watch.block in limits.landing_blocks:
+        why = f"Its flight plan went to the block “{watch.block}”."
+    if not why or watch.last is None:
+        return None
+    if (height_m := watch.last.altitude_m - ground_m) > limits.ceiling_m - _OWN_CEILING_M:
+        return Finding(failure=Failure.ENVELOPE, why=f"It was {height_m:.2f} m above the ground. {why}")
+    return Finding(failure=Failure.OWN_LANDING, why=why)
+
+
+def find_doubled(watch: Watch) -> Finding | None:
+    return Finding(failure=Failure.DOUBLED, why=watch.doubled) if watch.doubled else None
+
+
+def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    if now_s - watch.heard_s > limits.silent_s:
+        return Finding(failure=Failure.LINK, why=f"Nothing was heard for {limits.silent_s:g} s.")
+    if now_s - watch.heartbeat_s > _HEARTBEATS_MISSED * limits.heartbeat_s:
+        return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
+    return None
+
+
+def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bool) -> Finding | None:
+    why = ""
+    if watch.breached:
+        why = "The vehicle's own fence was crossed."
+    elif watch.last is not None and watch.origin is not None:
+        last, origin = watch.last, watch.origin
+        away_m = ((last.north_m - origin.north_m) ** 2 + (last.east_m - origin.east_m) ** 2) ** 0.5
+        if (height_m := last.altitude_m - ground_m) > limits.ceiling_m:
+            why = f"It flew at {height_m:.2f} m above the ground, over {limits.ceiling_m:g} m."
+        elif abs(last.climb_rate_m_s) > limits.climb_rate_m_s:
+            why = f"It flew at {last.climb_rate_m_s:+.1f} m/s, beyond {limits.climb_rate_m_s:g} m/s."
+        elif away_m > limits.radius_m:
+            why = f"It flew {away_m:.1f} m away from its start, over {limits.radius_m:g} m."
+        elif settling and watch.crossings >= limits.crossings:
+            why = f"It crossed its set point {watch.crossings} times, beyond ±{limits.crossing_m:g} m."
+    return Finding(failure=Failure.ENVELOPE, why=why) if why else None
+
+
+def find_frozen(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    if watch.stuck_s > limits.stuck_s:
+        return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
+    return agreement.find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
+
+
+def find_lost_position(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+    """To be asked after `find_link`: silence is a lost link."""
+    why = ""
+    if now_s - watch.accepted_s > limits.lost_s and watch.heard_s - watch.accepted_s > limits.lost_s:
+        why = f"None of its positions could be believed for {limits.lost_s:g} s."
+    elif is_restless(watch):
+        why = "Its position jumps to and fro."
+    return Finding(failure=Failure.LOST_POSITION, why=why) if why else None
+
+
+def find_battery(watch: Watch, now_s: float) -> Finding | None:
+    if watch.low_since_s is not None and now_s - watch.low_since_s > _LOW_BATTERY_S:
+        return Finding(failure=Failure.BATTERY, why=f"The battery was at {watch.battery_v:.1f} V.")
+    if now_s - watch.battery_s > _NO_BATTERY_S:
+        return Finding(failure=Failure.BATTERY, why=f"No battery voltage was heard for {_NO_BATTERY_S:g} s.")
+    return None
+
+
+def find_fall(watch: Watch, limits: Limits, ground_m: float) -> Finding | None:
+    """It comes to the ground faster than anything that lands."""
+    last = watch.last
+    if last is None or watch.doubted is not None or watch.leapt:
+        return None
+    near = last.altitude_m - ground_m < _IMPACT_BELOW_M
+    if not near or last.climb_rate_m_s >= -limits.impact_m_s:
+        return None
+    return Finding(failure=Failure.FALL, why=f"It came to the ground at {-last.climb_rate_m_s:.1f} m/s.")

@@ -1,0 +1,125 @@
+"""Whether one vehicle speaks under one system id, or two by turns.
+
+Two that speak at once use every sequence number twice, with other contents, and tell two times. A packet that comes
+twice, late or in another order does neither.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+NUMBERS: Final = 256
+WITHIN_S: Final = 2.0
+PIECES: Final = 6
+"""So many pieces of evidence within that time, and it is certain."""
+REMEMBERED_S: Final = 5.0
+"""How long it stays certain once the evidence is gone."""
+
+_SAME_CLOCK_S: Final = 0.6
+"""Two time stamps that differ by less from what has passed are of one clock: packets may be held up."""
+_RATE_OVER_S: Final = 1.0
+_PEAK_OVER_S: Final = 10.0
+_LATE: Final = 100
+"""A number that lies so little behind the latest, and was not used yet, is of a packet that was held up."""
+_OF_A_ROUND: Final = 0.9
+"""The share of a round of sequence numbers after which one may come again."""
+
+
+@dataclass(slots=True)
+class _Used:
+    at_s: float
+    count: int
+    frame: bytes
+
+
+class Speakers:
+    """The messages of one component, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self._used: dict[int, _Used] = {}
+        self._rate = _Rate()
+        self._count = 0
+        self._latest = -1
+        self._clocks: dict[int, tuple[float, float]] = {}
+        self._clock = 0
+        self._doubled_numbers: deque[float] = deque(maxlen=PIECES)
+        self._doubled_clocks: deque[float] = deque(maxlen=PIECES)
+        self._certain_s: float | None = None
+        self._why = ""
+
+    def hear(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
+        """A message by its whole frame and sequence number; `boot_s`: the time that it tells, where it tells one."""
+        if self._hear_number(frame, number, now_s) and boot_s is not None:
+            self._hear_clock(boot_s - now_s, now_s)
+
+    def doubt(self, now_s: float) -> str:
+        """Why two are believed to speak; empty while one does."""
+        if self._is_certain(self._doubled_numbers, now_s):
+            self._certain_s, self._why = now_s, "Its sequence numbers come twice, with other contents."
+        elif self._is_certain(self._doubled_clocks, now_s):
+            self._certain_s, self._why = now_s, "Its messages tell two times by turns."
+        is_recent = self._certain_s is not None and now_s - self._certain_s < REMEMBERED_S
+        return self._why if is_recent else ""
+
+    def _is_certain(self, evidence: deque[float], now_s: float) -> bool:
+        return len(evidence) == PIECES and now_s - evidence[0] < WITHIN_S
+
+    def _hear_number(self, frame: bytes, number: int, now_s: float) -> bool:
+        """Whether the packet came in its turn: not once more, nor later than others that were sent after it."""
+        self._count += 1
+        used = self._used.get(number)
+        is_taken = used is not None and self._is_of_this_round(used, now_s)
+        if used is not None and is_taken and used.frame == frame:
+            return False
+        ahead = (number - self._latest) % NUMBERS
+        if ahead < NUMBERS // 2:
+            self._latest = number
+            self._rate.pass_on(ahead, now_s)
+        behind = NUMBERS - ahead
+        is_late = behind <= _LATE and not is_taken
+        late = behind if is_late else 0
+        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late, frame)
+        if is_taken:
+            self._doubled_numbers.append(now_s)
+        return not is_late
+
+    def _is_of_this_round(self, used: _Used, now_s: float) -> bool:
+        """Whether the numbers cannot have come round since it was used."""
+        round_s = _OF_A_ROUND * NUMBERS / self._rate.number_hz
+        return self._count - used.count < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
+
+    def _hear_clock(self, offset_s: float, now_s: float) -> None:
+        """Evidence is a return: from another clock to one that was heard a moment ago."""
+        for clock, (known_s, at_s) in self._clocks.items():
+            if abs(offset_s - known_s) < _SAME_CLOCK_S and now_s - at_s < WITHIN_S:
+                if clock != self._clock:
+                    self._doubled_clocks.append(now_s)
+                    self._clock = clock
+                self._clocks[clock] = (offset_s, now_s)
+                return
+        self._clock = max(self._clocks, default=0) + 1
+        recent = {clock: known for clock, known in self._clocks.items() if now_s - known[1] < WITHIN_S}
+        self._clocks = {**recent, self._clock: (offset_s, now_s)}
+
+
+class _Rate:
+    """How many sequence numbers are used up within a second, lost ones among them: the most of the last while."""
+
+    def __init__(self) -> None:
+        self._passed: deque[tuple[float, int]] = deque()
+        self._sum = 0
+        self._peak = self._former_peak = 1
+        self._since_s = float("-inf")
+
+    @property
+    def number_hz(self) -> float:
+        return max(self._peak, self._former_peak) / _RATE_OVER_S
+
+    def pass_on(self, numbers: int, now_s: float) -> None:
+        self._passed.append((now_s, numbers))
+        self._sum += numbers
+        while now_s - self._passed[0][0] > _RATE_OVER_S:
+            self._sum -= self._passed.popleft()[1]
+        if now_s - self._since_s > _PEAK_OVER_S:
+            self._since_s, self._former_peak, self._peak = now_s, self._peak, 1
+        self._peak = max(self._peak, self._sum)

@@ -1,0 +1,94 @@
+"""One vehicle or two under one system id, by whatever a link does to the packets of one."""
+
+import random
+from collections.abc import Iterable
+from itertools import chain
+
+import pytest
+
+from app.vehicles.mavlink.speakers import Speakers
+
+Packet = tuple[float, int, bytes, float]
+"""When it comes, its sequence number, its frame, the vehicle's time that it tells."""
+
+
+def said(
+    vehicle: str,
+    *,
+    seconds: float = 20.0,
+    rate_hz: float = 68.0,
+    number: int = 0,
+    boot_s: float = 50.0,
+    at_s: float = 0.0,
+) -> list[Packet]:
+    """What one vehicle says, each packet unlike every other."""
+    count = round(seconds * rate_hz)
+    return [
+        (at_s + step / rate_hz, (number + step) % 256, f"{vehicle} {step}".encode(), boot_s + step / rate_hz)
+        for step in range(count)
+    ]
+
+
+def heard(packets: Iterable[Packet]) -> tuple[str, float]:
+    """What is believed first that is not nothing, and when; nothing, and the end."""
+    speakers, at_s = Speakers(), 0.0
+    for at_s, number, frame, boot_s in sorted(packets, key=lambda packet: packet[0]):
+        speakers.hear(frame, number, at_s, boot_s)
+        if doubt := speakers.doubt(at_s):
+            return doubt, at_s
+    return "", at_s
+
+
+@pytest.mark.parametrize("rate_hz", [12.0, 68.0, 150.0, 400.0])
+def test_one_vehicle_is_one_at_any_rate(rate_hz: float) -> None:
+    assert heard(said("one", rate_hz=rate_hz))[0] == ""
+
+
+@pytest.mark.parametrize("gap_s", [0.3, 1.0, 2.0, 2.5, 3.0, 3.7, 5.0, 8.0])
+def test_a_link_that_was_lost_is_no_second_vehicle(gap_s: float) -> None:
+    assert heard(packet for packet in said("one") if not 5.0 < packet[0] < 5.0 + gap_s)[0] == ""
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_losses_are_no_second_vehicle(share: float) -> None:
+    chance = random.Random(1)
+    assert heard(packet for packet in said("one", seconds=60.0) if chance.random() > share)[0] == ""
+
+
+def test_packets_that_come_twice_are_no_second_vehicle() -> None:
+    again = [(at_s + 0.3, *rest) for at_s, *rest in said("one")[::2]]
+    assert heard(chain(said("one"), again))[0] == ""  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("late_s", [0.02, 0.2, 0.7, 1.2])
+def test_packets_that_come_late_are_no_second_vehicle(late_s: float) -> None:
+    packets = [(at_s + (late_s if step % 5 == 0 else 0.0), *rest) for step, (at_s, *rest) in enumerate(said("one"))]
+    assert heard(packets)[0] == ""  # type: ignore[arg-type]
+
+
+def test_a_reboot_is_no_second_vehicle() -> None:
+    before = said("before", seconds=10.0)
+    after = said("after", seconds=10.0, at_s=12.0, boot_s=2.0)
+    assert heard([*before, *after])[0] == ""
+
+
+@pytest.mark.parametrize("ahead", range(0, 256, 16))
+@pytest.mark.parametrize("older_s", [0.0, 0.3, 5.0, 3600.0])
+def test_two_vehicles_are_noticed_within_two_seconds(ahead: int, older_s: float) -> None:
+    one = said("one")
+    other = said("other", number=ahead, boot_s=50.0 + older_s, at_s=3.005, rate_hz=61.0)
+    doubt, at_s = heard([*one, *other])
+    assert doubt
+    assert at_s < 3.0 + 3.5
+
+
+def test_the_doubt_is_over_once_one_of_them_is_silent() -> None:
+    speakers = Speakers()
+    packets = sorted([*said("one", seconds=30.0), *said("other", number=40, boot_s=7.0, at_s=3.0, seconds=5.0)])
+    doubts = []
+    for at_s, number, frame, boot_s in packets:
+        speakers.hear(frame, number, at_s, boot_s)
+        doubts.append((at_s, bool(speakers.doubt(at_s))))
+    doubted = [at_s for at_s, doubt in doubts if doubt]
+    assert 3.0 < doubted[0] < 5.0
+    assert 12.0 < doubted[-1] < 17.0

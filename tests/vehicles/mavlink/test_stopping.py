@@ -1,0 +1,166 @@
+"""How a vehicle's motors are stopped, and how it comes down when it is told to land in its first seconds."""
+
+import pytest
+
+from app.vehicles.base import FlightOrder, FlightRecord, Stop
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.simdrone.autopilots.base import Autopilot
+from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
+from app.vehicles.simdrone.autopilots.paparazzi.plan import LANDED_AFTER_S
+from app.vehicles.simdrone.autopilots.paparazzi.settings import KILL_SETTING, NEWER_KILL_SETTING
+from app.vehicles.simdrone.autopilots.registry import Make
+from app.vehicles.simdrone.body import Body
+from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
+from tests.vehicles.mavlink.rigs import LockstepRig
+from tests.vehicles.mavlink.test_connected import connected
+
+ORDER = FlightOrder(seed=1)
+HARD_M_S = 2.0
+MESSAGE_ID, PARAM_SET, COMMAND_LONG = 5, 23, 76
+"""Where a frame of MAVLink 1 has the number of its message, and two of these."""
+
+
+class DeafToCommands(Paparazzi):
+    """Answers no COMMAND_LONG."""
+
+    deaf_to = frozenset({COMMAND_LONG})
+
+    def receive(self, data: bytes) -> None:
+        if data[MESSAGE_ID] not in self.deaf_to:
+            super().receive(data)
+
+
+def of(kind: type[Paparazzi] = Paparazzi, **how: str | float) -> Make:
+    def make(body: Body, system: int) -> Autopilot:
+        return kind(body, system=system, **how)  # type: ignore[arg-type]
+
+    return make
+
+
+class FallingRig(LockstepRig):
+    """`impact_m_s`: the fastest that the vehicle truly sank within half a metre of the ground."""
+
+    impact_m_s = 0.0
+
+    def tick(self) -> None:
+        super().tick()
+        if 0.0 < self.drone.body.altitude_m < 0.5:
+            self.impact_m_s = max(self.impact_m_s, -self.drone.body.climb_rate_m_s)
+
+
+def fly(vehicle: MavlinkVehicle) -> FlightRecord:
+    vehicle.stage(TUNED)
+    return vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+
+
+@pytest.mark.parametrize("setting", [KILL_SETTING, NEWER_KILL_SETTING, ""])
+def test_after_a_flight_the_motors_stand_whatever_a_release_calls_its_setting(setting: str) -> None:
+    with LockstepRig(make=of(kill_setting=setting)) as rig, connected(rig) as vehicle:
+        assert all(item.passed for item in vehicle.check())
+        record = fly(vehicle)
+        assert (record.ending, vehicle.concern, rig.drone.autopilot.armed) == ("completed", "", False)
+        assert vehicle.read_gains() == SAFE
+
+
+@pytest.mark.parametrize("setting", [KILL_SETTING, NEWER_KILL_SETTING])
+def test_a_vehicle_that_heeds_no_commands_is_stopped_by_its_setting(setting: str) -> None:
+    with LockstepRig(make=of(DeafToCommands, kill_setting=setting)) as rig, connected(rig) as vehicle:
+        record = fly(vehicle)
+        assert (record.ending, vehicle.concern, rig.drone.autopilot.armed) == ("completed", "", False)
+
+
+def test_a_vehicle_that_confirms_no_way_to_stop_its_motors_is_not_flown() -> None:
+    with LockstepRig(make=of(DeafToCommands, kill_setting="")) as rig, connected(rig) as vehicle:
+        [stopping] = [item for item in vehicle.check() if item.name == "motors_off"]
+        assert (stopping.passed, stopping.found) == (False, "it answers to no way to stop its motors")
+        vehicle.stage(TUNED)
+        with pytest.raises(VehicleError, match="Motors off: it answers to no way"):
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert not rig.drone.autopilot.took_off
+
+
+def test_the_command_is_tried_only_on_a_vehicle_that_stands_disarmed() -> None:
+    with LockstepRig(make=of(kill_setting="")) as rig, connected(rig) as vehicle:
+        assert not rig.told("COMMAND_LONG")
+        rig.drone.body.altitude_m = 1.0  # carried about, disarmed
+        rig.drone.autopilot._body.climb_rate_m_s = 0.0  # type: ignore[attr-defined]
+        vehicle.check()
+    with LockstepRig(make=of(kill_setting="")) as rig, connected(rig) as vehicle:
+        rig.drone.autopilot._enter(3)  # type: ignore[attr-defined]  # armed by somebody else
+        vehicle.check()
+        assert not rig.told("COMMAND_LONG")
+
+
+@pytest.mark.parametrize("setting", [KILL_SETTING, NEWER_KILL_SETTING, ""])
+def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_says_so(setting: str) -> None:
+    with LockstepRig(make=of(kill_setting=setting)) as rig, connected(rig) as vehicle:
+        vehicle.stage(TUNED)
+
+        def slide() -> Stop | None:
+            return Stop("people below", motors_off=True) if rig.drone.body.altitude_m > 1.0 else None
+
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
+        assert not rig.drone.autopilot.armed
+        assert record.reason == "Motors off was asked for: people below. Its motors have stopped, it says."
+
+
+def test_motors_off_that_the_vehicle_does_not_heed_is_not_said_to_have_stopped_them() -> None:
+    """Seen: recorded as stopped, while the drone hovered on."""
+    slid: list[float] = []
+
+    class Heedless(DeafToCommands):
+        def receive(self, data: bytes) -> None:
+            if not (slid and data[MESSAGE_ID] == PARAM_SET):
+                super().receive(data)
+
+    with LockstepRig(make=of(Heedless)) as rig, connected(rig) as vehicle:
+        vehicle.stage(TUNED)
+
+        def slide() -> Stop | None:
+            if rig.drone.body.altitude_m > 1.0:
+                slid.append(rig.now_s())
+            return Stop("people below", motors_off=True) if slid else None
+
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
+        assert record.reason.startswith(
+            "Motors off was asked for: people below. It has not said within 5 s that its motors stopped."
+        )
+        assert vehicle.concern
+        vehicle.attend(40.0)  # and it is told to land on
+        assert rig.drone.body.altitude_m < 0.1
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize("tenths", range(1, 31))
+def test_an_abort_in_the_first_seconds_brings_it_down_gently(tenths: int) -> None:
+    with FallingRig(make=of(landed_after_s=LANDED_AFTER_S)) as rig, connected(rig) as vehicle:
+        record = aborted(vehicle, tenths / 10)
+        assert (record.ending, vehicle.concern) == ("aborted", "")
+        assert rig.impact_m_s < 1.2
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize("tenths", range(1, 31))
+def test_under_the_plan_of_before_a_fall_is_noticed_and_recorded(tenths: int) -> None:
+    with FallingRig(make=of(landed_after_s=0.0)) as rig, connected(rig) as vehicle:
+        record = aborted(vehicle, tenths / 10)
+        fell = rig.impact_m_s > HARD_M_S
+        assert record.ending == "aborted"
+        assert ("It came to the ground at" in record.reason, bool(vehicle.concern)) == (fell, fell)
+
+
+@pytest.mark.parametrize(("at_s", "falls"), [(0.7, True), (2.5, False)])
+def test_the_second_before_it_counts_as_flying_is_a_fall_under_the_plan_of_before(at_s: float, falls: bool) -> None:
+    with FallingRig(make=of(landed_after_s=0.0)) as rig, connected(rig) as vehicle:
+        record = aborted(vehicle, at_s)
+        assert (rig.impact_m_s > HARD_M_S, "It came to the ground at" in record.reason) == (falls, falls)
+        if falls:
+            with pytest.raises(SafeGainsError, match="It came to the ground at"):
+                vehicle.stage(TUNED)
+
+
+def aborted(vehicle: MavlinkVehicle, at_s: float) -> FlightRecord:
+    watcher = Watcher(abort_at_s=at_s)
+    vehicle.stage(TUNED)
+    return vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
