@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 BUILT = HERE.parents[1] / "frontend" / "dist" / "index.html"
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
-PATIENCE_MS = 20_000
+PATIENCE_MS = 60_000
 """On a machine that has other things to do as well."""
 ENDS_WITHIN_S = 90
 """Longer than a server waits for its worker."""
