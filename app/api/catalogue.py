@@ -24,7 +24,7 @@ router = APIRouter(prefix="/api", tags=["catalogue"])
 class Health(BaseModel):
     status: Literal["ok"]
     version: str
-    worker: Literal["running", "absent"]
+    worker: Literal["running", "not answering", "absent"]
 
 
 class GainInfo(BaseModel):
@@ -107,7 +107,7 @@ class Catalogue(BaseModel):
 @router.get("/health")
 def get_health(live: Live) -> Health:
     """Whether the program answers, and whether a worker is there to fly and compute."""
-    return Health(status="ok", version=__version__, worker="running" if live.worker_running else "absent")
+    return Health(status="ok", version=__version__, worker=live.worker)
 
 
 @router.get("/catalogue")

@@ -40,7 +40,7 @@ async def events(
             event="hello",
             id=None if last_event_id else str(sent),
             retry=RETRY_MS,
-            data={"version": __version__, "worker": live.worker_running},
+            data={"version": __version__, "worker": live.client.answers},
         )
         if not known:
             yield ServerSentEvent(event="reset", id=str(sent), data={})

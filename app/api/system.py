@@ -36,7 +36,7 @@ class System(BaseModel):
     `in_container` its own, which need not be the host's. `exposes` ends the sentence "It listens on …, so"."""
 
     version: str
-    worker: Literal["running", "absent"]
+    worker: Literal["running", "not answering", "absent"]
     host: str
     is_exposed: bool
     in_container: bool
@@ -54,7 +54,7 @@ def get_system(request: Request, settings: CurrentSettings, database: CurrentDat
     """Version, address, room on the disk: what one is asked for when something is wrong."""
     return System(
         version=__version__,
-        worker="running" if live.worker_running else "absent",
+        worker=live.worker,
         host=settings.host,
         is_exposed=exposure(settings.host) is not None,
         in_container=is_in_container(),

@@ -8,6 +8,7 @@ import datetime as dt
 import os
 import select
 import signal
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import fields
@@ -44,6 +45,7 @@ GONE_AFTER_S: Final = 3.0
 CONTROL_WITHIN_S: Final = 120.0
 """How long a session waits for the one of a worker that was killed: it may be landing, or waiting for a lost link."""
 LOOK_AGAIN_S: Final = 2.0
+_LATE: Final = "It came too late, when whoever asked had been told that it could not be; it was not passed on."
 
 
 class WorkerGoneError(Exception):
@@ -165,13 +167,18 @@ class Seat:
         return None
 
     def _obey(self, ordered: Ordered) -> None:
-        problem = ""
-        try:
-            act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
-            act(ordered.reason)
-        except VehicleError as error:
-            problem = str(error)
+        problem = _LATE if self._is_late(ordered) else ""
+        if not problem:
+            try:
+                act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
+                act(ordered.reason)
+            except VehicleError as error:
+                problem = str(error)
         self._line.say(Obeyed(ordered.order, ordered.reason, problem))
+
+    @staticmethod
+    def _is_late(ordered: Ordered) -> bool:
+        return time.monotonic() > ordered.by_s
 
     def _show(self) -> None:
         now_s = self._call.clock.now_s()
@@ -302,6 +309,8 @@ class Seat:
         match message:
             case StandDown(trial_id, reason) if trial_id == self._trial_id:
                 self._stop = self._stop or Stop(reason)
+            case Ordered(order, reason) if self._is_late(message):
+                self._line.say(Obeyed(order, reason, _LATE))
             case Ordered(order, reason):
                 if order == "motors off":
                     self._stop = Stop(reason, motors_off=True)

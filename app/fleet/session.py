@@ -74,10 +74,12 @@ class Answered:
 
 @dataclass(frozen=True, slots=True)
 class Ordered:
-    """Said to the process at any moment: land, or motors off."""
+    """Said to the process at any moment: land, or motors off; not to be carried out after `by_s` of this computer's
+    monotonic clock."""
 
     order: Order
     reason: str
+    by_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,9 +166,9 @@ class Session:
     def stand_down(self, trial_id: int, reason: str) -> None:
         self._tell(StandDown(trial_id, reason))
 
-    def order(self, order: Order, reason: str) -> bool:
+    def order(self, order: Order, reason: str, by_s: float) -> bool:
         """Whether the process was told; it passes the order on at once. False while there is no link."""
-        return self._open and self.alive and self._tell(Ordered(order, reason))
+        return self._open and self.alive and self._tell(Ordered(order, reason, by_s))
 
     def hang_up(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""

@@ -103,12 +103,12 @@ class SessionDeck:
 
     # ---- from any thread
 
-    def order(self, vehicle_id: int, order: Order, reason: str) -> bool:
+    def order(self, vehicle_id: int, order: Order, reason: str, by_s: float) -> bool:
         """Whether the vehicle's session was told. A flight that waits for its take-off stands down by it too."""
         berth = self._berths.get(vehicle_id)
         if berth is None or (session := berth.live) is None:
             return False
-        told = session.order(order, reason)
+        told = session.order(order, reason, by_s)
         if (trial_id := session.trial_id) is not None:
             self._airspace.abort(trial_id, reason)
         return told

@@ -3,6 +3,7 @@ cannot wait for the database."""
 
 import asyncio
 import itertools
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +20,8 @@ from app.live.messages import (
     FromWorker,
     Message,
     Order,
+    Ping,
+    Pong,
     ToWorker,
     VehicleOrder,
     VehicleOrderAnswer,
@@ -30,9 +33,10 @@ from app.live.messages import (
 FIRST_PAUSE_S: Final = 0.05
 LONGEST_PAUSE_S: Final = 0.5
 ANSWER_TIMEOUT_S: Final = 2.0
+PING_EVERY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
-A = TypeVar("A", AbortAnswer, VehicleOrderAnswer)
+A = TypeVar("A", AbortAnswer, VehicleOrderAnswer, Pong)
 
 
 class LinkDownError(GainlineError):
@@ -42,7 +46,8 @@ class LinkDownError(GainlineError):
 class LiveClient:
     """Keeps one connection to the worker at `path`, trying again for ever. One event loop only.
 
-    `on_message` gets whatever the worker says; `on_link` is told when the connection comes and goes.
+    `on_message` gets whatever the worker says; `on_link` is told when the connection comes and goes, and when the
+    worker ceases to answer and does again.
     """
 
     def __init__(
@@ -53,11 +58,35 @@ class LiveClient:
         self._on_link = on_link
         self._writer: asyncio.StreamWriter | None = None
         self._waiting: dict[int, asyncio.Future[Answer]] = {}
+        self._answers = True
         self._numbers = itertools.count(1)
 
     @property
     def connected(self) -> bool:
         return self._writer is not None
+
+    @property
+    def answers(self) -> bool:
+        """Whether there is a worker that answered when it was last asked whether it is there."""
+        return self.connected and self._answers
+
+    async def watch(self) -> None:
+        """Ask the worker again and again whether it is there, until cancelled."""
+        while True:
+            await asyncio.sleep(PING_EVERY_S)
+            if self.connected:
+                try:
+                    await self._ask(Ping(request=next(self._numbers)), Pong)
+                except LinkDownError:
+                    self._note(answers=False)
+                else:
+                    self._note(answers=True)
+
+    def _note(self, *, answers: bool) -> None:
+        before, self._answers = self.answers, answers
+        if self.answers != before:
+            _log.warning("worker answers again" if answers else "worker does not answer")
+            self._on_link(self.answers)
 
     async def run(self) -> None:
         """Connect and listen until cancelled."""
@@ -74,12 +103,15 @@ class LiveClient:
 
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
         """Tell the worker to end a flight and wait for its answer. Raises LinkDownError when it cannot be told."""
-        return await self._ask(Abort(request=next(self._numbers), trial_id=trial_id, reason=reason), AbortAnswer)
+        question = Abort(request=next(self._numbers), trial_id=trial_id, reason=reason, by_s=_deadline_s())
+        return await self._ask(question, AbortAnswer)
 
     async def order(self, vehicle_id: int, order: Order, reason: str) -> VehicleOrderAnswer:
         """Have the worker tell a vehicle to land or to stop its motors. Raises LinkDownError as `abort` does."""
-        request = VehicleOrder(request=next(self._numbers), vehicle_id=vehicle_id, order=order, reason=reason)
-        return await self._ask(request, VehicleOrderAnswer)
+        question = VehicleOrder(
+            request=next(self._numbers), vehicle_id=vehicle_id, order=order, reason=reason, by_s=_deadline_s()
+        )
+        return await self._ask(question, VehicleOrderAnswer)
 
     async def _ask(self, question: ToWorker, kind: type[A]) -> A:
         if self._writer is None:
@@ -108,13 +140,13 @@ class LiveClient:
     def _take(self, message: Message, writer: asyncio.StreamWriter) -> None:
         match message:
             case WorkerHello():
-                self._writer = writer
+                self._writer, self._answers = writer, True
                 self._on_message(message)
                 self._on_link(True)
-            case AbortAnswer(request=request) | VehicleOrderAnswer(request=request):
+            case AbortAnswer(request=request) | VehicleOrderAnswer(request=request) | Pong(request=request):
                 if (answer := self._waiting.get(request)) is not None and not answer.done():
                     answer.set_result(message)
-            case Abort() | VehicleOrder():
+            case Abort() | VehicleOrder() | Ping():
                 raise InputError(f"The worker sent an {message.type}.", hint="Restart the worker.")
             case _:
                 self._on_message(message)
@@ -128,6 +160,10 @@ class LiveClient:
             writer.close()
         if was_up:
             self._on_link(False)
+
+
+def _deadline_s() -> float:
+    return time.monotonic() + ANSWER_TIMEOUT_S
 
 
 def _link_down(why: str) -> LinkDownError:

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, Literal, TypeVar
 
 from app.db.session import Database
 from app.live.address import live_address
@@ -39,6 +39,12 @@ class Live:
     def worker_running(self) -> bool:
         return self.client.connected
 
+    @property
+    def worker(self) -> Literal["running", "not answering", "absent"]:
+        if not self.client.connected:
+            return "absent"
+        return "running" if self.client.answers else "not answering"
+
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
         """Past the database, straight to the worker. Raises LinkDownError when it cannot be told."""
         return await self.client.abort(trial_id, reason)
@@ -51,7 +57,7 @@ class Live:
         """Say whether the worker is there, again and again, until cancelled."""
         while True:
             await asyncio.sleep(BEAT_S)
-            self.hub.publish(LinkState(worker=self.worker_running))
+            self.hub.publish(LinkState(worker=self.client.answers))
 
     def close(self) -> None:
         """End every stream."""
@@ -68,7 +74,7 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
     live = Live(data_dir)
     tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
     await asyncio.to_thread(tail.start)
-    running = [asyncio.create_task(live.client.run()), asyncio.create_task(live.beat())]
+    running = [asyncio.create_task(work) for work in (live.client.run(), live.client.watch(), live.beat())]
     try:
         yield live
     finally:

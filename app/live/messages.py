@@ -72,11 +72,13 @@ class WorkerHello:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abort:
-    """End this trial's flight now: safe gains, land. `request` comes back in the answer."""
+    """End this trial's flight now: safe gains, land. `request` comes back in the answer. After `by_s` of the computer's
+    monotonic clock whoever asked has been told that it could not be: it is not carried out any more."""
 
     request: int
     trial_id: int
     reason: str
+    by_s: float
     type: Literal["abort"] = "abort"
 
 
@@ -92,13 +94,14 @@ class AbortAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleOrder:
-    """Have this vehicle land, or stop its motors at any height, now and whatever it does. `request` comes back in the
-    answer."""
+    """Have this vehicle land, or stop its motors at any height, now and whatever it does. `request` and `by_s` as in
+    `Abort`."""
 
     request: int
     vehicle_id: int
     order: Order
     reason: str
+    by_s: float
     type: Literal["order"] = "order"
 
 
@@ -112,11 +115,25 @@ class VehicleOrderAnswer:
     type: Literal["order answer"] = "order answer"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ping:
+    """Asked of the worker again and again: one that hangs does not answer."""
+
+    request: int
+    type: Literal["ping"] = "ping"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pong:
+    request: int
+    type: Literal["pong"] = "pong"
+
+
 Shown = Telemetry | FlightPhase | VehicleStatus
 """What streams show, as it comes."""
-Answer = AbortAnswer | VehicleOrderAnswer
+Answer = AbortAnswer | VehicleOrderAnswer | Pong
 FromWorker = Shown | WorkerHello | Answer
-ToWorker = Abort | VehicleOrder
+ToWorker = Abort | VehicleOrder | Ping
 Message = FromWorker | ToWorker
 
 

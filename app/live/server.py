@@ -8,6 +8,7 @@ client too slow to read loses telemetry instead of holding up the flight.
 import asyncio
 import socket
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
@@ -23,6 +24,8 @@ from app.live.messages import (
     FromWorker,
     Message,
     Order,
+    Ping,
+    Pong,
     Shown,
     Telemetry,
     VehicleOrder,
@@ -45,8 +48,8 @@ class LiveServer:
     """Listens at `path` between enter and exit.
 
     `abort(trial_id, reason)` is called on the socket's thread and says whether that trial flies;
-    `order(vehicle_id, order, reason)` whether that vehicle was told; `hello()` describes the worker to a new client.
-    All must return at once.
+    `order(vehicle_id, order, reason, by_s)` whether that vehicle was told; `hello()` describes the worker to a new
+    client. All must return at once. What comes after its time, because this process stood still, is not carried out.
     """
 
     def __init__(
@@ -54,7 +57,7 @@ class LiveServer:
         path: Path,
         *,
         abort: Callable[[int, str], bool],
-        order: Callable[[int, Order, str], bool],
+        order: Callable[[int, Order, str, float], bool],
         hello: Callable[[], WorkerHello],
     ) -> None:
         self._path = path
@@ -112,14 +115,16 @@ class LiveServer:
     def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
         answer: Message
         match decode(line):
-            case Abort(request=request, trial_id=trial_id, reason=reason):
-                accepted = self._abort(trial_id, reason)
+            case Abort(request=request, trial_id=trial_id, reason=reason, by_s=by_s):
+                accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
                 answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
                 _log.info("abort asked", trial_id=trial_id, reason=reason, accepted=accepted)
-            case VehicleOrder(request=request, vehicle_id=vehicle_id, order=order, reason=reason):
-                accepted = self._order(vehicle_id, order, reason)
+            case VehicleOrder(request=request, vehicle_id=vehicle_id, order=order, reason=reason, by_s=by_s):
+                accepted = _is_in_time(by_s) and self._order(vehicle_id, order, reason, by_s)
                 answer = VehicleOrderAnswer(request=request, vehicle_id=vehicle_id, accepted=accepted)
                 _log.info("order given", vehicle_id=vehicle_id, order=order, reason=reason, accepted=accepted)
+            case Ping(request=request):
+                answer = Pong(request=request)
             case other:
                 raise InputError(
                     f"A client sent {other.type!r}, which only the worker sends.",
@@ -135,6 +140,10 @@ class LiveServer:
                 writer.transport.abort()
             elif unread <= SLOW_CLIENT_BYTES or not isinstance(message, Telemetry | VehicleStatus):
                 writer.write(line)
+
+
+def _is_in_time(by_s: float) -> bool:
+    return time.monotonic() <= by_s
 
 
 def _listen(path: Path) -> socket.socket:

@@ -167,7 +167,10 @@ def _duration_s(chance: random.Random, kind: str) -> float:
 
 
 def _gains(chance: random.Random, autopilot: str, *, wild: bool) -> dict[str, float]:
-    if wild:
-        return dict(chance.choice(_WILD))
+    return dict(chance.choice(_WILD)) if wild else tuned_gains(chance, autopilot)
+
+
+def tuned_gains(chance: random.Random, autopilot: str) -> dict[str, float]:
+    """Gains that fly well, scattered so that none is another's."""
     scattered = {name: value * chance.uniform(1 - _SPREAD, 1 + _SPREAD) for name, value in _TUNED[autopilot].items()}
     return {name: round(value) if autopilot == "paparazzi" else round(value, 5) for name, value in scattered.items()}

@@ -4,6 +4,8 @@ import asyncio
 import os
 import socket
 import stat
+import threading
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -11,13 +13,18 @@ from pathlib import Path
 import pytest
 
 from app.core.errors import InputError
+from app.live import client as client_module
 from app.live.address import LONGEST_PATH_BYTES, live_address
 from app.live.client import LinkDownError, LiveClient
 from app.live.messages import (
+    Abort,
+    AbortAnswer,
     FlightPhase,
     FromWorker,
     Order,
     Telemetry,
+    VehicleOrder,
+    VehicleOrderAnswer,
     VehicleStatus,
     WorkerHello,
     decode,
@@ -52,7 +59,7 @@ def status(altitude_m: float = 0.1) -> VehicleStatus:
 def server(
     path: Path,
     abort: Callable[[int, str], bool] = lambda _trial, _why: False,
-    order: Callable[[int, Order, str], bool] = lambda _vehicle, _order, _why: False,
+    order: Callable[[int, Order, str, float], bool] = lambda _vehicle, _order, _why, _by_s: False,
 ) -> LiveServer:
     return LiveServer(
         path, abort=abort, order=order, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2])
@@ -159,7 +166,7 @@ def test_an_abort_reaches_the_worker_and_its_answer_comes_back(tmp_path: Path) -
 def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_vehicle(tmp_path: Path) -> None:
     given: list[tuple[int, Order, str]] = []
 
-    def order(vehicle_id: int, what: Order, reason: str) -> bool:
+    def order(vehicle_id: int, what: Order, reason: str, _by_s: float) -> bool:
         given.append((vehicle_id, what, reason))
         return vehicle_id == 5
 
@@ -172,6 +179,62 @@ def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_v
 
     asyncio.run(scenario())
     assert given == [(5, "land", "it drifts"), (6, "motors off", "it burns")]
+
+
+def test_what_comes_after_its_time_is_not_carried_out(tmp_path: Path) -> None:
+    """Seen: the worker stood still for 20 s, motors off was answered “could not be told”, and was carried out later."""
+    done: list[str] = []
+    path = tmp_path / "w.sock"
+    late_s, early_s = time.monotonic() - 0.001, time.monotonic() + 3600.0
+
+    def abort(_trial_id: int, reason: str) -> bool:
+        done.append(reason)
+        return True
+
+    def order(_vehicle_id: int, _order: Order, reason: str, _by_s: float) -> bool:
+        done.append(reason)
+        return True
+
+    with server(path, abort, order), socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as web:
+        web.connect(str(path))
+        reader = web.makefile("rb")
+        reader.readline()
+        for request, (by_s, reason) in enumerate(((late_s, "late"), (early_s, "in time"))):
+            web.sendall(encode(Abort(request=request, trial_id=2, reason=f"abort {reason}", by_s=by_s)))
+            web.sendall(
+                encode(VehicleOrder(request=request, vehicle_id=5, order="motors off", reason=reason, by_s=by_s))
+            )
+        answers = [decode(reader.readline()) for _ in range(4)]
+    assert [answer.accepted for answer in answers if isinstance(answer, AbortAnswer | VehicleOrderAnswer)] == [
+        False,
+        False,
+        True,
+        True,
+    ]
+    assert done == ["abort in time", "in time"]
+
+
+def test_a_worker_that_stands_still_is_noticed_and_one_that_goes_on_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_module, "PING_EVERY_S", 0.005)
+    monkeypatch.setattr(client_module, "ANSWER_TIMEOUT_S", 0.05)
+    path, goes_on = tmp_path / "w.sock", threading.Event()
+
+    async def scenario() -> None:
+        with server(path) as worker:
+            async with connected(path) as web:
+                watching = asyncio.create_task(web.client.watch())
+                await web.until(lambda: web.client.answers)
+                worker._loop.call_soon_threadsafe(goes_on.wait)
+                await web.until(lambda: not web.client.answers)
+                assert web.client.connected
+                goes_on.set()
+                await web.until(lambda: web.client.answers)
+                watching.cancel()
+                assert web.links == [True, False, True]
+
+    asyncio.run(scenario())
 
 
 def test_an_abort_without_a_worker_says_so_at_once(tmp_path: Path) -> None:

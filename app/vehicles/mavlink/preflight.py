@@ -152,6 +152,20 @@ def prepare(radio: Radio, telemetry_hz: float) -> None:
         raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
 
 
+def make_armable(radio: Radio) -> None:
+    """Bring a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError when it
+    refuses."""
+    heartbeat = radio.seen.heartbeat
+    steps = radio.profile.make_armable(radio.aim, heartbeat.mode) if heartbeat is not None else ()
+    until_s = radio.clock.now_s() + HEARTBEAT_S * radio.patience
+    while steps and not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
+        radio.listen(_LISTEN_S)
+    if not (steps and radio.is_disarmed):
+        return
+    if why := radio.set_up(steps):
+        raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
+
+
 # ---- judging it
 
 

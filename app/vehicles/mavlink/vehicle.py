@@ -327,6 +327,7 @@ class MavlinkVehicle:
     def _check(self, watched_s: float) -> tuple[preflight.Watched, tuple[CheckItem, ...]]:
         if not preflight.is_armed(self._radio) and self._state not in IN_DOUBT:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
+            preflight.make_armable(self._radio)
         watched = preflight.watch(self._radio, self._lookout, watched_s=watched_s)
         self._listen(0.0)
         if self._state not in IN_DOUBT:

@@ -244,6 +244,7 @@ def test_motors_off_is_repeated_too_until_the_vehicle_says_so() -> None:
             assert 2 <= rig.writes.count("kil_thr") <= 4
             rig.muted = False
             attend_until(vehicle, lambda: vehicle.condition().armed is False)
+            vehicle.attend(1.5)
             stopped = rig.writes.count("kil_thr")
             vehicle.attend(3.0)
             assert rig.writes.count("kil_thr") == stopped

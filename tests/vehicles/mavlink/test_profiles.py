@@ -306,7 +306,7 @@ def test_arducopter_takes_off_in_guided_mode_and_lands_in_its_own() -> None:
 
 def test_px4_takes_off_by_its_mode_to_the_altitude_of_its_parameter() -> None:
     assert PX4.take_off_settings(Aim(system=1, aircraft=1)) == (Setting("MIS_TAKEOFF_ALT", 3.0),)
-    assert commands(PX4, Action.ARM) == [(176, 1, 4, 3, 0, 0, 0, 0), (400, 1, 0, 0, 0, 0, 0, 0)]
+    assert commands(PX4, Action.ARM) == [(400, 1, 0, 0, 0, 0, 0, 0)]
     assert commands(PX4, Action.TAKE_OFF) == [(176, 1, 4, 2, 0, 0, 0, 0)]
     assert commands(PX4, Action.LAND) == [(176, 1, 4, 6, 0, 0, 0, 0)]
 

@@ -85,6 +85,9 @@ class ArduPilot:
         """A direct link is told nothing but heartbeats unless it asks."""
         return request_telemetry(aim, telemetry_hz)
 
+    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+        return ()
+
     def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
         return ()
 

@@ -220,6 +220,10 @@ class Profile(Protocol):
         """Ask for telemetry, which changes nothing that lasts."""
         ...
 
+    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:
+        """What brings a disarmed vehicle out of a mode in which it does not arm; nothing for other modes."""
+        ...
+
     def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:
         """Parameters that have to be so for a take-off to the altitude of `aim`."""
         ...

@@ -82,6 +82,9 @@ class Paparazzi:
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
         return ()
 
+    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+        return ()
+
     def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
         return ()
 

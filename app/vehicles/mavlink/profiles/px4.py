@@ -75,6 +75,12 @@ class Px4:
     def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
         return request_telemetry(aim, telemetry_hz)
 
+    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:
+        """Told to land when it has landed and disarmed already, it stays in that mode, and does not arm in it."""
+        if mode not in self.landing_modes:
+            return ()
+        return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
+
     def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:
         return (Setting(TAKE_OFF_ALTITUDE, aim.altitude_m),)
 
@@ -84,10 +90,7 @@ class Px4:
     def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
-                return (
-                    Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),
-                    Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),
-                )
+                return (Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),)
             case Action.TAKE_OFF:
                 mode = base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
                 return (Step((mode,), awaits="command 176", attempts=1),)

@@ -106,6 +106,10 @@ class Px4(Copter):
             self.mode = self.find_mode(self.manners.hold)
         return letters
 
+    def unreadiness(self) -> str | None:
+        """Its mode counts, too."""
+        return self.arming_refusal()
+
     def tune(self) -> None:
         cascade = self._cascade
         cascade.altitude_p = self.parameters["MPC_Z_P"]

@@ -18,7 +18,8 @@ FORCE: Final = 21196
 """The second parameter of 400 that makes it unconditional."""
 
 ESTIMATE_AFTER_S: Final = 3.0
-"""Since the start, until the position is known well enough to arm."""
+"""Since the start, until the position is known well enough to arm and to be told."""
+_ESTIMATED: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
 _GROUND_STATION: Final = 6
 _LIST_EVERY_TICKS: Final = 2
 _TELL_TICKS: Final = whole_ticks(30.0)
@@ -51,6 +52,7 @@ class Copter(ABC):
         self.refuses_arming = False
         self.ignores_parameters = False
         self.took_off = False
+        self.estimate_after_s = ESTIMATE_AFTER_S
         self.armed = False
         self.mode = self.manners.modes[0]
         self.parameters = Parameters(self.manners.parameters)
@@ -100,6 +102,14 @@ class Copter(ABC):
     def heeds(self, _message: Message) -> bool:
         """Whether this ground station's heartbeat counts."""
         return True
+
+    def unreadiness(self) -> str | None:
+        """Why its own checks before arming do not pass, as it tells all the time; None when they do."""
+        return self.manners.no_estimate if self.refuses_arming or not self._has_estimate else None
+
+    @property
+    def _has_estimate(self) -> bool:
+        return self.boot_s >= self.estimate_after_s
 
     # ------------------------------------------------------------ time
 
@@ -157,7 +167,7 @@ class Copter(ABC):
         return next(mode for mode in self.manners.modes if mode.name == name)
 
     def _arm(self, *, force: bool) -> int:
-        reason = None if force and not self.refuses_arming else self._arming_refusal()
+        reason = None if force and not self.refuses_arming else self.arming_refusal()
         if reason is not None:
             self.say(reason)
             return self.manners.refused
@@ -167,9 +177,9 @@ class Copter(ABC):
                 self.enter(self.mode)
         return ACCEPTED
 
-    def _arming_refusal(self) -> str | None:
-        if self.refuses_arming or self.boot_s < ESTIMATE_AFTER_S:
-            return self.manners.no_estimate
+    def arming_refusal(self) -> str | None:
+        if reason := Copter.unreadiness(self):
+            return reason
         return None if self.mode.may_arm else self.manners.not_armable
 
     def _disarm(self) -> None:
@@ -200,7 +210,7 @@ class Copter(ABC):
             self._react(reaction, self.manners.fence_breached)
 
     def _tell_readiness(self) -> None:
-        reason = None if self.armed or self._ticks % _TELL_TICKS else self._arming_refusal()
+        reason = None if self.armed or self._ticks % _TELL_TICKS else self.unreadiness()
         if reason is not None:
             self.say(self.manners.unready + reason)
 
@@ -229,7 +239,7 @@ class Copter(ABC):
         if self._listing is not None and self._ticks % _LIST_EVERY_TICKS == 0:
             self._send_parameter(self._listing)
             self._listing = self._listing + 1 if self._listing + 1 < len(self.parameters) else None
-        due = self._timetable.due(self._ticks)
+        due = [kind for kind in self._timetable.due(self._ticks) if self._has_estimate or kind not in _ESTIMATED]
         if due:
             now = self._snapshot()
             self._out += [Letter(kind, telemetry.REPORTS[kind].fields(now)) for kind in due]
@@ -252,7 +262,7 @@ class Copter(ABC):
             version=manners.version,
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
-            ready=self._arming_refusal() is None,
+            ready=self.unreadiness() is None,
         )
 
     def _send_parameter(self, place: int) -> None:

@@ -1,0 +1,170 @@
+"""What the real ArduCopter and PX4 were seen to do, done by the simulated ones, and what the program makes of it."""
+
+import pytest
+
+from app.vehicles.base import FlightOrder, FlightRecord, Stop
+from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.dialects import Message
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from tests.vehicles.flying import never, unwatched
+from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
+from tests.vehicles.mavlink.test_connected import connected
+
+ORDER = FlightOrder(seed=1)
+LAND_MODE, HOLD_MODE = "4.6", "4.3"
+
+
+def ready(autopilot: str) -> LockstepRig:
+    rig = LockstepRig(autopilot)
+    rig.switch_on_failsafes()
+    return rig
+
+
+def fly(vehicle: MavlinkVehicle, autopilot: str) -> FlightRecord:
+    vehicle.stage(SAFE[autopilot])
+    return vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+
+
+def test_an_ardupilot_that_tells_nothing_unasked_flies_all_the_same() -> None:
+    """Seen on a direct link: “no voltage told”, for nobody had asked for SYS_STATUS."""
+    with ready("ardupilot") as rig:
+        rig.wait_s(3.0)
+        kinds = {message.get_type() for message in _heard(rig)}
+        assert kinds <= {"HEARTBEAT", "PARAM_VALUE", "STATUSTEXT"}
+        with connected(rig) as vehicle:
+            vehicle.attend(2.0)
+            assert [item.name for item in vehicle.check() if not item.passed] == []
+            assert fly(vehicle, "ardupilot").ending == "completed"
+
+
+def _heard(rig: LockstepRig) -> list[Message]:
+    codec = rig._codec
+    return [message for data, _ in rig.read(0.0) for message in codec.parse(data)]
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_the_first_connection_reads_the_gains_and_writes_nothing(autopilot: str) -> None:
+    """Seen: 0.3 overwritten with 0.5, for good."""
+    name = "PSC_ACCZ_P" if autopilot == "ardupilot" else "MPC_Z_P"
+    with ready(autopilot) as rig:
+        rig.drone.autopilot.parameters[name] = 0.3  # type: ignore[attr-defined]
+        kind = rig.options()
+        vehicle = MavlinkVehicle(
+            kind, SAFE[autopilot], is_real=True, clock=rig, transport=rig, observes=True, decided=False
+        )
+        assert f"{name} 0.3" in vehicle.concern
+        assert "nothing was written" in vehicle.concern
+        assert vehicle.condition().held[name] == pytest.approx(0.3)
+        assert name not in rig.writes[3:]
+        assert rig.drone.autopilot.held(name) == 0.3
+        vehicle.release()  # a person's word: the named ones
+        assert rig.drone.autopilot.held(name) == SAFE[autopilot][name]
+        vehicle.close()
+
+
+def test_a_first_connection_that_finds_the_safe_gains_needs_no_word() -> None:
+    with ready("px4") as rig:
+        vehicle = MavlinkVehicle(
+            rig.options(), SAFE["px4"], is_real=True, clock=rig, transport=rig, observes=True, decided=False
+        )
+        assert vehicle.concern == ""
+        vehicle.close()
+
+
+def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
+    with ready("px4") as rig, connected(rig) as vehicle:
+        assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+        flown: list[float] = []
+
+        def look() -> Stop | None:
+            if rig.drone.body.altitude_m > 2.0:
+                flown.append(rig.drone.autopilot.held("MIS_TAKEOFF_ALT"))
+            return Stop("seen enough") if len(flown) > 100 else None
+
+        vehicle.stage(SAFE["px4"])
+        vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)
+        assert set(flown) == {3.0}
+        assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+
+
+def test_what_a_refused_run_had_set_is_put_back_too() -> None:
+    with LockstepRig("px4", faults=["arm-refused@5"]) as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            vehicle.stage(SAFE["px4"])
+            rig.drone.autopilot.refuses_arming = True
+            rig.drone.autopilot.unreadiness = lambda: None  # type: ignore[attr-defined]  # it does not tell before
+            with pytest.raises(VehicleError, match="would not arm"):
+                vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+
+
+def test_a_px4_that_was_told_to_land_after_it_had_disarmed_is_brought_back_and_flies() -> None:
+    with ready("px4") as rig, connected(rig) as vehicle:
+        autopilot = rig.drone.autopilot
+        assert fly(vehicle, "px4").ending == "completed"
+        autopilot.enter(autopilot.find_mode("AUTO.LAND"))  # type: ignore[attr-defined]
+        vehicle.attend(2.0)
+        assert vehicle.condition().mode == "Land"
+        assert [item.name for item in vehicle.check() if not item.passed] == []
+        assert vehicle.condition().mode == "Hold"
+        assert fly(vehicle, "px4").ending == "completed"
+
+
+def test_a_disarmed_vehicle_is_not_told_to_land() -> None:
+    with ready("px4") as rig, connected(rig) as vehicle:
+        vehicle.attend(3.0)
+        told = len(rig.told("COMMAND_LONG"))
+        with pytest.raises(VehicleError, match="Its motors stand already"):
+            vehicle.land("to be sure")
+        vehicle.attend(2.0)
+        assert len(rig.told("COMMAND_LONG")) == told
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_a_vehicle_whose_own_checks_do_not_pass_is_not_flown_and_the_whole_reason_is_told(autopilot: str) -> None:
+    with LockstepRig(autopilot, faults=["arm-refused@connect"]) as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            vehicle.attend(31.0)
+            [own] = [item for item in vehicle.check() if item.name == "own_checks"]
+            reason = {
+                "ardupilot": "Need Position Estimate",
+                "px4": "Preflight Fail: Arming denied: resolve system health failures first",
+            }
+            assert not own.passed
+            assert reason[autopilot] in own.found
+
+
+def test_parameters_of_a_copter_outlive_its_reboot_and_paparazzis_do_not() -> None:
+    for autopilot, name, kept in (
+        ("px4", "MPC_Z_P", True),
+        ("ardupilot", "PSC_POSZ_P", True),
+        ("paparazzi", "gui_v_kp", False),
+    ):
+        with LockstepRig(autopilot) as rig:
+            before = rig.drone.autopilot.held(name)
+            with rig.link(target_system=rig.drone.autopilot.system) as link:
+                to = {"target_system": rig.drone.autopilot.system, "target_component": 0}
+                link.send("PARAM_SET", **to, param_id=name, param_type=9, param_value=before + 1.0)
+                rig.wait_s(0.2)
+            rig.drone.reboot()
+            assert rig.drone.autopilot.held(name) == before + (1.0 if kept else 0.0)
+
+
+def test_a_vehicle_that_does_not_know_yet_where_it_is_is_waited_for_not_restarted() -> None:
+    with ready("px4") as rig, connected(rig) as vehicle:
+        rig.drone.autopilot.estimate_after_s = 60.0  # type: ignore[attr-defined]
+        items = {item.name: item for item in vehicle.check()}
+        for name in ("position", "clock", "still"):
+            assert not items[name].passed
+            assert items[name].hint.startswith("Wait until it knows where it is")
+        assert items["clock"].found == "waiting for a position"
+
+
+def test_a_text_that_comes_in_pieces_is_put_together() -> None:
+    with ready("px4") as rig, connected(rig) as vehicle:
+        words = "Preflight Fail: the heading estimate is not stable and the vehicle has moved since it was switched on"
+        rig.drone.autopilot.say(words)  # type: ignore[attr-defined]
+        vehicle.attend(0.5)
+        assert vehicle.condition().said == words
