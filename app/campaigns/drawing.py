@@ -119,11 +119,12 @@ def _flight(row: TrialRow) -> FlightData:
 
 
 def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
-    """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight."""
+    """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight, and
+    while it is not known."""
     groups = groups_of(history.flown_gains(rows))
-    if not groups:
-        return None
     scatter = pooled(groups, prior)
+    if not groups or not scatter.known:
+        return None
     best = winner_of(groups, scatter)
     half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
     return Noise(

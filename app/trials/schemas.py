@@ -107,23 +107,24 @@ class FlightBrief(BaseModel):
 
 class GroupBrief(BaseModel):
     """The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
-    campaign."""
+    campaign, null while that is not known."""
 
     mean: float
-    standard_error: float
+    standard_error: float | None
     n: int
 
 
 class TrialComparison(BaseModel):
     """The flight's gains against those of another one, each with all their flights. `difference` is this − other;
-    `confidence` is that of the likelier direction, and decides from 90 % on."""
+    `confidence` is that of the likelier direction, and decides from 90 % on; null, as the standard error is, while
+    nobody knows how much flights scatter."""
 
     against: Literal["best before", "first"]
     trial_number: int
     verdict: Word
-    confidence: float
+    confidence: float | None
     difference: float
-    standard_error: float
+    standard_error: float | None
 
 
 class Glitch(BaseModel):

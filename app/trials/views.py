@@ -106,7 +106,7 @@ def _group(row: TrialRow, field: Field) -> GroupBrief | None:
     same = field.group_with(row.gains)
     if same is None or field.scatter is None:
         return None
-    return GroupBrief(mean=same.mean, standard_error=same.standard_error(field.scatter), n=same.size)
+    return GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size)
 
 
 def _flown_before(row: TrialRow, field: Field) -> list[int]:

@@ -110,7 +110,8 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Fact>
         {group !== undefined && group.errors.length > 1 && (
           <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`} topic="standardError">
-            {plusMinus(group.mean, group.standard_error, unit)} <small>(± standard error)</small>
+            {plusMinus(group.mean, group.standard_error, unit)}{" "}
+            {group.standard_error !== null && <small>(± standard error)</small>}
           </Fact>
         )}
         {trial.overshoot_m !== null && (

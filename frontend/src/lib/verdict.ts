@@ -5,7 +5,12 @@ import { inOrder, sameHeld } from "./flyScreen";
 import { gainsInBrackets } from "./gains";
 import { wasFlown } from "./states";
 
-export const VERDICTS = { better: "Better", worse: "Worse", unresolved: "Unresolved" } as const;
+export const VERDICTS = {
+  better: "Better",
+  worse: "Worse",
+  unresolved: "Unresolved",
+  "not known yet": "Not known yet",
+} as const;
 
 /** Where the error came to lie against what was predicted; null without an interval or an error. */
 export function keptPrediction(trial: Trial): "inside" | "above" | "below" | null {
@@ -103,7 +108,9 @@ export function promotable(
     return { possible: false, why: `The best gains are the safe ones of ${name}.` };
   if (verdict === "better") return { possible: true, why: "" };
   const because =
-    verdict === null ? "no gains are better than the first ones yet" : `whether they are better is ${verdict} as yet`;
+    verdict === null
+      ? "no gains are better than the first ones yet"
+      : `whether they are better is ${verdict === "not known yet" ? verdict : `${verdict} as yet`}`;
   return {
     possible: false,
     why: `The best gains cannot become the safe ones of ${name}: ${because}. Fly the best and the first ones again until the statistics say “better”.`,

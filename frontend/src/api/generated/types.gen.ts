@@ -95,7 +95,7 @@ export type Advice = {
  * BestTrial
  *
  * The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
- * from the scatter pooled over the campaign.
+ * from the scatter pooled over the campaign, null while that is not known.
  */
 export type BestTrial = {
     /**
@@ -123,7 +123,7 @@ export type BestTrial = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
     /**
      * Flights
      */
@@ -179,7 +179,7 @@ export type Campaign = {
      *
      * the best gains against the first flight's; null while they are the same, or nothing has flown
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
@@ -239,7 +239,8 @@ export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finishe
  * CampaignStatistics
  *
  * What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
- * repeats and the experiment's prior; `optimism` by how much the best is expected to look better than it is, for
+ * repeats and the experiment's prior, null while nobody knows it: before the first repeat under an autopilot whose
+ * scatter was never measured; `optimism` by how much the best is expected to look better than it is, for
  * having been chosen, and `shrunk_error` its error without that.
  */
 export type CampaignStatistics = {
@@ -254,7 +255,7 @@ export type CampaignStatistics = {
     /**
      * Sigma
      */
-    sigma: number;
+    sigma: number | null;
     /**
      * Degrees Of Freedom
      */
@@ -323,7 +324,7 @@ export type CampaignSummary = {
      *
      * the best gains against the first flight's; null while they are the same, or nothing has flown
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Rehearsal
      */
@@ -568,7 +569,8 @@ export type Clone = {
  * ComparedFlight
  *
  * One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
- * all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight.
+ * all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight, null while
+ * nobody knows it.
  */
 export type ComparedFlight = {
     /**
@@ -622,7 +624,7 @@ export type ComparedFlight = {
     /**
      * Scatter
      */
-    scatter: number;
+    scatter: number | null;
     /**
      * Flown At
      */
@@ -637,17 +639,18 @@ export type ComparedFlight = {
  * Comparison
  *
  * The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
- * direction, with the allowance for having chosen the best among several.
+ * direction, with the allowance for having chosen the best among several. The verdict is `not known yet`, without
+ * confidence and standard error, while nobody knows how much flights scatter.
  */
 export type Comparison = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved';
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet';
     /**
      * Confidence
      */
-    confidence: number;
+    confidence: number | null;
     /**
      * Difference
      */
@@ -655,7 +658,7 @@ export type Comparison = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
     further: FlightsToDecide | null;
     /**
      * Sentence
@@ -1316,7 +1319,7 @@ export type FlightComparison = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Sentence
      */
@@ -1410,7 +1413,7 @@ export type FlightPair = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Confidence
      */
@@ -1658,7 +1661,7 @@ export type Glitch = {
  * GroupBrief
  *
  * The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
- * campaign.
+ * campaign, null while that is not known.
  */
 export type GroupBrief = {
     /**
@@ -1668,7 +1671,7 @@ export type GroupBrief = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
     /**
      * N
      */
@@ -2473,9 +2476,9 @@ export type RepeatGroup = {
     /**
      * Standard Error
      *
-     * from the pooled scatter
+     * from the pooled scatter; null while that is not known
      */
-    standard_error: number;
+    standard_error: number | null;
     /**
      * Is Baseline
      */
@@ -3186,7 +3189,8 @@ export type Trial = {
  * TrialComparison
  *
  * The flight's gains against those of another one, each with all their flights. `difference` is this − other;
- * `confidence` is that of the likelier direction, and decides from 90 % on.
+ * `confidence` is that of the likelier direction, and decides from 90 % on; null, as the standard error is, while
+ * nobody knows how much flights scatter.
  */
 export type TrialComparison = {
     /**
@@ -3200,11 +3204,11 @@ export type TrialComparison = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved';
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet';
     /**
      * Confidence
      */
-    confidence: number;
+    confidence: number | null;
     /**
      * Difference
      */
@@ -3212,7 +3216,7 @@ export type TrialComparison = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
 };
 
 /**
