@@ -15,7 +15,7 @@ from app.db.models import FlightRow, TrajectoryRow, TrialRow
 from app.errors import NotFoundError
 from app.trials import repository
 from app.trials.codec import Packed, pack, unpack
-from app.trials.states import HISTORY, TrialState
+from app.trials.states import HISTORY, NOT_AGAINST_GAINS, TrialState
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
@@ -94,7 +94,8 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 
 def history_digest(session: Session, campaign_id: int, definition: Definition, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from, the checksums of the trials' records among it; differs
-    as soon as any of it does."""
+    as soon as any of it does. Whether an abort counts against its gains stands in it only where it does not, so that
+    digests from before that was known still hold."""
     checksums = repository.checksums(session, campaign_id)
     flights = [
         [
@@ -105,6 +106,7 @@ def history_digest(session: Session, campaign_id: int, definition: Definition, t
             checksums.get(row.id),
             row.predicted_error,
             row.predicted_interval,
+            *(() if _is_against_gains(row) else ("not against the gains",)),
         ]
         for row in counted(trials)
     ]
@@ -203,7 +205,13 @@ def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
         error=row.error,
         outcome=outcome,
         predicted=_predicted(row),
+        against_gains=_is_against_gains(row),
     )
+
+
+def _is_against_gains(row: TrialRow) -> bool:
+    """Of an aborted trial; one that was not says nothing here."""
+    return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
 
 
 def _predicted(row: TrialRow) -> Prediction | None:

@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.core.statistics import Word
 from app.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
-from app.trials.states import Ending, FlightMode, FlightState, TrialKind, TrialState
+from app.trials.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 
@@ -59,6 +59,13 @@ class Classification(Request):
     version: Version
     outcome: Literal["valid", "aborted", "invalid"]
     reason: Reason
+
+
+class AbortJudgement(Request):
+    """The operator's word on a flight that they broke off: whether it counts against its gains."""
+
+    version: Version
+    cause: Literal["behaved badly", "something else"]
 
 
 class Abort(Request):
@@ -159,6 +166,13 @@ class Trial(BaseModel):
     overshoot_m: float | None
     verdict: Annotated[str, Field(description="the flight against the best before it and against its prediction")]
     reason: Annotated[str, Field(description="why it has the state that it has, where somebody or something said so")]
+    abort_cause: Annotated[
+        AbortCause | None,
+        Field(
+            description="why it was broken off: `limit` and `behaved badly` count against its gains, `operator` (who "
+            "has not said why) and `something else` do not; null where it was not, and where nobody recorded it"
+        ),
+    ]
     note: str
     gate: Gate
     overrule_reason: Annotated[str, Field(description="why the gate's refusal was overruled; empty when it was not")]

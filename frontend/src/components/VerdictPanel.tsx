@@ -9,6 +9,7 @@ import { percentChange, percentText, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { intervalText, plusMinus } from "../lib/uncertainty";
 import { askedFor, bestBeforeOf, sentenceOf, standingWithout } from "../lib/verdict";
+import { AbortCause } from "./AbortCause";
 import { Classify } from "./Classify";
 import { Comparisons } from "./Comparisons";
 import { FlightNotes } from "./FlightNotes";
@@ -89,6 +90,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
       )}
+      <AbortCause trial={trial} />
       <Comparisons trial={trial} unit={unit} />
       {trial.overrule_reason && (
         <p className={classes["overruled"]}>

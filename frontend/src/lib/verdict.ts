@@ -63,6 +63,34 @@ export function sentenceOf(trial: Trial): string {
   return trial.reason.charAt(0).toUpperCase() + trial.reason.slice(1);
 }
 
+type AbortWord = "behaved badly" | "something else";
+
+/** What an aborted flight says of its gains; empty for others. */
+export function abortSentence({ state, abort_cause: cause }: Pick<Trial, "state" | "abort_cause">): string {
+  if (state !== "aborted") return "";
+  switch (cause) {
+    case "limit":
+      return "A limit was met: the flight counts against its gains.";
+    case "operator":
+      return "Why was it aborted? It counts against its gains only if the vehicle behaved badly.";
+    case "behaved badly":
+      return "The vehicle behaved badly: the flight counts against its gains.";
+    case "something else":
+      return "It was something else: the flight does not count against its gains.";
+    default:
+      return "Nobody recorded why it was aborted: the flight counts against its gains.";
+  }
+}
+
+/** What the operator may say of it now: what they have not said already. */
+export function abortWords({
+  actions,
+  abort_cause: cause,
+}: Pick<Trial, "actions" | "abort_cause">): readonly AbortWord[] {
+  if (!actions.includes("judge abort")) return [];
+  return (["behaved badly", "something else"] as const).filter((word) => word !== cause);
+}
+
 /** The flight that the page shows: the chosen one, else the latest. */
 export function shownTrial(trials: readonly Trial[], chosen: number | null): Trial | null {
   const flown = trials.filter((trial) => wasFlown(trial.state));

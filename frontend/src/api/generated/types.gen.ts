@@ -38,6 +38,24 @@ export type AbortAnswer = {
 };
 
 /**
+ * AbortJudgement
+ *
+ * The operator's word on a flight that they broke off: whether it counts against its gains.
+ */
+export type AbortJudgement = {
+    /**
+     * Version
+     *
+     * the version that was edited, as last read
+     */
+    version: number;
+    /**
+     * Cause
+     */
+    cause: 'behaved badly' | 'something else';
+};
+
+/**
  * ActKind
  *
  * What a registered vehicle was asked, or what was decided about it, beside its flights.
@@ -3129,6 +3147,12 @@ export type Trial = {
      */
     reason: string;
     /**
+     * Abort Cause
+     *
+     * why it was broken off: `limit` and `behaved badly` count against its gains, `operator` (who has not said why) and `something else` do not; null where it was not, and where nobody recorded it
+     */
+    abort_cause: 'limit' | 'operator' | 'behaved badly' | 'something else' | null;
+    /**
      * Note
      */
     note: string;
@@ -4787,6 +4811,44 @@ export type ClassifyTrialResponses = {
 };
 
 export type ClassifyTrialResponse = ClassifyTrialResponses[keyof ClassifyTrialResponses];
+
+export type JudgeAbortData = {
+    body: AbortJudgement;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/judge-abort';
+};
+
+export type JudgeAbortErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type JudgeAbortError = JudgeAbortErrors[keyof JudgeAbortErrors];
+
+export type JudgeAbortResponses = {
+    /**
+     * Successful Response
+     */
+    200: Trial;
+};
+
+export type JudgeAbortResponse = JudgeAbortResponses[keyof JudgeAbortResponses];
 
 export type GetTrajectoryData = {
     body?: never;
