@@ -51,6 +51,7 @@ export const getAddressCode = <ThrowOnError extends boolean = false>(options: Op
  *
  * The whole database as it is at this moment, as one SQLite file; flights and computations go on meanwhile.
  *
+ * It is verified first; 503 names the trials whose record is damaged.
  * Only for programs and the dashboard itself: a page of another site cannot ask for it.
  */
 export const getBackup = <ThrowOnError extends boolean = false>(options?: Options<GetBackupData, ThrowOnError>): RequestResult<GetBackupResponses, GetBackupErrors, ThrowOnError> => (options?.client ?? client).get<GetBackupResponses, GetBackupErrors, ThrowOnError>({ url: '/api/system/backup', ...options });
