@@ -19,7 +19,12 @@ export function AbortCause({ trial }: { trial: Trial }) {
       {words.length > 0 && (
         <div className={classes["causes"]}>
           {words.map((cause) => (
-            <Button key={cause} variant="default" loading={judge.isPending} onClick={() => judge.mutate({ trial, cause })}>
+            <Button
+              key={cause}
+              variant="default"
+              loading={judge.isPending}
+              onClick={() => judge.mutate({ trial, cause })}
+            >
               {LABELS[cause]}
             </Button>
           ))}

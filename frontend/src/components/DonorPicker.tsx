@@ -91,8 +91,8 @@ function Taken({ donor, best, experiment }: TakenProps) {
         <GainList gains={best.gains} experiment={experiment} />
       </strong>
       , error {plusMinus(best.mean, best.standard_error, unit)}
-      {best.standard_error === null ? "" : " (± standard error)"}. They are flown first; then it shows
-      whether the vehicles are alike enough to build on what was learned there.
+      {best.standard_error === null ? "" : " (± standard error)"}. They are flown first; then it shows whether the
+      vehicles are alike enough to build on what was learned there.
     </p>
   );
 }

@@ -83,9 +83,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
       </p>
       <p className="numbers">
         {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
-        {standard_error !== null && (
-          <small className={classes["meaning"]}>(± standard error of the difference)</small>
-        )}
+        {standard_error !== null && <small className={classes["meaning"]}>(± standard error of the difference)</small>}
         {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>

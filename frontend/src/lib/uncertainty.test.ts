@@ -1,13 +1,5 @@
 import { describe, expect, test } from "vitest";
-import {
-  confidenceText,
-  decimalsOf,
-  intervalText,
-  percent,
-  plusMinus,
-  rangeText,
-  scatterSource,
-} from "./uncertainty";
+import { confidenceText, decimalsOf, intervalText, percent, plusMinus, rangeText, scatterSource } from "./uncertainty";
 
 describe("a number with its uncertainty", () => {
   test.each([

@@ -67,6 +67,7 @@ export function confidenceText(confidence: number): string {
 export function scatterSource(repeats: number, freedom: number | null): string {
   if (freedom === null)
     return "It was not measured under this autopilot, and no gains have been flown twice: fly a gain set again.";
-  const from = repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`;
+  const from =
+    repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`;
   return `${from}, worth ${Number(freedom.toFixed(1))} repeats in all.`;
 }
