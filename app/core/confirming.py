@@ -18,7 +18,7 @@ from app.core.strategies.history import describe
 from app.core.wording import percent, plus_minus, short
 
 SCATTER_NOT_KNOWN: Final = (
-    "How much its flights scatter was not measured under this autopilot, so nobody can say whether that is more than "
+    "How much flights scatter was never measured under this autopilot, so nobody can say whether that is more than "
     "chance: fly one of the gain sets again."
 )
 
