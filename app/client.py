@@ -23,7 +23,7 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self, TypeVar
+from typing import Final, Literal, Self, TypeVar
 
 import httpx2
 from pydantic import BaseModel, ValidationError
@@ -33,7 +33,7 @@ from app.core.errors import GainlineError, Problem
 from app.fleet.schemas import VehicleChoice
 from app.schemas import OptionValue, Page
 from app.schemas import Problem as ProblemDetails
-from app.trials.schemas import AbortAnswer, Classification, FlightOrder, NewTrial, Trajectory, Trial
+from app.trials.schemas import AbortAnswer, AbortJudgement, Classification, FlightOrder, NewTrial, Trajectory, Trial
 from app.trials.states import FlightState, TrialState
 
 Record = Path | bytes | Mapping[str, Iterable[float]]
@@ -223,6 +223,11 @@ class Client:
     def classify(self, trial: Trial, said: Classification) -> Trial:
         """Say what a flight is worth; whatever was computed from it is computed again."""
         return self._post(f"/api/trials/{trial.id}/classify", Trial, said)
+
+    def judge_abort(self, trial: Trial, cause: Literal["behaved badly", "something else"]) -> Trial:
+        """Say why a flight was broken off; it counts against its gains only if the vehicle behaved badly."""
+        said = AbortJudgement(version=trial.version, cause=cause)
+        return self._post(f"/api/trials/{trial.id}/judge-abort", Trial, said)
 
     def trajectory(self, trial_id: int, *, points: int = 1000) -> Trajectory:
         """The record thinned to at most so many points."""

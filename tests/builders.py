@@ -33,10 +33,16 @@ def climb_error(settling_s: float) -> float:
 
 
 def create_record(
-    settling_s: float = 1.0, *, ending: Ending = "completed", reason: str = "", until_s: float = 33.0
+    settling_s: float = 1.0,
+    *,
+    ending: Ending = "completed",
+    reason: str = "",
+    until_s: float = 33.0,
+    on_request: bool = False,
 ) -> FlightRecord:
     """What a vehicle leaves behind."""
-    return FlightRecord(trajectory=create_climb(settling_s, until_s=until_s), ending=ending, reason=reason)
+    climb = create_climb(settling_s, until_s=until_s)
+    return FlightRecord(trajectory=climb, ending=ending, reason=reason, on_request=on_request)
 
 
 def csv_of(columns: Mapping[str, NDArray[np.float64]]) -> bytes:

@@ -70,6 +70,16 @@ def test_fly_and_wait(gainline: Client, database: Database) -> None:
     assert gainline.wait(trial.id).state == "valid"
 
 
+def test_an_operator_says_why_they_broke_a_flight_off(gainline: Client, database: Database) -> None:
+    campaign = gainline.create_campaign("Mine", vehicle="twin")
+    run_jobs(database)
+    trial = gainline.fly(campaign.id, gainline.ask(campaign.id))
+    land(database, lift_off(database), create_record(ending="aborted", reason="enough", on_request=True))
+    aborted = gainline.wait(trial.id)
+    assert aborted.abort_cause == "operator"
+    assert gainline.judge_abort(aborted, "something else").abort_cause == "something else"
+
+
 def test_a_flight_that_did_not_take_place_is_raised(gainline: Client, database: Database) -> None:
     campaign = gainline.create_campaign("Mine", vehicle="twin")
     run_jobs(database)

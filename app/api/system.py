@@ -17,6 +17,7 @@ from app.db.migrate import revision_of
 from app.errors import InputError, Problem
 from app.network import EXPOSES, addresses_elsewhere, exposure, is_in_container
 from app.qr import qr_svg
+from app.trials.integrity import require_intact
 
 router = APIRouter(prefix="/api/system", tags=["system"])
 
@@ -96,9 +97,10 @@ def get_address_code(
 def get_backup(database: CurrentDatabase) -> StreamingResponse:
     """The whole database as it is at this moment, as one SQLite file; flights and computations go on meanwhile.
 
+    It is verified first; 503 names the trials whose record is damaged.
     Only for programs and the dashboard itself: a page of another site cannot ask for it.
     """
-    copy = take_backup(database.file)
+    copy = take_backup(database.file, require_intact)
     size = copy.seek(0, 2)
     copy.seek(0)
     name = f"gainline-{datetime.now(UTC):%Y-%m-%dT%H%MZ}.sqlite3"

@@ -1,8 +1,8 @@
-"""What a bundle holds, version 1, and what of it can be believed.
+"""What a bundle holds, version 2, and what of it can be believed.
 
 A zip of `manifest.json` (who wrote it, and the SHA-256 of every other part), `contents.json` (the campaign, after those
 that it starts from), and one part for each record, photo and telemetry log. A record is stored as in the database
-(`app.trials.codec`), with its own checksum.
+(`app.trials.codec`), with its own checksum. Version 1 lacks `abort_cause`.
 """
 
 from functools import cache
@@ -19,10 +19,10 @@ from app.core.strategies.base import Explanation
 from app.core.strategies.base import Kind as ProposalKind
 from app.schemas import Gate, Interval, Name, OptionValue
 from app.trials.schemas import Glitch
-from app.trials.states import Ending, TrialKind, TrialState
+from app.trials.states import AbortCause, Ending, TrialKind, TrialState
 
 FORMAT: Final = "gainline-campaign"
-VERSION: Final = 1
+VERSION: Final = 2
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
@@ -68,7 +68,7 @@ class Manifest(_Strict):
     """`parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
-    version: Literal[1]
+    version: Literal[1, 2]
     program: Word
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
@@ -111,6 +111,7 @@ class Trial(_Strict):
     overshoot_m: Finite | None
     curve: Annotated[list[tuple[Finite, Finite]], Field(max_length=5000)] | None
     ending: Ending | None
+    abort_cause: AbortCause | None = None
     settings: Options
     reason: Sentence
     note: Sentence

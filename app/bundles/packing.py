@@ -28,10 +28,11 @@ from app.bundles.contents import (
 )
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.types import utc_now
-from app.errors import ConflictError
+from app.errors import ConflictError, StorageError
 from app.fleet.elsewhere import origin_of
 from app.trials import history
-from app.trials.photos import ENDINGS
+from app.trials.integrity import is_intact, refused_for
+from app.trials.photos import ENDINGS, media_type_of
 from app.trials.telemetry_logs import log_of_trial, telemetry_log
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
@@ -44,12 +45,14 @@ class Packer:
     def __init__(self, session: Session, data_dir: Path, out: IO[bytes]) -> None:
         self._session = session
         self._data_dir = data_dir
+        self._out = out
         self._zip = zipfile.ZipFile(out, "w", allowZip64=True)
         self._digests: dict[str, str] = {}
 
     def pack(self, campaigns: Sequence[CampaignRow]) -> None:
         """All of it; the campaign last, after those that it starts from. Raises ConflictError for what a bundle cannot
-        hold."""
+        hold, StorageError naming the trial for a record or photo that is damaged, or when the file does not hold what
+        was written to it."""
         with self._zip:
             try:
                 contents = Contents(campaigns=[self._campaign(row) for row in campaigns])
@@ -60,13 +63,24 @@ class Packer:
                 format=FORMAT, version=VERSION, program=__version__, made_at=utc_now(), parts=self._digests
             )
             self._write(MANIFEST, _json(manifest.model_dump(mode="json")), squeeze=True)
+        self._verify()
+
+    def _verify(self) -> None:
+        """Read every part back as it lies in the file."""
+        try:
+            with zipfile.ZipFile(self._out) as written:
+                spoilt = [name for name, digest in self._digests.items() if _digest(written.read(name)) != digest]
+        except (zipfile.BadZipFile, KeyError, OSError) as error:
+            raise _not_written(str(error)) from error
+        if spoilt:
+            raise _not_written(f"{spoilt[0]} is not what was written")
 
     def _write(self, name: str, data: bytes, *, squeeze: bool = False) -> str:
         """`squeeze`: for what is not compressed already."""
         described = zipfile.ZipInfo(name, _EPOCH)
         described.compress_type = zipfile.ZIP_DEFLATED if squeeze else zipfile.ZIP_STORED
         self._zip.writestr(described, data)
-        self._digests[name] = hashlib.sha256(data).hexdigest()
+        self._digests[name] = _digest(data)
         return name
 
     def _campaign(self, row: CampaignRow) -> Campaign:
@@ -105,14 +119,25 @@ class Packer:
         return Trial(
             **kept,
             proposal=proposal,
-            record=self._record(row.trajectory),
-            photos=[self._photo(photo) for photo in photos],
+            record=self._flown(row),
+            photos=[self._photo(row, photo) for photo in photos],
             telemetry=self._telemetry(row, flight),
         )
 
     def _proposal(self, row: ProposalRow) -> Proposal:
         kept = {name: getattr(row, name) for name in Proposal.model_fields.keys() & row.__mapper__.columns.keys()}
+        if row.predicted is not None and not is_intact(row.predicted):
+            raise StorageError(
+                f"The bundle was not made: the predicted flight of proposal {row.id} of campaign {row.campaign_id} is "
+                "damaged.",
+                hint="Take the database from an earlier backup; every flight's own record is checked by itself.",
+            )
         return Proposal(**kept, predicted=self._record(row.predicted))
+
+    def _flown(self, row: TrialRow) -> Record | None:
+        if row.trajectory is not None and not is_intact(row.trajectory):
+            raise refused_for((row,), "The bundle was not made")
+        return self._record(row.trajectory)
 
     def _record(self, row: TrajectoryRow | None) -> Record | None:
         if row is None:
@@ -125,7 +150,12 @@ class Packer:
             **{name: getattr(row, name) for name in Record.model_fields.keys() - {"part", "codec"}},
         )
 
-    def _photo(self, row: TrialPhotoRow) -> Photo:
+    def _photo(self, trial: TrialRow, row: TrialPhotoRow) -> Photo:
+        if media_type_of(row.data) != row.media_type:
+            raise StorageError(
+                f"The bundle was not made: a photo of trial {trial.number} of campaign {trial.campaign_id} is damaged.",
+                hint="Delete that photo, or take it from an earlier backup; everything else is intact.",
+            )
         part = self._write(f"photos/{row.id}.{ENDINGS[row.media_type]}", row.data)
         self._session.expire(row, ["data"])
         return Photo(part=part, media_type=row.media_type, added_at=row.added_at)
@@ -156,6 +186,17 @@ def _vehicle(row: VehicleRow) -> Vehicle:
         return said
     kind, name = origin
     return said.model_copy(update={"kind": kind, "name": name, "registered": True})
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _not_written(why: str) -> StorageError:
+    return StorageError(
+        f"The bundle was not made: the file does not hold what was written to it ({why}).",
+        hint="Check the disk that it was written to, then take the bundle again.",
+    )
 
 
 def _json(document: object) -> bytes:

@@ -119,11 +119,12 @@ def _flight(row: TrialRow) -> FlightData:
 
 
 def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
-    """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight."""
+    """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight, and
+    while it is not known."""
     groups = groups_of(history.flown_gains(rows))
-    if not groups:
-        return None
     scatter = pooled(groups, prior)
+    if not groups or not scatter.known:
+        return None
     best = winner_of(groups, scatter)
     half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
     return Noise(
@@ -144,12 +145,13 @@ def _glitches(row: TrialRow) -> tuple[Range, ...]:
 
 
 def _curves(session: Session, flown: Sequence[TrialRow], whole: Collection[int], output: str) -> dict[int, Curve]:
-    """The scored output of each flight that left a record, by its number: of those in `whole` as it was recorded."""
+    """The scored output of each flight that left a record, by its number: of those in `whole` as it was recorded,
+    unless the record is damaged."""
     recorded = [row for row in flown if row.trajectory_id is not None]
-    coarse = history.curves_of(session, [row for row in recorded if row.number not in whole])
-    records = history.trajectories_of(
+    records = history.readable_of(
         session, [row.trajectory_id for row in recorded if row.trajectory_id is not None and row.number in whole]
     )
+    coarse = history.curves_of(session, [row for row in recorded if row.trajectory_id not in records])
     return {
         row.number: _curve(records[row.trajectory_id], output) if row.trajectory_id in records else _coarse(coarse, row)
         for row in recorded
@@ -214,7 +216,9 @@ def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _
     """The predicted curve with its band, as far as there are any."""
     if proposal is None or proposal.predicted_id is None:
         return {"curve": None, "band": None}
-    predicted = history.trajectory_of(session, proposal.predicted_id)
+    predicted = history.readable_of(session, [proposal.predicted_id]).get(proposal.predicted_id)
+    if predicted is None:
+        return {"curve": None, "band": None}
     lower, upper = band_channels(output)
     has_band = lower in predicted.channels and upper in predicted.channels
     band = Band(lower=_curve(predicted, lower), upper=_curve(predicted, upper)) if has_band else None

@@ -17,8 +17,8 @@ from app.core.proposing import next_proposal
 from app.core.stopping import judge, landing_battery_v
 from app.core.strategies.base import Explanation, Interval, Kind, Proposal
 from app.core.strategies.history import was_flown
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Vehicle
+from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, open_vehicle
 
 Outcome = Literal["valid", "aborted", "invalid"]
@@ -55,11 +55,13 @@ class HeadlessCampaign:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watcher:
-    """What the caller wants to hear: a proposal before its flight, samples during it, the trial after it."""
+    """What the caller wants to hear: a proposal before its flight, samples during it, the trial after it; and which
+    gains the vehicle holds as soon as these are others, None while nobody knows."""
 
     proposed: Callable[[int, Proposal], None] = field(default=lambda _number, _proposal: None)
     sampled: Callable[[Sample], None] = field(default=lambda _sample: None)
     landed: Callable[[HeadlessTrial], None] = field(default=lambda _trial: None)
+    holding: Callable[[Mapping[str, float] | None], None] = field(default=lambda _gains: None)
 
 
 def fly_campaign(
@@ -183,15 +185,31 @@ def _fly(
     watcher: Watcher,
 ) -> FlightRecord:
     safe_gains = envelope_of(definition, experiment).safe_gains
-    with open_vehicle(vehicle, options, safe_gains=safe_gains) as controlled:
-        held = controlled.stage(proposal.gains)
-        if held != proposal.gains:
-            raise VehicleError(
-                f"The vehicle holds {held} instead of {proposal.gains}; nothing was flown.",
-                hint="Read its gains back by hand before flying it again.",
-            )
-        order = FlightOrder(seed=flight_seed(definition.seed, number))
-        return controlled.fly(order, on_sample=watcher.sampled, should_stop=lambda: None)
+    opened = False
+    try:
+        with open_vehicle(vehicle, options, safe_gains=safe_gains) as controlled:
+            opened = True
+            watcher.holding(None)
+            return _flown(controlled, definition, number, proposal, watcher)
+    except SafeGainsError:
+        opened = False
+        raise
+    finally:
+        if opened:
+            watcher.holding(safe_gains)
+
+
+def _flown(
+    controlled: Vehicle, definition: Definition, number: int, proposal: Proposal, watcher: Watcher
+) -> FlightRecord:
+    held = controlled.stage(proposal.gains)
+    if held != proposal.gains:
+        raise VehicleError(
+            f"The vehicle holds {held} instead of {proposal.gains}; nothing was flown.",
+            hint="Read its gains back by hand before flying it again.",
+        )
+    order = FlightOrder(seed=flight_seed(definition.seed, number))
+    return controlled.fly(order, on_sample=watcher.sampled, should_stop=lambda: None)
 
 
 def _assess(

@@ -40,6 +40,7 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: As
 
 def _because(row: CampaignRow, now: Standing, asked: Promotion) -> str:
     assert now.comparison is not None
+    assert now.comparison.confidence is not None
     flights = ", ".join(map(str, now.winner.numbers))
     sure = percent(now.comparison.confidence)
     return f"{asked.statement} (campaign {row.id}, flights {flights}: better, {sure} confidence)"

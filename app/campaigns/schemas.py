@@ -121,14 +121,14 @@ class Promotion(Request):
 
 class BestTrial(BaseModel):
     """The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
-    from the scatter pooled over the campaign."""
+    from the scatter pooled over the campaign, null while that is not known."""
 
     trial_id: int
     trial_number: int
     error: float
     gains: Gains
     mean: float
-    standard_error: float
+    standard_error: float | None
     flights: int
 
 
@@ -280,7 +280,7 @@ class RepeatGroup(BaseModel):
     trial_numbers: list[int]
     errors: list[float]
     mean: float
-    standard_error: Annotated[float, Field(description="from the pooled scatter")]
+    standard_error: Annotated[float | None, Field(description="from the pooled scatter; null while that is not known")]
     is_baseline: bool
     is_best: bool
 
@@ -294,12 +294,13 @@ class FlightsToDecide(BaseModel):
 
 class Comparison(BaseModel):
     """The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
-    direction, with the allowance for having chosen the best among several."""
+    direction, with the allowance for having chosen the best among several. The verdict is `not known yet`, without
+    confidence and standard error, while nobody knows how much flights scatter."""
 
     verdict: Word
-    confidence: float
+    confidence: float | None
     difference: float
-    standard_error: float
+    standard_error: float | None
     further: FlightsToDecide | None
     sentence: str
 
@@ -340,12 +341,13 @@ class TrackRecord(BaseModel):
 
 class CampaignStatistics(BaseModel):
     """What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
-    repeats and the experiment's prior; `optimism` by how much the best is expected to look better than it is, for
+    repeats and the experiment's prior, null while nobody knows it: before the first repeat under an autopilot whose
+    scatter was never measured; `optimism` by how much the best is expected to look better than it is, for
     having been chosen, and `shrunk_error` its error without that."""
 
     error_unit: str
     confidence: float
-    sigma: float
+    sigma: float | None
     degrees_of_freedom: float
     groups: list[RepeatGroup]
     comparison: Comparison | None

@@ -41,20 +41,20 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     flights = history.flown_gains(trials)
     now = standing(definition, experiment, flights)
     scatter = pooled((), experiment.scatter) if now is None else now.scatter
-    expected = 0.0 if now is None else _optimism(now)
+    expected = 0.0 if now is None or not scatter.known else _optimism(now)
     record = track_record(flights)
     drift = None if now is None else _drift(experiment, now)
     return CampaignStatistics(
         error_unit=experiment.error_unit,
         confidence=definition.stop.confidence,
-        sigma=scatter.sigma,
-        degrees_of_freedom=scatter.degrees_of_freedom,
+        sigma=scatter.sigma if scatter.known else None,
+        degrees_of_freedom=scatter.degrees_of_freedom if scatter.known else 0.0,
         groups=[] if now is None else [_group(now, group) for group in now.groups],
         comparison=None if now is None else _comparison(experiment, now),
         drift=drift,
         trends=[] if now is None else _trends(experiment, max(now.groups, key=lambda group: group.size), trials),
         optimism=expected,
-        shrunk_error=None if now is None else now.winner.mean + expected,
+        shrunk_error=None if now is None or not scatter.known else now.winner.mean + expected,
         track_record=_track_record(record),
         notes=[] if now is None else _notes(experiment, now, expected, drift, record),
     )
@@ -82,7 +82,7 @@ def best_trial(trials: Sequence[TrialRow], now: Standing | None) -> BestTrial | 
         error=best.error,
         gains=best.gains,
         mean=group.mean,
-        standard_error=group.standard_error(now.scatter),
+        standard_error=group.known_error(now.scatter),
         flights=group.size,
     )
 
@@ -93,7 +93,7 @@ def _group(now: Standing, group: Group) -> RepeatGroup:
         trial_numbers=list(group.numbers),
         errors=list(group.errors),
         mean=group.mean,
-        standard_error=group.standard_error(now.scatter),
+        standard_error=group.known_error(now.scatter),
         is_baseline=group is now.baseline,
         is_best=group is now.winner,
     )

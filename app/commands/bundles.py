@@ -25,7 +25,7 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
             target = out or Path(f"campaign-{campaign_id}.gainline.zip")
             arriving = target.with_name(f".{target.name}.part")
             try:
-                with arriving.open("wb") as file:
+                with arriving.open("w+b") as file:
                     write_bundle(session, campaign_id, settings.data_dir, file)
                 arriving.replace(target)
             except OSError as error:

@@ -14,7 +14,6 @@ from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly
 from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
 from app.core.definition import Definition
-from app.core.envelope import envelope_of
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.strategies.base import Proposal
@@ -38,7 +37,8 @@ def run_campaign(
     json_out: Path | None,
     overrule: str = "",
 ) -> None:
-    """Fly the campaign of a preset or file and print its table. Raises InputError for what cannot be flown."""
+    """Fly the campaign of a preset or file and print its table; of one that an error ends, what was flown until then,
+    and which gains the vehicle holds. Raises InputError for what cannot be flown."""
     file = override(
         _read(source),
         vehicle=vehicle,
@@ -54,12 +54,21 @@ def run_campaign(
     experiment = experiment_of(definition)
     given = gains_by_hand(file, definition, within_bounds=not overrule)
     out = console(json_out)
-    with _Display(definition, experiment) as display:
-        campaign = fly_campaign(definition, file.vehicle.kind, options, display.watcher, gains=given, overrule=overrule)
+    display = _Display(definition, experiment)
+    try:
+        with display:
+            campaign = fly_campaign(
+                definition, file.vehicle.kind, options, display.watcher, gains=given, overrule=overrule
+            )
+    except BaseException as error:
+        campaign = display.broken_off(error)
+        if campaign.trials or display.touched:
+            _print(out, file, experiment, campaign)
+            _print_held(out, file, display)
+            write_json(json_out, _document(file, definition, options, campaign))
+        raise
     _print(out, file, experiment, campaign)
-    if get_kind(file.vehicle.kind).is_real:  # a simulation of a real one; fly_campaign has raised if this is not so
-        safe_gains = envelope_of(definition, experiment).safe_gains
-        out.print(f"The vehicle holds its safe gains again, read back: {_gains(safe_gains)}.")
+    _print_held(out, file, display)
     write_json(json_out, _document(file, definition, options, campaign))
 
 
@@ -85,7 +94,11 @@ def _require_wings(vehicle: VehicleChoice, options: Mapping[str, OptionValue]) -
 
 
 class _Display:
-    """One line of progress for the flight in the air, on standard error; flown ones stay in its text."""
+    """One line of progress for the flight in the air, on standard error; flown ones stay in its text.
+
+    `touched`: whether the vehicle was given any gains; `held` are those that it was read to hold then, None while
+    nobody knows.
+    """
 
     def __init__(self, definition: Definition, experiment: Experiment) -> None:
         self._progress = Progress(
@@ -100,7 +113,20 @@ class _Display:
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
         self._output, self._output_unit = experiment.output, CHANNEL_UNITS[experiment.output]
-        self.watcher = Watcher(proposed=self._proposed, sampled=self._sampled, landed=self._landed)
+        self._trials: list[HeadlessTrial] = []
+        self.touched = False
+        self.held: Mapping[str, float] | None = None
+        self.watcher = Watcher(
+            proposed=self._proposed, sampled=self._sampled, landed=self._landed, holding=self._holding
+        )
+
+    def broken_off(self, error: BaseException) -> HeadlessCampaign:
+        """What was flown until the error."""
+        said = str(error) or type(error).__name__
+        return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"An error ended it: {said}")
+
+    def _holding(self, gains: Mapping[str, float] | None) -> None:
+        self.touched, self.held = True, gains
 
     def __enter__(self) -> "_Display":
         self._progress.start()
@@ -125,6 +151,7 @@ class _Display:
         )
 
     def _landed(self, trial: HeadlessTrial) -> None:
+        self._trials.append(trial)
         self._progress.console.print(
             f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} ({_came_to(trial)})",
             highlight=False,
@@ -157,6 +184,16 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: H
     out.print(f"Stopped: {campaign.stopped_because}")
     if best is not None:
         out.print(f"Best: {_error(best.error, unit)} with {_gains(best.gains)}, flight {best.number}.")
+
+
+def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
+    """Of a vehicle at the other end of a link; any other is a new one with every flight."""
+    if not get_kind(file.vehicle.kind).is_real:
+        return
+    if display.held is not None:
+        out.print(f"The vehicle holds its safe gains again, read back: {_gains(display.held)}.")
+    elif display.touched:
+        out.print("Nobody knows which gains the vehicle holds: read them back by hand before it flies again.")
 
 
 def _document(

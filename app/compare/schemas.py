@@ -27,7 +27,8 @@ class FlightSetting(BaseModel):
 
 class ComparedFlight(BaseModel):
     """One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
-    all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight."""
+    all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight, null while
+    nobody knows it."""
 
     trial_id: int
     label: str
@@ -42,7 +43,7 @@ class ComparedFlight(BaseModel):
     gains: Gains
     error: float | None
     group: GroupBrief | None
-    scatter: float
+    scatter: float | None
     flown_at: datetime | None
     settings: list[FlightSetting]
 

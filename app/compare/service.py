@@ -97,8 +97,8 @@ def _flight(side: Side, settings: list[FlightSetting]) -> ComparedFlight:
         error=row.error,
         group=None
         if group is None
-        else GroupBrief(mean=group.mean, standard_error=group.standard_error(side.scatter), n=group.size),
-        scatter=side.scatter.sigma,
+        else GroupBrief(mean=group.mean, standard_error=group.known_error(side.scatter), n=group.size),
+        scatter=side.scatter.sigma if side.scatter.known else None,
         flown_at=row.flown_at,
         settings=settings,
     )

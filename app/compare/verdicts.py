@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
 from app.compare.sides import Side
 from app.compare.words import capitalised, measured, named, percent
+from app.core.confirming import SCATTER_NOT_KNOWN
 from app.core.statistics import Comparison, Group, Word, compare, drift_of
 from app.core.strategies.history import describe
 from app.fleet import service as fleet
@@ -72,7 +73,7 @@ def notes_on(sides: Sequence[Side]) -> list[str]:
         f"One flight scatters by {scatters[population].sigma:.4f} {first.experiment.error_unit}, as repeats in "
         f"{len(members)} campaigns of the same vehicle and experiment say together."
         for population, members in campaigns.items()
-        if len(members) > 1
+        if len(members) > 1 and scatters[population].known
     ]
     return [*apart, *shared]
 
@@ -103,7 +104,9 @@ def _pair(side: Side, against: Side, basis: Basis, sentence: str) -> FlightPair:
 def _apart(side: Side, own: Group, against: Side, other: Group) -> FlightPair:
     """Two means with scatters of their own: the difference has the sum of both variances."""
     difference = own.mean - other.mean
-    standard_error = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
+    known = side.scatter.known and against.scatter.known
+    apart = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
+    standard_error = apart if known else None
     amount = measured(abs(difference), standard_error, side.experiment.error_unit)
     direction = "lower" if difference < 0.0 else "higher"
     how, _ = _why_apart(side, against)
@@ -158,28 +161,35 @@ def _repeats(side: Side, against: Side, group: Group) -> FlightPair:
 def _changed(side: Side, against: Side, said: Comparison) -> str:
     """The same gains in two campaigns."""
     amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
+    if said.confidence is None:
+        return (
+            f"Not known yet: with the same gains in two campaigns {side.name} is {amount} {_direction(said)} than "
+            f"{against.name}. {SCATTER_NOT_KNOWN}"
+        )
     word = (
         "which scatter explains"
         if said.verdict == "unresolved"
         else "more than scatter explains: the vehicle or its surroundings have changed"
     )
-    direction = "lower" if said.difference < 0.0 else "higher"
     return (
-        f"The same gains in two campaigns: {side.name} is {amount} {direction} than {against.name}, {word} "
+        f"The same gains in two campaigns: {side.name} is {amount} {_direction(said)} than {against.name}, {word} "
         f"({percent(said.confidence)} confidence)."
     )
 
 
 def _told(side: Side, own: Group, against: Side, other: Group, said: Comparison) -> str:
     amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
-    direction = "lower" if said.difference < 0.0 else "higher"
-    both = f"{amount} {direction}, {percent(said.confidence)} confidence"
+    pair = f"{named(own, side.name)} against {named(other, against.name)}"
+    if said.confidence is None:
+        return f"Not known yet: {pair}, {amount} {_direction(said)}. {SCATTER_NOT_KNOWN}"
+    both = f"{amount} {_direction(said)}, {percent(said.confidence)} confidence"
     if said.verdict == "unresolved":
-        return (
-            f"Unresolved: {named(own, side.name)} against {named(other, against.name)}, {both}. "
-            f"{_deciding(side, against, said)}"
-        )
+        return f"Unresolved: {pair}, {both}. {_deciding(side, against, said)}"
     return f"{capitalised(named(own, side.name))} is {said.verdict} than {named(other, against.name)}: {both}."
+
+
+def _direction(said: Comparison) -> str:
+    return "lower" if said.difference < 0.0 else "higher"
 
 
 def _deciding(side: Side, against: Side, said: Comparison) -> str:

@@ -9,9 +9,9 @@ from app.core.wording import plus_minus
 from app.db.models import CampaignRow, TrialRow
 
 
-def measured(value: float, standard_error: float, unit: str) -> str:
+def measured(value: float, standard_error: float | None, unit: str) -> str:
     """`0.105 ± 0.012 m`, in as many digits as the uncertainty allows; the value alone where there is none."""
-    return plus_minus(value, standard_error, unit) if standard_error > 0.0 else f"{value:.3f} {unit}"
+    return plus_minus(value, standard_error, unit) if standard_error else f"{value:.3f} {unit}"
 
 
 def percent(confidence: float) -> str:

@@ -17,6 +17,11 @@ from app.core.strategies.base import Proposal
 from app.core.strategies.history import describe
 from app.core.wording import percent, plus_minus, short
 
+SCATTER_NOT_KNOWN: Final = (
+    "How much flights scatter was never measured under this autopilot, so nobody can say whether that is more than "
+    "chance: fly one of the gain sets again."
+)
+
 _RESERVED: Final = 2
 """Flights kept back for flying the winner and the baseline again."""
 
@@ -118,8 +123,10 @@ def verdict_sentence(experiment: Experiment, now: Standing) -> str:
     if now.comparison is None:
         return f"The first flight's gains ({describe(now.baseline.gains)}) are the best flown."
     unit, said = experiment.error_unit, now.comparison
-    amount = plus_minus(abs(said.difference), said.standard_error, unit)
     pair = f"{describe(now.winner.gains)} against the first flight's {describe(now.baseline.gains)}"
+    if said.confidence is None or said.standard_error is None:
+        return f"Not known yet: {pair}, {short(abs(said.difference))} {unit} {_direction(said)}. {SCATTER_NOT_KNOWN}"
+    amount = plus_minus(abs(said.difference), said.standard_error, unit)
     if said.verdict == "unresolved":
         return (
             f"Unresolved: {pair}, {amount} {_direction(said)}, {percent(said.confidence)} confidence. {_deciding(said)}"

@@ -89,8 +89,9 @@ class Prediction:
 class Flight:
     """A finished trial as a strategy sees it: single-precision trajectory, error in the experiment's unit.
 
-    `outcome` is `valid` or `aborted`; invalid and lost flights are not history. An aborted flight has no error.
-    `predicted` is None for gains that no proposal had.
+    `outcome` is `valid` or `aborted`; invalid and lost flights are not history. An aborted flight has no error; it is
+    `against_gains` unless it was a person who broke it off, and not because the vehicle behaved badly. `predicted` is
+    None for gains that no proposal had.
     """
 
     number: int
@@ -99,6 +100,7 @@ class Flight:
     error: float | None
     outcome: Literal["valid", "aborted"]
     predicted: Prediction | None = None
+    against_gains: bool = True
 
 
 def flight_seed(seed: int, number: int) -> int:

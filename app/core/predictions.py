@@ -136,19 +136,20 @@ def expected(
 def expected_again(
     experiment: Experiment, flights: Sequence[Flight], group: Group, scatter: Pooled, kind: Kind, why: Explanation
 ) -> Proposal:
-    """The proposal to fly a policy again: the mean of its flights is expected, with the scatter around it."""
+    """The proposal to fly a policy again: the mean of its flights is expected, with the scatter around it as far as
+    that is known."""
     measured = np.array([on_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
+    curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
+    bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
+    if not scatter.known:
+        return bare
     half = scatter.half_width(1.0 + 1.0 / group.size, CONFIDENCE)
     offset = half / cost_of_an_offset(experiment)
-    curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
-    return Proposal(
-        kind=kind,
-        gains=dict(group.gains),
+    return replace(
+        bare,
         predicted=_with_band(
             curve, experiment.output, curve[experiment.output] - offset, curve[experiment.output] + offset
         ),
-        predicted_error=group.mean,
-        explanation=why,
         interval=_interval(group.mean - half, group.mean + half),
     )
 

@@ -8,6 +8,9 @@ experiment's prior scatter s₀ worth ν₀ degrees of freedom (a scaled inverse
 
 and the difference of two means is t-distributed with ν degrees of freedom around the observed one, with the standard
 error σ̂ √(1/n₁ + 1/n₂): the pooled t test where ν₀ = 0.
+
+A prior that was not measured on such a vehicle does not enter: σ̂ is then that of the repeats alone, and without any the
+scatter is not known yet, so that no difference is told from noise.
 """
 
 from collections.abc import Sequence
@@ -22,7 +25,8 @@ from app.core.definition import Flight
 from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Gains, Vector
 
-Word = Literal["better", "worse", "unresolved"]
+Word = Literal["better", "worse", "unresolved", "not known yet"]
+"""`unresolved`: the flights could not tell; `not known yet`: nobody knows how much they scatter."""
 
 MOST_FURTHER_FLIGHTS: Final = 100
 _OPTIMISM_POINTS: Final = 2001
@@ -31,10 +35,12 @@ _OPTIMISM_REACH: Final = 8.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pooled:
-    """The flight-to-flight scatter: a standard deviation in the error's unit, and how well it is known."""
+    """The flight-to-flight scatter: a standard deviation in the error's unit, and how well it is known. One that is not
+    `known` is an order of magnitude: good enough to rank by, and told to nobody."""
 
     sigma: float
     degrees_of_freedom: float
+    known: bool = True
 
     def half_width(self, variance: float, confidence: float) -> float:
         """Half of the two-sided interval of a number whose variance is `variance`·σ²."""
@@ -69,6 +75,10 @@ class Group:
     def standard_error(self, scatter: Pooled) -> float:
         return scatter.sigma / sqrt(self.size)
 
+    def known_error(self, scatter: Pooled) -> float | None:
+        """The same; None while the scatter is not known."""
+        return self.standard_error(scatter) if scatter.known else None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightsToDecide:
@@ -88,13 +98,14 @@ class Comparison:
 
     `difference` is first − second. `confidence` is that of the likelier of the two directions, with the allowance for
     having chosen and for having looked before; `further` is None for a decided comparison, and for one that
-    100 flights would not decide, or where nobody asked.
+    100 flights would not decide, or where nobody asked. While the scatter is not known there is neither confidence nor
+    standard error, and every further flight of gains flown before makes it known.
     """
 
     verdict: Word
-    confidence: float
+    confidence: float | None
     difference: float
-    standard_error: float
+    standard_error: float | None
     further: FlightsToDecide | None
 
 
@@ -143,8 +154,12 @@ def groups_of(flights: Sequence[Flight]) -> tuple[Group, ...]:
 
 def pooled(groups: Sequence[Group], prior: Scatter) -> Pooled:
     """σ̂ and ν as above. `prior.degrees_of_freedom` must be above zero, or a policy have been repeated."""
-    freedom = prior.degrees_of_freedom + sum(group.size - 1 for group in groups)
-    squares = prior.degrees_of_freedom * prior.sd**2 + sum(group.squares for group in groups)
+    repeats = sum(group.size - 1 for group in groups)
+    if not prior.measured and not repeats:
+        return Pooled(sigma=prior.sd, degrees_of_freedom=prior.degrees_of_freedom, known=False)
+    worth = prior.degrees_of_freedom if prior.measured else 0.0
+    freedom = worth + repeats
+    squares = worth * prior.sd**2 + sum(group.squares for group in groups)
     return Pooled(sigma=float(np.sqrt(squares / freedom)), degrees_of_freedom=freedom)
 
 
@@ -174,6 +189,10 @@ def compare(
     """
     allowance = candidates * max(looks * (looks + 1), 1)
     difference = first.mean - second.mean
+    if not scatter.known:
+        return Comparison(
+            verdict="not known yet", confidence=None, difference=difference, standard_error=None, further=None
+        )
     certainty = _certainty(difference, scatter, (first.size, second.size), allowance)
     verdict: Word = "unresolved" if certainty < confidence else "better" if difference < 0.0 else "worse"
     return Comparison(

@@ -3,6 +3,7 @@
 import shutil
 import sqlite3
 import tempfile
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -15,8 +16,11 @@ SPARE_BYTES: Final = 2**28
 """What a copy must leave free for what is flown meanwhile."""
 
 
-def take_backup(database_file: Path) -> BinaryIO:
+def take_backup(database_file: Path, require_intact: Callable[[Path], None]) -> BinaryIO:
     """The copy as an open file without a name, so that nothing is left behind once it is closed.
+
+    It is looked at before it is given away: SQLite's own check, then `require_intact`, which raises StorageError for
+    what is damaged in what the copy holds.
 
     It is one moment's state: the write-ahead log lets writers go on meanwhile, and what they commit is not in it. It
     lies beside the database until then, and needs as much space. Raises StorageError, before anything is written where
@@ -31,8 +35,21 @@ def take_backup(database_file: Path) -> BinaryIO:
         with closing(sqlite3.connect(database_file)) as source, closing(sqlite3.connect(copied)) as copy:
             copy.execute("PRAGMA synchronous = OFF")  # nobody needs half a copy after a power cut
             source.backup(copy)
+            _require_sound(copy)
+        require_intact(copied)
+        with closing(sqlite3.connect(copied)) as copy:
             copy.execute("PRAGMA journal_mode = DELETE")  # one file, readable without -wal beside it
         return copied.open("rb")
+
+
+def _require_sound(copy: sqlite3.Connection) -> None:
+    (found,) = copy.execute("PRAGMA quick_check(1)").fetchone()
+    if found != "ok":
+        raise StorageError(
+            f"The backup was not made: the database is damaged ({found}).",
+            hint="Stop Gainline, keep a copy of gainline.sqlite3, most of which can be recovered, and restore the last "
+            "backup.",
+        )
 
 
 def _require_room(database_file: Path) -> None:

@@ -24,7 +24,7 @@ from app.core.strategies.base import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
 from app.fleet.states import ACT_UNDER_WAY, ActKind, ActState, VehicleState
 from app.jobs.states import JobState
-from app.trials.states import UNDER_WAY, Ending, FlightMode, FlightState, TrialKind, TrialState
+from app.trials.states import UNDER_WAY, AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
 JsonObject = dict[str, Any]
@@ -227,7 +227,7 @@ class TrajectoryRow(Base):
 class TrialRow(Base, Reported):
     """One flight of one policy. `predicted_interval` is the proposal's own, copied; `repaired_error` what the flight
     would score without its `glitches`; `curve` the scored output in a few [time_s, value] pairs, for small plots;
-    `ending` says how the record ends, whatever the trial is classed as."""
+    `ending` says how the record ends, whatever the trial is classed as, `abort_cause` why it was broken off."""
 
     __tablename__ = "trial"
     __table_args__ = (
@@ -254,6 +254,7 @@ class TrialRow(Base, Reported):
     overshoot_m: Mapped[float | None]
     curve: Mapped[list[list[float]] | None]
     ending: Mapped[Ending | None] = mapped_column(String)
+    abort_cause: Mapped[AbortCause | None] = mapped_column(String)
     settings: Mapped[OptionsJson] = mapped_column(default=dict)
     reason: Mapped[str] = mapped_column(default="")
     note: Mapped[str] = mapped_column(default="")

@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
-REVISION: Final = "0004"
+REVISION: Final = "0005"
 """The newest of the migrations."""
 
 

@@ -30,6 +30,7 @@ from app.trials.crew import (
     StandDown,
     TakeOff,
     Trouble,
+    as_asked,
     in_control,
     mistake,
 )
@@ -285,10 +286,18 @@ class Seat:
         experiment = get_experiment(orders.experiment)
         monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, self._publish, self._call.clock)
         monitor.phase("flying")
-        record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=self._should_stop)
+        asked: set[str] = set()
+
+        def should_stop() -> Stop | None:
+            stop = self._should_stop()
+            if stop is not None:
+                asked.add(stop.reason)
+            return stop
+
+        record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=should_stop)
         monitor.flush()
         monitor.phase("landed")
-        return record
+        return as_asked(record, asked)
 
     def _publish(self, message: Telemetry | FlightPhase | VehicleStatus) -> None:
         (self._line.say if isinstance(message, FlightPhase) else self._line.show)(message)

@@ -1,9 +1,11 @@
 """Takeoffs in a flight log: where each begins and ends, the gains it was flown with, and its record.
 
-A reader brings a log into the form of `FlightLog`; what is a takeoff is decided here, alike for every format. Flights
-are told by altitude: off the ground by 0.15 m and on to at least 0.5 m. A flight begins with the command to take off
-where the log holds one, else where the vehicle leaves the ground, and ends with the command to land, with another
-gain, or on the ground.
+A reader brings a log into the form of `FlightLog`; what is a takeoff is decided here, alike for every format. Where the
+autopilot says when it was in the air, each such time that leads up by 0.5 m is a flight, and nothing else is: an
+estimate that settles at boot, or jumps at a touchdown, is none. Where it does not say so, flights are told by altitude,
+while the motors were armed if that is known: off the ground by 0.15 m and on to at least 0.5 m. A flight begins with
+the command to take off where the log holds one, else where the vehicle leaves the ground, and ends with the command to
+land, with another gain, or on the ground.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,6 +52,14 @@ class Setting:
     value: float
 
 
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A time in which something was so, in seconds of the log; `end_s` is infinite where the log ends before it."""
+
+    begin_s: float
+    end_s: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightLog:
     """What any log says, in seconds of the log's own `clock` (`vehicle` or `ground`), altitude up.
@@ -58,7 +68,8 @@ class FlightLog:
     where a value is missing. `gain_sets` are the names of gains that make a set, the first one of which every name is
     known holds. `from_ground` says that the altitude is to be counted from where the vehicle stood. Of `starts`
     (commands to take off), `ends` (commands that end the flight under them) and `landings` (the vehicle is down, says
-    the autopilot) there may be none.
+    the autopilot) there may be none. `in_air` are the times from a lift-off to a touchdown, `armed` those with the
+    motors armed, both as the autopilot says and in their order; None where the log does not say.
     """
 
     title: str
@@ -71,6 +82,8 @@ class FlightLog:
     starts: Sequence[Moment] = ()
     ends: Sequence[Moment] = ()
     landings: Sequence[Moment] = ()
+    in_air: Sequence[Span] | None = None
+    armed: Sequence[Span] | None = None
     notes: Sequence[str] = ()
 
 
@@ -102,7 +115,7 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
     altitude_m = channels["altitude_m"]
     found: list[Takeoff] = []
     free_from_s = -np.inf
-    for stood, down in _flights(time_s, altitude_m, [landing.time_s for landing in log.landings]):
+    for stood, down in _flights(log, time_s, altitude_m):
         begin, is_commanded = _beginning(log, float(time_s[stood]), free_from_s)
         held = _Held(log, begin.time_s)
         kept, end = _kept(log, time_s, begin, held, stood, down)
@@ -125,7 +138,7 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
                 Problem(
                     "altitude_m",
                     f"varies by {np.ptp(altitude_m):.2f} m within {time_s[-1] - time_s[0]:.1f} s, without a rise by "
-                    f"{HIGHEST_HOP_M:g} m in {_RISE_S[-1]:g} s that {MIN_SAMPLES} samples show",
+                    f"{HIGHEST_HOP_M:g} m {_where_looked(log)} that {MIN_SAMPLES} samples show",
                 ),
             ),
         )
@@ -164,9 +177,41 @@ def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
     return time_s, {name: values[good][rising] for name, values in log.channels.items()}
 
 
-def _flights(time_s: Samples, altitude_m: Samples, landings_s: Sequence[float]) -> Iterator[tuple[int, int]]:
-    """Every rise by more than a hop within three seconds: the last sample where the vehicle stood, and the first where
-    it is down again, or the last of all."""
+def _where_looked(log: FlightLog) -> str:
+    if log.in_air is None:
+        return f"in {_RISE_S[-1]:g} s{'' if log.armed is None else ' while it was armed'}"
+    return f"while it was in the air, {len(log.in_air)} times as the autopilot says,"
+
+
+def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:
+    """The last sample where the vehicle stood, and the first where it is down again, or the last of all."""
+    if log.in_air is not None:
+        yield from _flights_in_air(time_s, altitude_m, log.in_air)
+        return
+    landings_s = [landing.time_s for landing in log.landings]
+    for armed in (Span(-np.inf, np.inf),) if log.armed is None else log.armed:
+        first, past = _between(time_s, armed.begin_s, armed.end_s)
+        for stood, down in _flights_by_altitude(time_s[first:past], altitude_m[first:past], landings_s):
+            yield first + stood, first + down
+
+
+def _flights_in_air(time_s: Samples, altitude_m: Samples, in_air: Sequence[Span]) -> Iterator[tuple[int, int]]:
+    """Every time in the air that leads higher than a hop above where the vehicle stood in the second before it."""
+    last = len(time_s) - 1
+    for span in in_air:
+        first, off = _between(time_s, span.begin_s - _BEFORE_S, span.begin_s)
+        stood = min(max(off - 1, 0), last)
+        down = min(int(np.searchsorted(time_s, span.end_s)), last)
+        ground_m = float(np.median(altitude_m[first:off])) if off > first else float(altitude_m[stood])
+        risen = np.flatnonzero(altitude_m[stood : down + 1] > ground_m + HIGHEST_HOP_M)
+        if len(risen):
+            yield stood, min(_down(time_s, altitude_m, stood + int(risen[0]), ground_m), down)
+
+
+def _flights_by_altitude(
+    time_s: Samples, altitude_m: Samples, landings_s: Sequence[float]
+) -> Iterator[tuple[int, int]]:
+    """Every rise by more than a hop within three seconds."""
     landings = np.searchsorted(time_s, np.sort(np.asarray(landings_s, dtype=np.float64)))
     lowest_m = altitude_m.copy()
     for lag_s in _RISE_S:

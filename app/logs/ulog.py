@@ -2,11 +2,15 @@
 
 The file is sieved first: of the messages only those that tell of a takeoff go on to pyulog, and of their formats only
 flat and sensible ones. So memory and time stay bounded by the flight, whatever a file claims to hold.
+
+A takeoff is told by the land detector (`vehicle_land_detected`), the arming state and the mode (`vehicle_status`). A
+log without them is searched for rises of the altitude, and a note says so.
 """
 
 import io
 import re
-from collections.abc import Iterator, Mapping
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, BinaryIO, Final
 
@@ -16,7 +20,7 @@ from numpy.typing import NDArray
 from app.core.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
 from app.logs.gains import PX4_SETS, names_in
-from app.logs.takeoffs import FlightLog, Moment, Setting
+from app.logs.takeoffs import FlightLog, Moment, Setting, Span
 
 if TYPE_CHECKING:
     from pyulog import ULog
@@ -40,6 +44,11 @@ _TAKEOFF, _LAND = 22, 21
 _ACCEPTED: Final = 0
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
+_COMING_DOWN: Final = frozenset({5.0, 12.0, 18.0, 20.0})
+"""Return, descend, land, precision landing: nobody takes off in these."""
+_ARMED: Final = 2.0
+_BOUNCE_S: Final = 2.0
+"""A vehicle that is off the ground again sooner than this after a touchdown has not taken off anew."""
 _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position", 3: "mission", 5: "return", 18: "land"}
 
 _HINT: Final = "Give PX4's .ulg log of the flight, with vehicle_local_position in it."
@@ -82,7 +91,9 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
         starts=starts,
         ends=[*ends, *landings],
         landings=landings,
-        notes=tuple(_notes(sieve, log)),
+        in_air=_in_air(topics),
+        armed=_armed(topics),
+        notes=(*_notes(sieve, log), *_missing(topics)),
     )
 
 
@@ -216,18 +227,84 @@ def _moments(topics: Mapping[str, Topic]) -> tuple[list[Moment], list[Moment], l
             moments, spoken = (starts, "NAV_TAKEOFF") if command == _TAKEOFF else (ends, "NAV_LAND")
             moments.append(Moment(time_s, f"the command {spoken}"))
     before: float | None = None
+    is_armed = _at(_rows(topics, _STATUS, "arming_state"))
+    was_taking_off = False
     for time_s, mode in _rows(topics, _STATUS, "nav_state"):
-        if mode == _TAKEOFF_MODE != before:
+        takes_off = mode == _TAKEOFF_MODE and is_armed(time_s) in {_ARMED, None}
+        if takes_off and not was_taking_off:
             starts.append(Moment(time_s, "the takeoff mode"))
-        elif before not in {None, mode} and mode != _HOVER_MODE:
+        elif before not in {None, mode} and mode not in {_TAKEOFF_MODE, _HOVER_MODE}:
             ends.append(Moment(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}"))
-        before = mode
+        before, was_taking_off = mode, takes_off
     before = None
     for time_s, landed in _rows(topics, _LANDED, "landed"):
         if landed and before == 0.0:
             landings.append(Moment(time_s, "the landing"))
         before = landed
     return starts, ends, landings
+
+
+def _in_air(topics: Mapping[str, Topic]) -> list[Span] | None:
+    """From each lift-off to the touchdown, as the land detector has it, with the motors armed where that is known.
+
+    No lift-off is what happens in a mode that comes down, or within two seconds of a touchdown: the landing's bounce.
+    None without the land detector.
+    """
+    landed = list(_rows(topics, _LANDED, "landed"))
+    if not landed:
+        return None
+    arming = list(_rows(topics, _STATUS, "arming_state"))
+    mode = _at(_rows(topics, _STATUS, "nav_state"))
+    is_landed, is_armed = _at(landed), _at(arming)
+    times = sorted({time_s for time_s, _ in (*landed, *arming)})
+    spans = _spans((time_s, is_landed(time_s) == 0.0 and is_armed(time_s) in {_ARMED, None}) for time_s in times)
+    touched_s = [-np.inf, *(span.end_s for span in spans)]
+    return [
+        span
+        for span, before_s in zip(spans, touched_s, strict=False)
+        if mode(span.begin_s) not in _COMING_DOWN and span.begin_s - before_s >= _BOUNCE_S
+    ]
+
+
+def _armed(topics: Mapping[str, Topic]) -> list[Span] | None:
+    """The times with the motors armed; None where the log does not say."""
+    arming = list(_rows(topics, _STATUS, "arming_state"))
+    return _spans((time_s, state == _ARMED) for time_s, state in arming) if arming else None
+
+
+def _spans(told: Iterable[tuple[float, bool]]) -> list[Span]:
+    """The times in which something was so, of what was told of it and when."""
+    spans: list[Span] = []
+    since_s: float | None = None
+    for time_s, holds in told:
+        if holds and since_s is None:
+            since_s = time_s
+        elif not holds and since_s is not None:
+            spans.append(Span(since_s, time_s))
+            since_s = None
+    return spans if since_s is None else [*spans, Span(since_s, np.inf)]
+
+
+def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:
+    """What the last of these rows, of a time and a value, said at a time; None before the first."""
+    told = sorted((time_s, value) for time_s, value in rows)
+    times = [time_s for time_s, _ in told]
+
+    def value_at(time_s: float) -> float | None:
+        place = bisect_right(times, time_s)
+        return told[place - 1][1] if place else None
+
+    return value_at
+
+
+def _missing(topics: Mapping[str, Topic]) -> Iterator[str]:
+    """What the log lacks to tell a takeoff from an altitude that jumps, and what was done without it."""
+    has_status = any(True for _ in _rows(topics, _STATUS, "arming_state", "nav_state"))
+    if not any(True for _ in _rows(topics, _LANDED, "landed")):
+        how = "while it was armed" if has_status else "armed or not"
+        yield f"no {_LANDED} in the log, so the takeoff is a rise of the altitude, {how}: see that it is the flight"
+    elif not has_status:
+        yield f"no {_STATUS} in the log, so the takeoff is told by the land detector alone: see that it is the flight"
 
 
 def _notes(sieve: _Sieve, log: "ULog") -> Iterator[str]:

@@ -1,21 +1,29 @@
 """What did not go as it should, in the order of the flights."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
 
 from app.campaigns.schemas import Campaign
 from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
 from app.reports.content import Anomaly
 from app.reports.wording import gains, number
 from app.trials.schemas import Trial
+from app.trials.states import AbortCause
 
 _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
+_CAUSES: Final[Mapping[AbortCause, str]] = {
+    "limit": "(A limit was met: it counts against the gains.)",
+    "operator": "(Broken off by the operator, who has not said why: it does not count against the gains.)",
+    "behaved badly": "(The vehicle behaved badly, says the operator: it counts against the gains.)",
+    "something else": "(The operator had another reason: it does not count against the gains.)",
+}
 
 
 def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, gains that read back otherwise, and orders that failed."""
     for trial in trials:
         if (kind := _ENDINGS.get(trial.state)) is not None:
-            yield Anomaly(trial.number, kind, trial.reason or "No reason was given.")
+            yield Anomaly(trial.number, kind, f"{trial.reason or 'No reason was given.'}{_counting(trial)}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
             yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} The gate had said: {refused}")
@@ -29,6 +37,24 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             yield Anomaly(trial.number, "Glitch in the record", repaired)
         if trial.flight is not None and trial.flight.problem:
             yield Anomaly(trial.number, "Trouble with the vehicle", trial.flight.problem)
+
+
+def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
+    """Flights, by their numbers, whose stored record does not fit its checksum any more."""
+    for number_of_flight in damaged:
+        yield Anomaly(
+            number_of_flight,
+            "Damaged record",
+            "Its stored record does not fit its checksum. Its curve here is the coarse one that was made at its "
+            "landing, and its error is the one computed then; take the record from an earlier backup.",
+        )
+
+
+def _counting(trial: Trial) -> str:
+    """What an aborted flight says of its gains, where that is known."""
+    if trial.state != "aborted" or trial.abort_cause is None:
+        return ""
+    return f" {_CAUSES[trial.abort_cause]}"
 
 
 def of_vehicle(

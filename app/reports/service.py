@@ -21,6 +21,7 @@ from app.reports.content import Anomaly, Report
 from app.reports.settings_in_words import experiment_of, how_it_was_tuned, what_was_tuned
 from app.schemas import Page
 from app.trials import service as trials_service
+from app.trials.integrity import damaged_trials
 from app.trials.schemas import Trial
 
 _PAGE: Final = 200
@@ -63,6 +64,7 @@ def _landscape(session: Session, campaign: Campaign) -> Iterator[Card]:
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
     yield from anomalies.of_flights(trials, unit)
+    yield from anomalies.of_records(row.number for row in damaged_trials(session, campaign.id))
     if not campaign.vehicle.registered:
         return
     vehicle_id = campaign.vehicle.id

@@ -24,12 +24,14 @@ def capture(
     *,
     ending: Ending = "completed",
     reason: str = "",
+    on_request: bool = False,
 ) -> None:
     """Store a flight's record and class it: one that was `aborted` as that, with its `reason`, else by the program
     where it may.
 
     A flight of a real vehicle stays captured until a person has classed it, with the reason as a suggestion where the
-    measurement is `invalid`; and so does one with glitches in its record that can be scored. Raises TrajectoryError
+    measurement is `invalid`; and so does one with glitches in its record that can be scored. One that was broken off
+    `on_request` counts against its gains only once a person says that the vehicle behaved badly. Raises TrajectoryError
     when the record cannot be stored.
     """
     stored = history.store_trajectory(session, trajectory)
@@ -45,6 +47,8 @@ def capture(
     row.overshoot_m, row.curve = judged.overshoot, judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
     row.ending = ending
+    if ending == "aborted":
+        row.abort_cause = "operator" if on_request else "limit"
     if ending == "aborted" and row.state == TrialState.FLYING:
         move_trial(row, TrialState.ABORTED, reason=reason or "aborted")
         return

@@ -26,6 +26,7 @@ from app.trials.crew import (
     StandDown,
     TakeOff,
     Trouble,
+    as_asked,
     died,
     in_control,
     mistake,
@@ -164,17 +165,25 @@ def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle, standing_down:
     experiment = get_experiment(orders.experiment)
     monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, pipe.send, orders.flight.clock)
     monitor.phase("flying")
-    listener = _listener(pipe, orders.trial_id, standing_down)
+    asked: set[str] = set()
+    listener = _listener(pipe, orders.trial_id, standing_down, asked)
     record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=listener)
     monitor.flush()
     monitor.phase("landed")
-    return record
+    return as_asked(record, asked)
 
 
-def _listener(pipe: Connection, trial_id: int, standing_down: str | None) -> ShouldStop:
-    """Looks into the pipe, which takes microseconds, unless the flight is standing down already."""
+def _listener(pipe: Connection, trial_id: int, standing_down: str | None, asked: set[str]) -> ShouldStop:
+    """Looks into the pipe, which takes microseconds, unless the flight is standing down already; why it is to end goes
+    into `asked`."""
 
     def should_stop() -> Stop | None:
+        stop = heard()
+        if stop is not None:
+            asked.add(stop.reason)
+        return stop
+
+    def heard() -> Stop | None:
         if standing_down is not None:
             return Stop(standing_down)
         try:

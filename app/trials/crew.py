@@ -6,16 +6,16 @@
 `StandDown` may come at any moment; in place of what is missing comes `Trouble`.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 from app.core.clock import REAL_TIME, Clock
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import LockedError, exclusive
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue
+from app.vehicles.base import MOTORS_STOPPED, FlightOrder, FlightRecord, OptionValue
 from app.vehicles.errors import VehicleError
 
 
@@ -110,6 +110,14 @@ class Crew(Protocol):
     def close(self) -> None:
         """Let the process end: what flies is aborted and left with its safe gains."""
         ...
+
+
+def as_asked(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
+    """The record; it says so where the flight was broken off for one of these reasons that were given from here, and
+    not for a limit."""
+    said = record.reason.removeprefix(MOTORS_STOPPED)
+    asked = record.ending == "aborted" and any(said.startswith(reason) for reason in reasons)
+    return replace(record, on_request=asked)
 
 
 def died(exit_code: int | None) -> VehicleError:

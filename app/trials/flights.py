@@ -253,7 +253,15 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
 
 
 def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
-    capture(session, campaign, flight.trial, record.trajectory, ending=record.ending, reason=record.reason)
+    capture(
+        session,
+        campaign,
+        flight.trial,
+        record.trajectory,
+        ending=record.ending,
+        reason=record.reason,
+        on_request=record.on_request,
+    )
     flight.trial.settings = dict(record.settings)
     flight.battery_v_before = starting_battery_v(record.trajectory)
     flight.battery_v_after = landing_battery_v(record.trajectory)

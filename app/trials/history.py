@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from typing import Final, Literal
 
 import numpy as np
@@ -12,10 +13,10 @@ from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
 from app.db.models import FlightRow, TrajectoryRow, TrialRow
-from app.errors import NotFoundError
+from app.errors import NotFoundError, StorageError
 from app.trials import repository
 from app.trials.codec import Packed, pack, unpack
-from app.trials.states import HISTORY, TrialState
+from app.trials.states import HISTORY, NOT_AGAINST_GAINS, TrialState
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
@@ -49,7 +50,7 @@ def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     rows = counted(trials_of(session, campaign_id))
     records = repository.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
     return tuple(
-        _flight(row, _unpacked(records[row.trajectory_id]) if row.trajectory_id is not None else _NOTHING)
+        _flight(row, _NOTHING if row.trajectory_id is None else _recorded(row, records[row.trajectory_id]))
         for row in rows
     )
 
@@ -94,7 +95,8 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 
 def history_digest(session: Session, campaign_id: int, definition: Definition, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from, the checksums of the trials' records among it; differs
-    as soon as any of it does."""
+    as soon as any of it does. Whether an abort counts against its gains stands in it only where it does not, so that
+    digests from before that was known still hold."""
     checksums = repository.checksums(session, campaign_id)
     flights = [
         [
@@ -105,6 +107,7 @@ def history_digest(session: Session, campaign_id: int, definition: Definition, t
             checksums.get(row.id),
             row.predicted_error,
             row.predicted_interval,
+            *(() if _is_against_gains(row) else ("not against the gains",)),
         ]
         for row in counted(trials)
     ]
@@ -145,20 +148,29 @@ def unclassed(trials: Sequence[TrialRow]) -> TrialRow | None:
 
 
 def record_of(session: Session, row: TrialRow) -> Trajectory:
-    """A trial's whole record. Raises NotFoundError when it has none."""
+    """A trial's whole record. Raises NotFoundError when it has none, StorageError when it is damaged."""
     if row.trajectory_id is None:
         raise NotFoundError("record of trial", row.id, hint=f"The trial is {row.state}; only flights leave a record.")
-    return trajectory_of(session, row.trajectory_id)
+    return _recorded(row, repository.samples_of(session, [row.trajectory_id])[row.trajectory_id])
 
 
 def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
     """A stored trajectory, checked against its checksum."""
-    return _unpacked(repository.samples_of(session, [trajectory_id])[trajectory_id])
+    return unpacked(repository.samples_of(session, [trajectory_id])[trajectory_id])
 
 
 def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
     """Several stored trajectories, by id."""
-    return {identity: _unpacked(row) for identity, row in repository.samples_of(session, trajectory_ids).items()}
+    return {identity: unpacked(row) for identity, row in repository.samples_of(session, trajectory_ids).items()}
+
+
+def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
+    """The same without those that are damaged, for what can do without them."""
+    found: dict[int, Trajectory] = {}
+    for identity, row in repository.samples_of(session, trajectory_ids).items():
+        with suppress(StorageError):
+            found[identity] = unpacked(row)
+    return found
 
 
 def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
@@ -179,7 +191,8 @@ def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
     return row
 
 
-def _unpacked(row: TrajectoryRow) -> Trajectory:
+def unpacked(row: TrajectoryRow) -> Trajectory:
+    """A stored record, checked against its checksum. Raises StorageError when it is damaged."""
     return unpack(
         Packed(
             codec=row.codec,
@@ -194,6 +207,17 @@ def _unpacked(row: TrajectoryRow) -> Trajectory:
     )
 
 
+def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
+    """Raises StorageError naming the trial when its record is damaged."""
+    try:
+        return unpacked(record)
+    except StorageError as error:
+        raise StorageError(
+            f"The record of trial {row.number} of campaign {row.campaign_id} cannot be read: {error.message}",
+            hint=error.hint,
+        ) from error
+
+
 def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
     outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
     return Flight(
@@ -203,7 +227,13 @@ def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
         error=row.error,
         outcome=outcome,
         predicted=_predicted(row),
+        against_gains=_is_against_gains(row),
     )
+
+
+def _is_against_gains(row: TrialRow) -> bool:
+    """Of an aborted trial; one that was not says nothing here."""
+    return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
 
 
 def _predicted(row: TrialRow) -> Prediction | None:

@@ -96,6 +96,17 @@ def next_number(session: Session, campaign_id: int) -> int:
     return (last or 0) + 1
 
 
+def recorded(session: Session, campaign_id: int | None = None) -> Sequence[TrialRow]:
+    """The trials of one campaign, or of all, that left a record, by campaign and number."""
+    wanted = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
+    if campaign_id is not None:
+        wanted = wanted.where(TrialRow.campaign_id == campaign_id)
+    large = (TrialRow.gate, TrialRow.curve, TrialRow.settings)
+    return session.scalars(
+        wanted.options(*(defer(column) for column in large)).order_by(TrialRow.campaign_id, TrialRow.number)
+    ).all()
+
+
 def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
     """The records with their samples, by id."""
     rows = session.scalars(

@@ -25,6 +25,7 @@ from app.trials import orders, photos, service
 from app.trials.schemas import (
     Abort,
     AbortAnswer,
+    AbortJudgement,
     Classification,
     FlightOrder,
     NewTrial,
@@ -124,6 +125,13 @@ def cancel_trial(act: Act, trial_id: Id) -> Trial:
 def classify_trial(act: Act, trial_id: Id, body: Classification) -> Trial:
     """Say what a finished flight is worth; whatever was computed from it is computed again."""
     return act(Trial, lambda session: service.classify_trial(session, trial_id, body))
+
+
+@router.post("/trials/{trial_id}/judge-abort")
+def judge_abort(act: Act, trial_id: Id, body: AbortJudgement) -> Trial:
+    """Say why the operator broke a flight off. It counts against its gains only if the vehicle behaved badly; whatever
+    was computed from it is computed again."""
+    return act(Trial, lambda session: service.judge_abort(session, trial_id, body))
 
 
 @router.get("/trials/{trial_id}/trajectory")

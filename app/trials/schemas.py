@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.core.statistics import Word
 from app.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
-from app.trials.states import Ending, FlightMode, FlightState, TrialKind, TrialState
+from app.trials.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 
@@ -61,6 +61,13 @@ class Classification(Request):
     reason: Reason
 
 
+class AbortJudgement(Request):
+    """The operator's word on a flight that they broke off: whether it counts against its gains."""
+
+    version: Version
+    cause: Literal["behaved badly", "something else"]
+
+
 class Abort(Request):
     """Why the flight is to end now."""
 
@@ -107,23 +114,24 @@ class FlightBrief(BaseModel):
 
 class GroupBrief(BaseModel):
     """The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
-    campaign."""
+    campaign, null while that is not known."""
 
     mean: float
-    standard_error: float
+    standard_error: float | None
     n: int
 
 
 class TrialComparison(BaseModel):
     """The flight's gains against those of another one, each with all their flights. `difference` is this − other;
-    `confidence` is that of the likelier direction, and decides from 90 % on."""
+    `confidence` is that of the likelier direction, and decides from 90 % on; null, as the standard error is, while
+    nobody knows how much flights scatter."""
 
     against: Literal["best before", "first"]
     trial_number: int
     verdict: Word
-    confidence: float
+    confidence: float | None
     difference: float
-    standard_error: float
+    standard_error: float | None
 
 
 class Glitch(BaseModel):
@@ -158,6 +166,13 @@ class Trial(BaseModel):
     overshoot_m: float | None
     verdict: Annotated[str, Field(description="the flight against the best before it and against its prediction")]
     reason: Annotated[str, Field(description="why it has the state that it has, where somebody or something said so")]
+    abort_cause: Annotated[
+        AbortCause | None,
+        Field(
+            description="why it was broken off: `limit` and `behaved badly` count against its gains, `operator` (who "
+            "has not said why) and `something else` do not; null where it was not, and where nobody recorded it"
+        ),
+    ]
     note: str
     gate: Gate
     overrule_reason: Annotated[str, Field(description="why the gate's refusal was overruled; empty when it was not")]

@@ -31,7 +31,7 @@ from app.trials.judging import Judged, judge_gains, judge_proposal
 from app.trials.lifecycle import move_trial
 from app.trials.orders import request_flight, require_open
 from app.trials.records import settle_gains
-from app.trials.schemas import Classification, NewTrial, Trial, TrialEdit
+from app.trials.schemas import AbortJudgement, Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
 from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, TrialKind, TrialState
@@ -122,6 +122,28 @@ def classify_trial(session: Session, trial_id: int, said: Classification) -> Tri
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     move_trial(row, outcome, reason=said.reason)
+    row.version += 1
+    campaigns.history_changed(session, campaign)
+    return trial_view(session, campaign, row)
+
+
+def judge_abort(session: Session, trial_id: int, said: AbortJudgement) -> Trial:
+    """An operator's word on why they broke a flight off; the next gains are computed again from what counts now.
+
+    Raises ConflictError unless the trial is aborted, and not for a limit that the program keeps, or when somebody else
+    was faster.
+    """
+    row = repository.get_one(session, trial_id)
+    check_version(said.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", said.cause)})
+    check_action(ACTIONS, "judge abort", row.state, f"Trial {row.number}")
+    campaign = campaigns.get_row(session, row.campaign_id)
+    check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
+    if row.abort_cause == "limit":
+        raise ConflictError(
+            f"Trial {row.number} was broken off by the program, for a limit: it counts against its gains.",
+            hint="If the measurement is no good, mark it invalid.",
+        )
+    row.abort_cause = said.cause
     row.version += 1
     campaigns.history_changed(session, campaign)
     return trial_view(session, campaign, row)

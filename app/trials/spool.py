@@ -116,6 +116,7 @@ def _pack(spooled: Spooled) -> bytes:
         "flight_id": spooled.flight_id,
         "ending": record.ending,
         "reason": record.reason,
+        "on_request": record.on_request,
         "settings": dict(record.settings),
         "source": trajectory.source,
         "clock": trajectory.clock,
@@ -143,6 +144,7 @@ def _unpack(content: bytes) -> Spooled:
             trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
             ending=ending,
             reason=header["reason"],
+            on_request=header.get("on_request", False),
             settings=settings,
         ),
     )

@@ -12,6 +12,13 @@ Ending = Literal["completed", "aborted", "invalid"]
 """How a flight's record ends: where it should, where the flight was broken off, or with a measurement that is no
 good."""
 
+AbortCause = Literal["limit", "operator", "behaved badly", "something else"]
+"""Why a flight was broken off: a limit that the program keeps; the operator, who has not said yet why; and what the
+operator said. Unknown of flights from before it was recorded."""
+
+NOT_AGAINST_GAINS: Final[frozenset[AbortCause]] = frozenset({"operator", "something else"})
+"""Aborts that say nothing about the gains, or not yet. All others do."""
+
 FlightMode = Literal["fly", "stage"]
 """Take off as soon as the gains are read back, or wait for an operator's own act."""
 
@@ -73,6 +80,7 @@ ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
     "classify": frozenset(
         {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
     ),
+    "judge abort": frozenset({TrialState.ABORTED}),
     "note": frozenset(TrialState),
 }
 """What a person may do with a trial, and in which states."""

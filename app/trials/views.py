@@ -80,6 +80,7 @@ def _view(
         overshoot_m=row.overshoot_m,
         verdict=verdict(row, field, get_experiment(campaign.experiment).error_unit, _flown_before(row, field)),
         reason=row.reason,
+        abort_cause=row.abort_cause,
         note=row.note,
         gate=Gate.model_validate(row.gate),
         overrule_reason=row.overrule_reason,
@@ -106,7 +107,7 @@ def _group(row: TrialRow, field: Field) -> GroupBrief | None:
     same = field.group_with(row.gains)
     if same is None or field.scatter is None:
         return None
-    return GroupBrief(mean=same.mean, standard_error=same.standard_error(field.scatter), n=same.size)
+    return GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size)
 
 
 def _flown_before(row: TrialRow, field: Field) -> list[int]:
@@ -221,6 +222,8 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, reh
     if fleet.can_fly(vehicle) and row.state == TrialState.PLANNED:
         impossible.add("upload")
     if campaign.state not in CAMPAIGN_ACTIONS["judge"]:
-        impossible |= {"classify", "upload"}
+        impossible |= {"classify", "upload", "judge abort"}
+    if row.abort_cause == "limit":
+        impossible.add("judge abort")
     possible = [action for action in allowed(ACTIONS, row.state) if action not in impossible]
     return [*possible, "abort"] if under_way and "abort" not in possible else possible

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Final, Literal, Protocol
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.policy import Gains
@@ -61,15 +61,21 @@ class Stop:
 
 
 ShouldStop = Callable[[], Stop | None]
+MOTORS_STOPPED: Final = "The motors were stopped: "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecord:
-    """What a flight left: its full-rate trajectory, how it ended, and why when it was cut short."""
+    """What a flight left: its full-rate trajectory, how it ended, and why when it was cut short.
+
+    A flight that `should_stop` ended, and no limit before it, has a `reason` that begins with the stop's, or with
+    `MOTORS_STOPPED` and the stop's. `on_request` says so of an aborted one, once whoever asked has looked.
+    """
 
     trajectory: Trajectory
     ending: Ending
     reason: str = ""
+    on_request: bool = False
     settings: Mapping[str, OptionValue] = field(default_factory=dict)
 
 

@@ -1,5 +1,6 @@
 """A campaign out of one installation and into another: every number is the same, and nothing more than it can be."""
 
+import json
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -13,8 +14,8 @@ from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, 
 from app.db.session import Database
 from app.settings import Settings
 from app.trials.telemetry_logs import telemetry_log
-from tests.builders import Json, create_ready_campaign, create_trial, get, land, lift_off, run_jobs
-from tests.bundles.builders import another_installation, bring, parts_of, take
+from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
+from tests.bundles.builders import another_installation, bring, parts_of, sealed, take
 from tests.campaigns.test_recomputing import told
 from tests.campaigns.test_statistics import modelled
 
@@ -262,3 +263,25 @@ def test_nothing_is_left_of_a_bundle_whose_storing_fails(
     with database.read() as session:
         assert session.query(CampaignRow).count() == 1
         assert session.query(TrialRow).count() == 3
+
+
+def test_why_a_flight_was_broken_off_goes_along_and_bundles_from_before_it_was_recorded_are_still_read(
+    client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, _ = elsewhere
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), create_record(ending="aborted", reason="enough", on_request=True))
+    run_jobs(database)
+    bundle = take(client, campaign["id"])
+
+    def causes(arrived: Json) -> list[str | None]:
+        return [each["abort_cause"] for each in get(there, f"/api/campaigns/{arrived['id']}/trials")["items"]]
+
+    assert causes(brought(there, bundle))[trial["number"] - 1] == "operator"
+    parts = parts_of(bundle)
+    contents = json.loads(parts["contents.json"])
+    for each in contents["campaigns"][0]["trials"]:
+        del each["abort_cause"]
+    manifest = {**json.loads(parts["manifest.json"]), "version": 1}
+    old = {**parts, "contents.json": json.dumps(contents).encode(), "manifest.json": json.dumps(manifest).encode()}
+    assert set(causes(brought(there, sealed(old)))) == {None}

@@ -57,7 +57,41 @@ def test_its_figures_and_statistics_stand_without_predictions(client: TestClient
     assert not [name for name in drawn if "predict" in name.lower()]
     said = get(client, f"/api/campaigns/{campaign['id']}/statistics")
     assert said["track_record"]["of"] == 0
-    assert said["comparison"]["verdict"] == "unresolved", "nobody knows their scatter before a set is repeated"
+
+
+def test_nothing_is_better_before_a_gain_set_was_flown_twice_under_an_autopilot_whose_scatter_nobody_measured(
+    client: TestClient, database: Database
+) -> None:
+    campaign, trials = flown_by_hand(client, database)
+    said = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    found = said["comparison"]
+    assert (found["verdict"], found["confidence"], found["standard_error"]) == ("not known yet", None, None)
+    assert (said["sigma"], said["shrunk_error"], campaign["best"]["standard_error"]) == (None, None, None)
+    assert found["sentence"].endswith("fly one of the gain sets again.")
+    assert campaign["verdict"] == "not known yet"
+    last = get(client, f"/api/trials/{trials[-1]['id']}")
+    assert {each["verdict"] for each in last["comparisons"]} == {"not known yet"}
+    compared = get(client, "/api/compare?" + "&".join(f"trial={trial['id']}" for trial in trials))
+    assert (compared["verdict"], {pair["verdict"] for pair in compared["pairs"]}) == (
+        "not known yet",
+        {"not known yet"},
+    )
+    assert "fly one of the gain sets again" in compared["sentence"]
+    report = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
+    assert "Not known yet" in report
+    assert "no gain set has been flown twice" in report
+
+
+def test_one_repeat_makes_the_scatter_known_from_these_flights_alone(client: TestClient, database: Database) -> None:
+    campaign, trials = flown_by_hand(client, database)
+    again = create_trial(client, campaign["id"], gains=FIRMER)
+    repeat = upload(client, again["id"], create_csv(0.86)).json()
+    said = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    apart = repeat["error"] - trials[1]["error"]
+    assert said["sigma"] == pytest.approx(abs(apart) / 2**0.5)
+    assert said["degrees_of_freedom"] == 1.0
+    assert said["comparison"]["verdict"] in {"better", "unresolved"}
+    assert said["comparison"]["confidence"] is not None
 
 
 def test_a_step_beyond_the_limit_or_the_bounds_is_refused_with_what_would_pass(

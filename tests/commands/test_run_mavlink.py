@@ -2,11 +2,15 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli import app
+from app.vehicles.base import FlightOrder, FlightRecord
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 
 VEHICLE = "mavlink:udp:127.0.0.1:4245"
@@ -52,3 +56,45 @@ def test_a_real_vehicle_is_refused_before_anything_is_opened(arguments: tuple[st
     result = gainline(*RUN, *arguments)
     assert result.exit_code == 1
     assert said in " ".join(result.output.split())
+
+
+def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains_the_vehicle_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "campaign.json"
+    rig = LockstepRig()
+    rig.take_the_place_of_every_vehicle(monkeypatch)
+    flown = MavlinkVehicle.fly
+    flights: list[int] = []
+
+    def fly_once(vehicle: MavlinkVehicle, order: FlightOrder, **watched: Any) -> FlightRecord:
+        flights.append(1)
+        if len(flights) > 1:
+            raise VehicleError("The battery is below 10.2 V.", hint="Charge it.")
+        return flown(vehicle, order, **watched)
+
+    monkeypatch.setattr(MavlinkVehicle, "fly", fly_once)
+    result = gainline(*RUN, "--vehicle", VEHICLE, "--set", "simulated=true", "--json", str(out))
+    assert result.exit_code == 1
+    printed = " ".join(result.output.split())
+    assert "run 1" in printed
+    assert "Stopped: An error ended it: The battery is below 10.2 V." in printed
+    assert "The vehicle holds its safe gains again, read back: kp 283, ki 13, kd 82." in printed
+    document = json.loads(out.read_text())
+    assert [trial["outcome"] for trial in document["trials"]] == ["valid"]
+    assert document["stopped_because"].startswith("An error ended it")
+
+
+def test_when_the_safe_gains_could_not_be_verified_it_says_that_nobody_knows_what_the_vehicle_holds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = LockstepRig()
+    rig.take_the_place_of_every_vehicle(monkeypatch)
+
+    def forget(_vehicle: MavlinkVehicle, _order: FlightOrder, **_watched: Any) -> FlightRecord:
+        raise SafeGainsError("The vehicle does not answer.", hint="Look at it.")
+
+    monkeypatch.setattr(MavlinkVehicle, "fly", forget)
+    result = gainline(*RUN, "--vehicle", VEHICLE, "--set", "simulated=true")
+    assert result.exit_code == 1
+    assert "Nobody knows which gains the vehicle holds" in " ".join(result.output.split())

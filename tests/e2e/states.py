@@ -8,6 +8,7 @@ worker of a running server finds nothing to do; browsers are told of it as of an
 import io
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -32,14 +33,16 @@ from app.studies import service as studies
 from app.studies.reproductions import get_reproduction
 from app.trials import flights, photos
 from app.trials import service as trials
+from app.trials.crew import as_asked
 from app.trials.schemas import Classification, NewTrial
-from app.vehicles.base import FlightOrder
+from app.vehicles.base import FlightOrder, Stop
 from app.vehicles.open import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
 
 T = TypeVar("T")
 Json = dict[str, Any]
 LEASE_S: Final = 60.0
+_ASKED_IN_2_S: Final = 100
 TRIES: Final = 5
 """A writer waits five seconds for another one; what computes on a busy machine may take longer."""
 
@@ -90,6 +93,10 @@ class States:
     def fly_gains(self, campaign_id: int, gains: Mapping[str, float], *, overrule: str | None = None) -> int:
         """Fly gains of one's own, also those that the gate refuses if there is a reason to; the trial's id."""
         return self._fly(campaign_id, {"gains": dict(gains), "overrule": overrule})
+
+    def abort(self, campaign_id: int) -> int:
+        """The next proposal, whose flight its operator breaks off in the air; the trial's id."""
+        return self._fly(campaign_id, None, stop=Stop("aborted by the operator"))
 
     def repeat(self, campaign_id: int) -> int:
         """Fly the best gains again; the trial's id."""
@@ -203,12 +210,12 @@ class States:
                 return work(session)
         raise AssertionError("the database was busy for too long")
 
-    def _fly(self, campaign_id: int, chosen: Json | None) -> int:
+    def _fly(self, campaign_id: int, chosen: Json | None, *, stop: Stop | None = None) -> int:
         def fly(session: Session) -> int:
             what = {"proposal_id": _proposed(session, campaign_id).id} if chosen is None else chosen
             new = NewTrial.model_validate({**what, "fly": {"speed": None}})
             trial = trials.create_trial(session, campaign_id, new)
-            _carry_out(session, trial.id)
+            _carry_out(session, trial.id, stop)
             _propose(session, campaign_id)
             return trial.id
 
@@ -230,8 +237,8 @@ def _proposed(session: Session, campaign_id: int) -> ProposalRow:
     return proposing.latest_fresh(session, campaigns.get_row(session, campaign_id))
 
 
-def _carry_out(session: Session, trial_id: int) -> None:
-    """What a worker does with the flight that was asked for."""
+def _carry_out(session: Session, trial_id: int, stop: Stop | None) -> None:
+    """What a worker does with the flight that was asked for, which `stop` ends after two seconds."""
     task = flights.claim_flight(session, WORKER)
     assert task is not None
     assert task.trial_id == trial_id, "another flight waits"
@@ -239,7 +246,11 @@ def _carry_out(session: Session, trial_id: int) -> None:
         flights.record_staged(session, task.flight_id, vehicle.stage(task.gains))
         flights.record_lift_off(session, task.flight_id)
         order = FlightOrder(seed=task.seed)
-        record = vehicle.fly(order, on_sample=lambda _sample: None, should_stop=lambda: None)
+        seen = count()
+        record = vehicle.fly(
+            order, on_sample=lambda _sample: None, should_stop=lambda: stop if next(seen) > _ASKED_IN_2_S else None
+        )
+        record = as_asked(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
     flights.record_landing(session, task.flight_id, record)
     flights.record_restored(session, task.flight_id, restored)

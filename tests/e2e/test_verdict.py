@@ -69,6 +69,29 @@ def test_a_flight_that_came_to_nothing_is_flown_again_with_its_gains(
     dashboard.until(lambda: dashboard.get(f"/trials/{again['id']}")["state"] == "valid")
 
 
+def test_one_tap_after_an_abort_says_whether_it_counts_against_the_gains(
+    dashboard: Dashboard, states: States, campaign_id: int
+) -> None:
+    aborted = dashboard.get(f"/trials/{states.abort(campaign_id)}")
+    verdict = open_flight(dashboard, aborted)
+    expect(verdict).to_contain_text("It counts against its gains only if the vehicle behaved badly.")
+    badly = verdict.get_by_role("button", name="The vehicle behaved badly")
+    box = badly.bounding_box()
+    assert box is not None
+    assert min(box["width"], box["height"]) >= 24
+    badly.click()
+    expect(verdict).to_contain_text("The vehicle behaved badly: the flight counts against its gains.")
+    assert dashboard.get(f"/trials/{aborted['id']}")["abort_cause"] == "behaved badly"
+    verdict.get_by_role("button", name="Something else").click()
+    expect(verdict).to_contain_text("the flight does not count against its gains.")
+    expect(badly).to_be_visible()
+
+    dashboard.open(f"/fly/{aborted['id']}")
+    why = dashboard.page.get_by_role("region", name="Why it was aborted")
+    why.get_by_role("button", name="The vehicle behaved badly").click()
+    expect(why).to_contain_text("the flight counts against its gains.")
+
+
 def test_a_note_and_a_photo_stay_with_the_flight(dashboard: Dashboard, campaign_id: int) -> None:
     trial = dashboard.trials(campaign_id)[0]
     page, verdict = dashboard.page, open_flight(dashboard, trial)

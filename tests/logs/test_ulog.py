@@ -1,6 +1,7 @@
 """PX4's logs: the sieve loses nothing of what is wanted, and the recorded takeoff is found with its gains."""
 
 import io
+import math
 import struct
 
 import numpy as np
@@ -79,6 +80,95 @@ def test_after_damage_reading_goes_on_at_the_next_mark() -> None:
 def test_a_log_that_was_cut_off_gives_what_is_in_it() -> None:
     whole = small_log()
     assert len(read_takeoff(io.BytesIO(whole[: len(whole) // 2 + 1])).trajectory) > 50
+
+
+STATUS, LANDED = 8, 9
+BOOT_JUMP_S, ARMED_S, COMMAND_S, LIFT_OFF_S, LAND_S, TOUCHDOWN_S = 4.0, 10.0, 11.0, 12.5, 24.0, 27.0
+TAKEOFF, HOVER, LAND = 17, 4, 18
+
+
+def altitude_from_boot(time_s: float) -> float:
+    """The estimate settles by 2.6 m a few seconds after boot, and jumps by 0.8 m for a second at the touchdown."""
+    settled_m = 0.0 if time_s < BOOT_JUMP_S else 2.6
+    if LIFT_OFF_S <= time_s < LAND_S:
+        return settled_m + 3.0 * (1.0 - math.exp(-(time_s - LIFT_OFF_S) / 0.5))
+    if LAND_S <= time_s < TOUCHDOWN_S:
+        return settled_m + 3.0 * (TOUCHDOWN_S - time_s) / (TOUCHDOWN_S - LAND_S)
+    return settled_m + (0.8 if TOUCHDOWN_S + 2.5 <= time_s < TOUCHDOWN_S + 3.5 else 0.0)
+
+
+def three_topics() -> bytes:
+    """What precedes the messages of a log of altitude, status and land detector."""
+    topics = (
+        (7, b"vehicle_local_position", b"float z;"),
+        (STATUS, b"vehicle_status", b"uint8_t nav_state;uint8_t arming_state;"),
+        (LANDED, b"vehicle_land_detected", b"bool landed;"),
+    )
+    formats = [message("F", topic + b":uint64_t timestamp;" + fields) for _, topic, fields in topics]
+    return HEADER + b"".join(
+        (*formats, *(message("A", b"\0" + struct.pack("<H", number) + topic) for number, topic, _ in topics))
+    )
+
+
+def log_from_boot(*, status: bool = True, land_detector: bool = True) -> bytes:
+    """A log that PX4 began at boot: 20 s after the command the vehicle is told to land, bounces, and is disarmed."""
+    content = three_topics()
+    told = [
+        *((s, STATUS, struct.pack("<BB", mode, armed)) for s, mode, armed in (
+            (0.0, HOVER, 1), (ARMED_S, HOVER, 2), (COMMAND_S, TAKEOFF, 2), (16.0, HOVER, 2), (LAND_S, LAND, 2),
+            (TOUCHDOWN_S + 6.0, LAND, 1),
+        ) if status),
+        *((s, LANDED, struct.pack("<?", landed)) for s, landed in (
+            (0.0, True), (LIFT_OFF_S, False), (TOUCHDOWN_S, True), (TOUCHDOWN_S + 2.5, False),
+            (TOUCHDOWN_S + 4.0, True),
+        ) if land_detector),
+        *((s, 7, struct.pack("<f", -altitude_from_boot(s))) for s in (np.arange(2000) * 0.02).tolist()),
+    ]  # fmt: skip
+    for time_s, number, body in sorted(told):
+        content += message("D", struct.pack("<HQ", number, round(time_s * 1e6)) + body)
+    return content
+
+
+def test_an_estimate_that_settles_at_boot_and_the_landings_bounce_are_no_takeoffs() -> None:
+    (flown,) = read_takeoffs(io.BytesIO(log_from_boot()))
+    assert flown.begins_with == "the takeoff mode"
+    assert flown.start_s == pytest.approx(COMMAND_S)
+    record = flown.trajectory
+    assert record["altitude_m"][record.time_s < LIFT_OFF_S - COMMAND_S] == pytest.approx(0.0, abs=1e-6)
+    assert record["altitude_m"].max() == pytest.approx(3.0, abs=0.01)
+    assert "ends after 13.0 s with the mode land" in flown.notes
+
+
+def test_without_an_arming_state_the_land_detector_alone_tells_the_takeoff_and_a_note_says_so() -> None:
+    (flown, bounce) = read_takeoffs(io.BytesIO(log_from_boot(status=False)))
+    assert flown.start_s == pytest.approx(LIFT_OFF_S, abs=0.021)
+    assert bounce.start_s == pytest.approx(TOUCHDOWN_S + 2.5, abs=0.021)
+    assert any("no vehicle_status in the log" in note for note in flown.notes)
+
+
+def test_without_the_land_detector_a_takeoff_is_a_rise_while_armed_and_a_note_says_so() -> None:
+    flown = read_takeoffs(io.BytesIO(log_from_boot(land_detector=False)))
+    assert flown[0].start_s == pytest.approx(COMMAND_S)
+    assert all(any("no vehicle_land_detected in the log" in note for note in each.notes) for each in flown)
+
+
+def test_without_either_every_rise_is_offered_and_a_note_says_why() -> None:
+    flown = read_takeoffs(io.BytesIO(log_from_boot(status=False, land_detector=False)))
+    assert flown[0].start_s == pytest.approx(BOOT_JUMP_S, abs=0.05)
+    assert any("armed or not: see that it is the flight" in note for note in flown[0].notes)
+
+
+def test_a_takeoff_mode_that_was_chosen_before_arming_begins_the_flight_at_the_arming() -> None:
+    content = three_topics()
+    for time_s, mode, armed in ((0.0, HOVER, 1), (9.0, TAKEOFF, 1), (11.0, TAKEOFF, 2)):
+        content += message("D", struct.pack("<HQBB", STATUS, round(time_s * 1e6), mode, armed))
+    for time_s, landed in ((0.0, True), (LIFT_OFF_S, False)):
+        content += message("D", struct.pack("<HQ?", LANDED, round(time_s * 1e6), landed))
+    for step in range(1100):
+        content += message("D", struct.pack("<HQf", 7, step * 20_000, -altitude_from_boot(step * 0.02)))
+    (flown,) = read_takeoffs(io.BytesIO(content))
+    assert flown.begins_with == "the takeoff mode"
+    assert flown.start_s == pytest.approx(11.0)
 
 
 @pytest.mark.parametrize(

@@ -87,6 +87,7 @@ def test_an_abort_reaches_a_vehicle_in_the_air_while_the_database_is_locked(serv
             assert landing["state"] == "connected"
         ended = serving.trial(trial_id, "aborted")
         assert ended["reason"] == "enough"
+        assert ended["abort_cause"] == "operator"
         assert vehicle.in_state("ready")["held"] == SAFE
 
 

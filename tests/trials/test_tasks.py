@@ -135,6 +135,7 @@ def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_grou
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["reason"]) == ("aborted", "somebody walked in")
+    assert ended["abort_cause"] == "operator"
     assert ended["record"]["samples"] == 1
     assert vehicle_state(client) == "ready"
 

@@ -88,10 +88,12 @@ def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: 
 @dataclass(frozen=True, slots=True)
 class Scatter:
     """How much errors of repeated flights scatter, as known before any: a standard deviation in the error's unit, worth
-    as much as `degrees_of_freedom` repeats."""
+    as much as `degrees_of_freedom` repeats. One that is not `measured`, but taken over from another autopilot, gives an
+    order of magnitude and decides nothing."""
 
     sd: float
     degrees_of_freedom: float
+    measured: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -46,8 +46,8 @@ class CopterTakeoff:
     output: Final = _PAPER.output
     integrates: Final = _PAPER.integrates
     error_unit: Final = _PAPER.error_unit
-    scatter: Final = Scatter(sd=_PAPER.scatter.sd, degrees_of_freedom=1.0)
-    """The paper's drone's, for want of their own: worth no more than one repeat."""
+    scatter: Final = Scatter(sd=_PAPER.scatter.sd, degrees_of_freedom=1.0, measured=False)
+    """The paper's drone's, for want of their own; under PX4 one flight scattered by three times as much."""
 
     def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...]) -> None:
         self.name: Final = name

@@ -15,8 +15,10 @@ def best_flight(flights: Sequence[Flight]) -> Flight:
 
 
 def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
-    """Whether these gains were flown before, to the end or not."""
-    return any(dict(flight.gains) == dict(gains) for flight in flights)
+    """Whether these gains were flown before: to the end, or until something spoke against them."""
+    return any(
+        dict(flight.gains) == dict(gains) for flight in flights if flight.outcome == "valid" or flight.against_gains
+    )
 
 
 def describe(gains: Gains) -> str:

@@ -17,6 +17,7 @@ import {
   editCampaign,
   finishCampaign,
   flyTrial,
+  judgeAbort,
   type NewCampaignInput,
   type NewTrial,
   promoteBest,
@@ -98,6 +99,19 @@ export function useClassify() {
   return useMutation({
     mutationFn: ({ trial, outcome, reason }: Classing) =>
       answer(classifyTrial({ path: { trial_id: trial.id }, body: { version: trial.version, outcome, reason } })),
+    onSuccess: settled.trial,
+    onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),
+  });
+}
+
+export type AbortWord = "behaved badly" | "something else";
+
+/** Why the operator broke a flight off. */
+export function useJudgeAbort() {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: ({ trial, cause }: { trial: Trial; cause: AbortWord }) =>
+      answer(judgeAbort({ path: { trial_id: trial.id }, body: { version: trial.version, cause } })),
     onSuccess: settled.trial,
     onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),
   });

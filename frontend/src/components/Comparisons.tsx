@@ -4,7 +4,12 @@ import { confidenceText, plusMinus } from "../lib/uncertainty";
 import { askedFor, VERDICTS } from "../lib/verdict";
 import classes from "./Verdict.module.css";
 
-const ICONS = { better: IconCircleArrowDown, worse: IconCircleArrowUp, unresolved: IconHelpHexagon } as const;
+const ICONS = {
+  better: IconCircleArrowDown,
+  worse: IconCircleArrowUp,
+  unresolved: IconHelpHexagon,
+  "not known yet": IconHelpHexagon,
+} as const;
 
 /** Better, worse or not to be told apart: the flight's gains against the best before it and against the first. */
 export function Comparisons({ trial, unit }: { trial: Trial; unit: string }) {
@@ -19,9 +24,10 @@ export function Comparisons({ trial, unit }: { trial: Trial; unit: string }) {
             <Icon size={20} className={classes["sign"]} aria-hidden />
             <span>
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>},{" "}
-              {confidenceText(confidence)} confidence, against {against === "first" ? "the first" : "the best before"},
-              flight {trial_number}: {plusMinus(Math.abs(difference), standard_error, unit)}{" "}
-              {difference < 0 ? "lower" : "higher"} <small>(± standard error)</small>
+              {confidence === null ? "" : `${confidenceText(confidence)} confidence, `}against{" "}
+              {against === "first" ? "the first" : "the best before"}, flight {trial_number}:{" "}
+              {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
+              <small>{standard_error === null ? "(no gains were flown twice)" : "(± standard error)"}</small>
             </span>
           </li>
         );

@@ -90,8 +90,9 @@ function Taken({ donor, best, experiment }: TakenProps) {
       <strong>
         <GainList gains={best.gains} experiment={experiment} />
       </strong>
-      , error {plusMinus(best.mean, best.standard_error, unit)} (± standard error). They are flown first; then it shows
-      whether the vehicles are alike enough to build on what was learned there.
+      , error {plusMinus(best.mean, best.standard_error, unit)}
+      {best.standard_error === null ? "" : " (± standard error)"}. They are flown first; then it shows whether the
+      vehicles are alike enough to build on what was learned there.
     </p>
   );
 }

@@ -40,7 +40,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
           <div className={`${classes["best"]} numbers`}>
             <p>Best: flight {best.number}</p>
             <p className={classes["figure"]}>{plusMinus(campaign.best.mean, campaign.best.standard_error, unit)}</p>
-            <p>± standard error</p>
+            {campaign.best.standard_error !== null && <p>± standard error</p>}
             {campaign.best.flights > 1 && <p>mean of {campaign.best.flights} flights</p>}
             <p>
               <GainList gains={best.gains} experiment={experiment} />

@@ -3,7 +3,7 @@ import { useStatistics } from "../api/queries";
 import type { CampaignStatistics } from "../api/types";
 import { count } from "../lib/format";
 import { gainsInBrackets } from "../lib/gains";
-import { confidenceText, percent, plusMinus } from "../lib/uncertainty";
+import { confidenceText, percent, plusMinus, scatterSource } from "../lib/uncertainty";
 import { VERDICTS } from "../lib/verdict";
 import { Help } from "./Help";
 import { useLastRows } from "./MoreRows";
@@ -79,11 +79,12 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
       </h3>
       <p className={classes["big"]}>
         {VERDICTS[verdict]}
-        <small>{confidenceText(confidence)} confidence</small>
+        {confidence !== null && <small>{confidenceText(confidence)} confidence</small>}
       </p>
       <p className="numbers">
         {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
-        <small className={classes["meaning"]}>(± standard error of the difference)</small>
+        {standard_error !== null && <small className={classes["meaning"]}>(± standard error of the difference)</small>}
+        {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>
             {count(more, "more flight")} would decide: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the
@@ -110,15 +111,16 @@ function Scatter({
         Scatter of one flight
         <Help topic="scatter" />
       </h3>
-      <p className={`${classes["big"]} numbers`}>
-        {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
-        <small>± its own standard error</small>
-      </p>
-      <p>
-        {repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`},{" "}
-        worth {Number(freedom.toFixed(1))} repeats in all.
-      </p>
-      {optimism > 0.1 * sigma && shrunk_error !== null && (
+      {sigma === null ? (
+        <p className={classes["big"]}>Not known yet</p>
+      ) : (
+        <p className={`${classes["big"]} numbers`}>
+          {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
+          <small>± its own standard error</small>
+        </p>
+      )}
+      <p>{scatterSource(repeats, sigma === null ? null : freedom)}</p>
+      {sigma !== null && optimism > 0.1 * sigma && shrunk_error !== null && (
         <p className={`${classes["fine"]} numbers`}>
           Chosen as the best of {groups.length}, it looks {plusMinus(optimism, null, unit)} better than it is; likely{" "}
           {plusMinus(shrunk_error, null, unit)}.

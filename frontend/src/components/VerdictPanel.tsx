@@ -9,6 +9,7 @@ import { percentChange, percentText, withUnit } from "../lib/format";
 import { trialWords } from "../lib/states";
 import { intervalText, plusMinus } from "../lib/uncertainty";
 import { askedFor, bestBeforeOf, sentenceOf, standingWithout } from "../lib/verdict";
+import { AbortCause } from "./AbortCause";
 import { Classify } from "./Classify";
 import { Comparisons } from "./Comparisons";
 import { FlightNotes } from "./FlightNotes";
@@ -89,6 +90,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
       )}
+      <AbortCause trial={trial} />
       <Comparisons trial={trial} unit={unit} />
       {trial.overrule_reason && (
         <p className={classes["overruled"]}>
@@ -110,7 +112,8 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Fact>
         {group !== undefined && group.errors.length > 1 && (
           <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`} topic="standardError">
-            {plusMinus(group.mean, group.standard_error, unit)} <small>(± standard error)</small>
+            {plusMinus(group.mean, group.standard_error, unit)}{" "}
+            {group.standard_error !== null && <small>(± standard error)</small>}
           </Fact>
         )}
         {trial.overshoot_m !== null && (

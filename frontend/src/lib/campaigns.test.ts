@@ -24,6 +24,12 @@ test("a difference within the noise is no progress that could be claimed", () =>
   expect(progress(summary(0.32, 0.3267, 5, "unresolved"))).toBe("not told apart from the first");
 });
 
+test("before anybody knows how much flights scatter, a difference may be chance", () => {
+  expect(progress(summary(0.0933, 0.3267, 2, "not known yet"))).toBe(
+    "71\u00a0% below the first, not known yet whether by chance",
+  );
+});
+
 test("one flight is no progress yet", () => {
   expect(progress(summary(0.3267, 0.3267, 1))).toBeNull();
   expect(progress(summary(null, null, 0))).toBeNull();

@@ -29,5 +29,6 @@ export function progress({ best, first_error, flights, verdict }: CampaignSummar
   if (best === null || change === null || flights < 2) return null;
   if (verdict === null) return "none better yet";
   if (verdict === "unresolved") return "not told apart from the first";
+  if (verdict === "not known yet") return `${against(change, "the first")}, not known yet whether by chance`;
   return against(change, "the first");
 }

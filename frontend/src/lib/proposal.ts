@@ -88,5 +88,6 @@ export function expectationOf(variant: Variant, statistics: CampaignStatistics |
   if (statistics === undefined || group === undefined) return "";
   const flights = `flight${group.trial_numbers.length === 1 ? "" : "s"} ${group.trial_numbers.join(", ")}`;
   const error = plusMinus(group.mean, statistics.sigma, statistics.error_unit);
-  return `Expected: ${error}, as ${flights} (± scatter of one flight).`;
+  const meaning = statistics.sigma === null ? "how much flights scatter is not known yet" : "± scatter of one flight";
+  return `Expected: ${error}, as ${flights} (${meaning}).`;
 }

@@ -1,7 +1,7 @@
 /** Numbers with their uncertainty, in as many digits as it allows: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
 
 import type { Interval } from "../api/types";
-import { NOTHING, percentText, withUnit } from "./format";
+import { count, NOTHING, percentText, withUnit } from "./format";
 
 const MOST_DIGITS = 6;
 /** An uncertainty that begins with less than this carries a second digit: rounding 0.012 to 0.01 would cost too much. */
@@ -61,4 +61,13 @@ export function percent(share: number): string {
 /** A confidence as people say it; one that rounds to certainty is not claimed. */
 export function confidenceText(confidence: number): string {
   return confidence > 0.995 ? `more than ${percent(0.99)}` : percent(confidence);
+}
+
+/** Where the scatter of one flight is known from; `freedom`: its degrees of freedom, null while it is not known. */
+export function scatterSource(repeats: number, freedom: number | null): string {
+  if (freedom === null)
+    return "It was not measured under this autopilot, and no gains have been flown twice: fly a gain set again.";
+  const from =
+    repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`;
+  return `${from}, worth ${Number(freedom.toFixed(1))} repeats in all.`;
 }

@@ -1,6 +1,8 @@
 import { expect, test } from "vitest";
 import type { Campaign, Trial } from "../api/types";
 import {
+  abortSentence,
+  abortWords,
   askedFor,
   bestBeforeOf,
   consequenceOf,
@@ -113,4 +115,19 @@ test("after a change of the safe gains it is told what the vehicle holds until t
   expect(heldMeanwhile({ ...vehicle, state: "disconnected" })).toContain("when it is next connected");
   expect(heldMeanwhile({ ...vehicle, held: vehicle.safe_gains })).toBe("");
   expect(heldMeanwhile({ ...vehicle, held: null })).toBe("");
+});
+
+test("an operator's abort asks why, and counts against its gains only when they behaved badly", () => {
+  const aborted = (abort_cause: Trial["abort_cause"]) => ({ ...trial(2, "aborted", null), abort_cause });
+  expect(abortSentence(aborted("operator"))).toContain("only if the vehicle behaved badly");
+  expect(abortSentence(aborted("something else"))).toContain("does not count against its gains");
+  expect(abortSentence(aborted("limit"))).toBe("A limit was met: the flight counts against its gains.");
+  expect(abortSentence(first)).toBe("");
+});
+
+test("the operator may say what they have not said already, where the server lets them", () => {
+  const actions = ["judge abort"];
+  expect(abortWords({ actions, abort_cause: "operator" })).toEqual(["behaved badly", "something else"]);
+  expect(abortWords({ actions, abort_cause: "behaved badly" })).toEqual(["something else"]);
+  expect(abortWords({ actions: [], abort_cause: "limit" })).toEqual([]);
 });

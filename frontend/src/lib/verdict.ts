@@ -5,7 +5,12 @@ import { inOrder, sameHeld } from "./flyScreen";
 import { gainsInBrackets } from "./gains";
 import { wasFlown } from "./states";
 
-export const VERDICTS = { better: "Better", worse: "Worse", unresolved: "Unresolved" } as const;
+export const VERDICTS = {
+  better: "Better",
+  worse: "Worse",
+  unresolved: "Unresolved",
+  "not known yet": "Not known yet",
+} as const;
 
 /** Where the error came to lie against what was predicted; null without an interval or an error. */
 export function keptPrediction(trial: Trial): "inside" | "above" | "below" | null {
@@ -58,6 +63,34 @@ export function sentenceOf(trial: Trial): string {
   return trial.reason.charAt(0).toUpperCase() + trial.reason.slice(1);
 }
 
+type AbortWord = "behaved badly" | "something else";
+
+/** What an aborted flight says of its gains; empty for others. */
+export function abortSentence({ state, abort_cause: cause }: Pick<Trial, "state" | "abort_cause">): string {
+  if (state !== "aborted") return "";
+  switch (cause) {
+    case "limit":
+      return "A limit was met: the flight counts against its gains.";
+    case "operator":
+      return "Why was it aborted? It counts against its gains only if the vehicle behaved badly.";
+    case "behaved badly":
+      return "The vehicle behaved badly: the flight counts against its gains.";
+    case "something else":
+      return "It was something else: the flight does not count against its gains.";
+    default:
+      return "Nobody recorded why it was aborted: the flight counts against its gains.";
+  }
+}
+
+/** What the operator may say of it now: what they have not said already. */
+export function abortWords({
+  actions,
+  abort_cause: cause,
+}: Pick<Trial, "actions" | "abort_cause">): readonly AbortWord[] {
+  if (!actions.includes("judge abort")) return [];
+  return (["behaved badly", "something else"] as const).filter((word) => word !== cause);
+}
+
 /** The flight that the page shows: the chosen one, else the latest. */
 export function shownTrial(trials: readonly Trial[], chosen: number | null): Trial | null {
   const flown = trials.filter((trial) => wasFlown(trial.state));
@@ -103,7 +136,9 @@ export function promotable(
     return { possible: false, why: `The best gains are the safe ones of ${name}.` };
   if (verdict === "better") return { possible: true, why: "" };
   const because =
-    verdict === null ? "no gains are better than the first ones yet" : `whether they are better is ${verdict} as yet`;
+    verdict === null
+      ? "no gains are better than the first ones yet"
+      : `whether they are better is ${verdict === "not known yet" ? verdict : `${verdict} as yet`}`;
   return {
     possible: false,
     why: `The best gains cannot become the safe ones of ${name}: ${because}. Fly the best and the first ones again until the statistics say “better”.`,

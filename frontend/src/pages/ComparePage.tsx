@@ -112,7 +112,12 @@ function OnlyOne({ trialId }: { trialId: number }) {
   );
 }
 
-const ICONS = { better: IconCircleArrowDown, worse: IconCircleArrowUp, unresolved: IconHelpHexagon } as const;
+const ICONS = {
+  better: IconCircleArrowDown,
+  worse: IconCircleArrowUp,
+  unresolved: IconHelpHexagon,
+  "not known yet": IconHelpHexagon,
+} as const;
 
 interface ComparedProps {
   comparison: FlightComparison;

@@ -131,6 +131,17 @@ def test_the_rule_that_tells_from_noise_flies_the_winner_again_with_what_its_fli
     again = next_proposal(definition, FLOWN)
     assert (again.kind, again.gains) == ("repeat", FIRMER)
     assert again.predicted_error == pytest.approx(0.2)
+    assert again.interval is None, "nobody knows yet how much flights scatter"
+    assert "Not known yet" in again.explanation.summary
+
+
+def test_once_a_set_was_flown_twice_its_own_repeats_say_what_to_expect_of_a_third_flight() -> None:
+    definition = replace(BY_HAND, stop=StopRule(kind="noise", max_flights=6))
+    again = next_proposal(definition, (*FLOWN, fly(4, FIRMER, 0.264)))
+    assert again.interval is not None
+    assert again.interval.upper - again.interval.lower > 0.2, (
+        "one repeat knows little: Student's t, one degree of freedom"
+    )
 
 
 def refusals(gains: Gains, flights: Sequence[Flight] = ()) -> list[tuple[str, str]]:

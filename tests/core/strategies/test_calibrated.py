@@ -132,6 +132,18 @@ def test_gains_that_were_aborted_are_not_proposed_again() -> None:
 
 
 @compiled_only
+def test_gains_that_an_operator_aborted_out_of_caution_are_proposed_again() -> None:
+    first = fly(1, DEFAULT)
+    free = next_proposal(CALM, [first])
+    cautious = [
+        replace(fly(number, free.gains), outcome="aborted", error=None, against_gains=False) for number in (2, 3, 4)
+    ]
+    again = next_proposal(CALM, [first, *cautious])
+    assert again.gains == free.gains
+    assert again.explanation.trust_fraction == 1.0
+
+
+@compiled_only
 def test_gains_that_flew_worse_than_the_best_are_not_flown_again_however_good_they_look() -> None:
     space = SPACE.narrowed({"kp": (400, 500), "ki": (50, 90), "kd": (90, 100)})
     first = fly(1, {"kp": 400, "ki": 50, "kd": 90})

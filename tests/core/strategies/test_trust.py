@@ -7,15 +7,18 @@ from app.core.definition import Flight, Prediction
 from app.core.strategies.trust import trust_fraction
 from tests.core.bowl import fly
 
+Came = Literal["held", "missed", "better", "aborted", "cautious", "untold"]
 
-def flown(number: int, outcome: Literal["held", "missed", "better", "aborted", "untold"]) -> Flight:
+
+def flown(number: int, outcome: Came) -> Flight:
     """A flight that was told 0.9 … 1.1 times its error, or not."""
     flight = fly(number, 30.0, 40)
     assert flight.error is not None
-    factor = {"held": 1.0, "missed": 0.5, "better": 2.0, "aborted": 1.0, "untold": 1.0}[outcome]
+    factor = {"held": 1.0, "missed": 0.5, "better": 2.0, "aborted": 1.0, "cautious": 1.0, "untold": 1.0}[outcome]
     told = Prediction(error=factor * flight.error, lower=0.9 * factor * flight.error, upper=1.1 * factor * flight.error)
-    if outcome == "aborted":
-        return replace(flight, outcome="aborted", error=None, predicted=told)
+    if outcome in {"aborted", "cautious"}:
+        against = outcome == "aborted"
+        return replace(flight, outcome="aborted", error=None, predicted=told, against_gains=against)
     return replace(flight, predicted=None if outcome == "untold" else told)
 
 
@@ -33,9 +36,11 @@ def flown(number: int, outcome: Literal["held", "missed", "better", "aborted", "
         (["untold", "missed", "untold"], 0.5),
         (["aborted", "untold"], 0.5),
         (["untold", "aborted", "aborted"], 0.25),
+        (["untold", "cautious", "cautious", "cautious"], 1.0),
+        (["untold", "cautious", "aborted"], 0.5),
     ],
 )
 def test_trust_shrinks_after_an_abort_and_a_miss_and_grows_again_with_predictions_that_held(
-    history: list[Literal["held", "missed", "better", "aborted", "untold"]], fraction: float
+    history: list[Came], fraction: float
 ) -> None:
     assert trust_fraction([flown(number, each) for number, each in enumerate(history, start=1)]) == fraction

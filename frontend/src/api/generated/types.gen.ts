@@ -38,6 +38,24 @@ export type AbortAnswer = {
 };
 
 /**
+ * AbortJudgement
+ *
+ * The operator's word on a flight that they broke off: whether it counts against its gains.
+ */
+export type AbortJudgement = {
+    /**
+     * Version
+     *
+     * the version that was edited, as last read
+     */
+    version: number;
+    /**
+     * Cause
+     */
+    cause: 'behaved badly' | 'something else';
+};
+
+/**
  * ActKind
  *
  * What a registered vehicle was asked, or what was decided about it, beside its flights.
@@ -95,7 +113,7 @@ export type Advice = {
  * BestTrial
  *
  * The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
- * from the scatter pooled over the campaign.
+ * from the scatter pooled over the campaign, null while that is not known.
  */
 export type BestTrial = {
     /**
@@ -123,7 +141,7 @@ export type BestTrial = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
     /**
      * Flights
      */
@@ -179,7 +197,7 @@ export type Campaign = {
      *
      * the best gains against the first flight's; null while they are the same, or nothing has flown
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
@@ -239,7 +257,8 @@ export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finishe
  * CampaignStatistics
  *
  * What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
- * repeats and the experiment's prior; `optimism` by how much the best is expected to look better than it is, for
+ * repeats and the experiment's prior, null while nobody knows it: before the first repeat under an autopilot whose
+ * scatter was never measured; `optimism` by how much the best is expected to look better than it is, for
  * having been chosen, and `shrunk_error` its error without that.
  */
 export type CampaignStatistics = {
@@ -254,7 +273,7 @@ export type CampaignStatistics = {
     /**
      * Sigma
      */
-    sigma: number;
+    sigma: number | null;
     /**
      * Degrees Of Freedom
      */
@@ -323,7 +342,7 @@ export type CampaignSummary = {
      *
      * the best gains against the first flight's; null while they are the same, or nothing has flown
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Rehearsal
      */
@@ -568,7 +587,8 @@ export type Clone = {
  * ComparedFlight
  *
  * One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
- * all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight.
+ * all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight, null while
+ * nobody knows it.
  */
 export type ComparedFlight = {
     /**
@@ -622,7 +642,7 @@ export type ComparedFlight = {
     /**
      * Scatter
      */
-    scatter: number;
+    scatter: number | null;
     /**
      * Flown At
      */
@@ -637,17 +657,18 @@ export type ComparedFlight = {
  * Comparison
  *
  * The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
- * direction, with the allowance for having chosen the best among several.
+ * direction, with the allowance for having chosen the best among several. The verdict is `not known yet`, without
+ * confidence and standard error, while nobody knows how much flights scatter.
  */
 export type Comparison = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved';
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet';
     /**
      * Confidence
      */
-    confidence: number;
+    confidence: number | null;
     /**
      * Difference
      */
@@ -655,7 +676,7 @@ export type Comparison = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
     further: FlightsToDecide | null;
     /**
      * Sentence
@@ -1316,7 +1337,7 @@ export type FlightComparison = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Sentence
      */
@@ -1410,7 +1431,7 @@ export type FlightPair = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved' | null;
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
      * Confidence
      */
@@ -1658,7 +1679,7 @@ export type Glitch = {
  * GroupBrief
  *
  * The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
- * campaign.
+ * campaign, null while that is not known.
  */
 export type GroupBrief = {
     /**
@@ -1668,7 +1689,7 @@ export type GroupBrief = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
     /**
      * N
      */
@@ -2473,9 +2494,9 @@ export type RepeatGroup = {
     /**
      * Standard Error
      *
-     * from the pooled scatter
+     * from the pooled scatter; null while that is not known
      */
-    standard_error: number;
+    standard_error: number | null;
     /**
      * Is Baseline
      */
@@ -3126,6 +3147,12 @@ export type Trial = {
      */
     reason: string;
     /**
+     * Abort Cause
+     *
+     * why it was broken off: `limit` and `behaved badly` count against its gains, `operator` (who has not said why) and `something else` do not; null where it was not, and where nobody recorded it
+     */
+    abort_cause: 'limit' | 'operator' | 'behaved badly' | 'something else' | null;
+    /**
      * Note
      */
     note: string;
@@ -3186,7 +3213,8 @@ export type Trial = {
  * TrialComparison
  *
  * The flight's gains against those of another one, each with all their flights. `difference` is this − other;
- * `confidence` is that of the likelier direction, and decides from 90 % on.
+ * `confidence` is that of the likelier direction, and decides from 90 % on; null, as the standard error is, while
+ * nobody knows how much flights scatter.
  */
 export type TrialComparison = {
     /**
@@ -3200,11 +3228,11 @@ export type TrialComparison = {
     /**
      * Verdict
      */
-    verdict: 'better' | 'worse' | 'unresolved';
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet';
     /**
      * Confidence
      */
-    confidence: number;
+    confidence: number | null;
     /**
      * Difference
      */
@@ -3212,7 +3240,7 @@ export type TrialComparison = {
     /**
      * Standard Error
      */
-    standard_error: number;
+    standard_error: number | null;
 };
 
 /**
@@ -4783,6 +4811,44 @@ export type ClassifyTrialResponses = {
 };
 
 export type ClassifyTrialResponse = ClassifyTrialResponses[keyof ClassifyTrialResponses];
+
+export type JudgeAbortData = {
+    body: AbortJudgement;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/judge-abort';
+};
+
+export type JudgeAbortErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type JudgeAbortError = JudgeAbortErrors[keyof JudgeAbortErrors];
+
+export type JudgeAbortResponses = {
+    /**
+     * Successful Response
+     */
+    200: Trial;
+};
+
+export type JudgeAbortResponse = JudgeAbortResponses[keyof JudgeAbortResponses];
 
 export type GetTrajectoryData = {
     body?: never;

@@ -123,7 +123,7 @@ function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: Compar
     return (
       <>
         <strong>{plusMinus(error, scatter, unit)}</strong>
-        <small className={classes["small"]}>± scatter of one flight</small>
+        {scatter !== null && <small className={classes["small"]}>± scatter of one flight</small>}
       </>
     );
   }

@@ -4,6 +4,7 @@ import { useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";
 import { trialWords } from "../../lib/states";
 import { sentenceOf } from "../../lib/verdict";
+import { AbortCause } from "../AbortCause";
 import { Classify } from "../Classify";
 import { FlightNotes } from "../FlightNotes";
 import { Kept, Marks } from "../Marks";
@@ -27,6 +28,7 @@ export function Judge({ campaign, trial }: Props) {
         <Marks trial={trial} />
       </p>
       {trial.state !== "captured" && <p className={classes["say"]}>{sentenceOf(trial)}</p>}
+      <AbortCause trial={trial} />
       <div className={classes["classes"]}>
         <Classify key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
       </div>

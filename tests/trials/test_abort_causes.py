@@ -1,0 +1,170 @@
+"""Why a flight was broken off: a limit counts against its gains, an operator's caution only when they say so."""
+
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.db.models import TrialRow
+from app.db.session import Database
+from app.trials.crew import as_asked
+from app.trials.spool import Spool
+from tests.builders import (
+    Json,
+    create_flown_trial,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    land,
+    lift_off,
+    run_jobs,
+)
+
+CALIBRATED = {"strategy": "calibrated", "stop": {"kind": "budget", "max_flights": 9}}
+
+
+@pytest.fixture
+def campaign(client: TestClient, database: Database) -> Json:
+    """One flight has counted, and the whole step from it is proposed."""
+    ready = create_ready_campaign(client, database, definition=CALIBRATED)
+    create_flown_trial(client, database, ready["id"])
+    return ready
+
+
+def proposal(client: TestClient, campaign: Json) -> Json:
+    found: Json = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
+    return found
+
+
+def trust(client: TestClient, campaign: Json) -> float:
+    fraction: float = proposal(client, campaign)["explanation"]["trust_fraction"]
+    return fraction
+
+
+def aborted(client: TestClient, database: Database, campaign: Json, *, on_request: bool) -> Json:
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    reason = "aborted by the operator" if on_request else "A safety limit was met."
+    land(
+        database, lift_off(database), create_record(ending="aborted", reason=reason, until_s=4.0, on_request=on_request)
+    )
+    run_jobs(database)
+    found: Json = get(client, f"/api/trials/{trial['id']}")
+    assert found["state"] == "aborted"
+    return found
+
+
+def judge(client: TestClient, trial: Json, cause: str, *, version: int | None = None) -> int:
+    now: int = get(client, f"/api/trials/{trial['id']}")["version"]
+    body = {"version": now if version is None else version, "cause": cause}
+    return client.post(f"/api/trials/{trial['id']}/judge-abort", json=body).status_code
+
+
+def test_three_cautious_aborts_leave_the_proposal_as_it_was(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    before = proposal(client, campaign)
+    for _ in range(3):
+        trial = aborted(client, database, campaign, on_request=True)
+        assert trial["abort_cause"] == "operator"
+        assert {"judge abort", "classify"} <= set(trial["actions"])
+    assert trust(client, campaign) == 1.0
+    assert proposal(client, campaign)["gains"] == before["gains"]
+
+
+def test_an_abort_counts_once_its_operator_says_that_the_vehicle_behaved_badly_and_no_more_when_they_take_it_back(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = aborted(client, database, campaign, on_request=True)
+    planned = create_trial(client, campaign["id"])
+    free = proposal(client, campaign)
+    assert judge(client, trial, "behaved badly") == 200
+    assert proposal(client, campaign)["stale"]
+    assert get(client, f"/api/trials/{planned['id']}")["state"] == "cancelled"
+    run_jobs(database)
+    assert trust(client, campaign) == 0.5
+    assert judge(client, trial, "something else") == 200
+    run_jobs(database)
+    assert proposal(client, campaign)["gains"] == free["gains"]
+    assert get(client, f"/api/trials/{trial['id']}")["abort_cause"] == "something else"
+
+
+def test_saying_that_it_was_something_else_changes_no_proposal(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = aborted(client, database, campaign, on_request=True)
+    assert judge(client, trial, "something else") == 200
+    assert not proposal(client, campaign)["stale"]
+
+
+def test_a_limit_that_the_program_keeps_counts_and_nobody_says_otherwise(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = aborted(client, database, campaign, on_request=False)
+    assert trial["abort_cause"] == "limit"
+    assert "judge abort" not in trial["actions"]
+    assert judge(client, trial, "something else") == 409
+    assert trust(client, campaign) == 0.5
+
+
+def test_two_operators_do_not_overwrite_each_others_word(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = aborted(client, database, campaign, on_request=True)
+    assert judge(client, trial, "behaved badly", version=trial["version"]) == 200
+    assert judge(client, trial, "something else", version=trial["version"]) == 409
+
+
+def test_a_flight_that_was_not_aborted_has_no_cause(client: TestClient, database: Database, campaign: Json) -> None:
+    flown = create_flown_trial(client, database, campaign["id"])
+    assert flown["abort_cause"] is None
+    assert judge(client, flown, "behaved badly") == 409
+
+
+def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_says_otherwise(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = aborted(client, database, campaign, on_request=False)
+    digest = proposal(client, campaign)["history_digest"]
+    with database.write() as session:
+        session.get_one(TrialRow, trial["id"]).abort_cause = None
+    found = get(client, f"/api/trials/{trial['id']}")
+    assert (found["abort_cause"], "judge abort" in found["actions"]) == (None, True)
+    assert (proposal(client, campaign)["history_digest"], proposal(client, campaign)["stale"]) == (digest, False)
+    assert judge(client, trial, "something else") == 200
+    run_jobs(database)
+    assert trust(client, campaign) == 1.0
+
+
+def test_the_report_says_which_aborts_count(client: TestClient, database: Database, campaign: Json) -> None:
+    trial = aborted(client, database, campaign, on_request=True)
+    path = f"/api/campaigns/{campaign['id']}/report.html"
+    assert "who has not said why: it does not count against the gains" in client.get(path).text
+    assert judge(client, trial, "behaved badly") == 200
+    assert "The vehicle behaved badly, says the operator: it counts against the gains." in client.get(path).text
+
+
+@pytest.mark.parametrize(
+    ("ending", "reason", "asked", "on_request"),
+    [
+        ("aborted", "enough", {"enough"}, True),
+        ("aborted", "enough 4 of its samples jumped and were dropped.", {"enough"}, True),
+        ("aborted", "The motors were stopped: people below", {"people below"}, True),
+        ("aborted", "A safety limit was met. It rose to 4.6 m.", {"enough"}, False),
+        ("aborted", "A safety limit was met. It rose to 4.6 m. The motors were stopped: hot", {"hot"}, False),
+        ("invalid", "enough", {"enough"}, False),
+        ("aborted", "A safety limit was met.", set(), False),
+    ],
+)
+def test_a_flight_was_ended_on_request_only_where_no_limit_had_ended_it(
+    ending: str, reason: str, asked: set[str], on_request: bool
+) -> None:
+    record = create_record(ending=ending, reason=reason)  # type: ignore[arg-type]  # one of the three
+    assert as_asked(record, asked).on_request is on_request
+
+
+def test_a_record_that_waits_on_the_disk_keeps_why_it_was_broken_off(tmp_path: Path) -> None:
+    spool = Spool(tmp_path)
+    spool.claim(1)
+    spool.keep(1, create_record(ending="aborted", reason="enough", on_request=True))
+    assert spool.read(1).record.on_request
