@@ -15,7 +15,7 @@ from typing import Protocol
 from app.core.clock import REAL_TIME, Clock
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import LockedError, exclusive
-from app.vehicles.base import MOTORS_STOPPED, FlightOrder, FlightRecord, OptionValue
+from app.vehicles.base import MOTORS_OFF_ASKED, FlightOrder, FlightRecord, OptionValue
 from app.vehicles.errors import VehicleError
 
 
@@ -115,7 +115,7 @@ class Crew(Protocol):
 def as_asked(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
     """The record; it says so where the flight was broken off for one of these reasons that were given from here, and
     not for a limit."""
-    said = record.reason.removeprefix(MOTORS_STOPPED)
+    said = record.reason.removeprefix(MOTORS_OFF_ASKED)
     asked = record.ending == "aborted" and any(said.startswith(reason) for reason in reasons)
     return replace(record, on_request=asked)
 

@@ -61,7 +61,7 @@ class Stop:
 
 
 ShouldStop = Callable[[], Stop | None]
-MOTORS_STOPPED: Final = "The motors were stopped: "
+MOTORS_OFF_ASKED: Final = "Motors off was asked for: "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,7 @@ class FlightRecord:
     """What a flight left: its full-rate trajectory, how it ended, and why when it was cut short.
 
     A flight that `should_stop` ended, and no limit before it, has a `reason` that begins with the stop's, or with
-    `MOTORS_STOPPED` and the stop's. `on_request` says so of an aborted one, once whoever asked has looked.
+    `MOTORS_OFF_ASKED` and the stop's. `on_request` says so of an aborted one, once whoever asked has looked.
     """
 
     trajectory: Trajectory

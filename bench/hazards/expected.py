@@ -28,6 +28,8 @@ LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "p
 
 IMPACT_M_S: Final = 1.9
 """At more than this it has truly come to the ground in a fall."""
+LAND_AGAIN_S: Final[Mapping[str, float]] = {"paparazzi": 6.0, "ardupilot": 1.0, "px4": 1.0}
+"""After five seconds: under Paparazzi every order to land begins the landing anew."""
 DRIFT_M_S: Final = 0.1
 SLACK_S: Final = 0.35
 """Of the rig's clock, and of a packet under way."""
@@ -253,8 +255,12 @@ class _Judgement:
             yield f"{self.flown.packets} packets were sent before a heartbeat was heard"
         for lost_s, end_s in self.stages.spans(Stage.LINK_LOST):
             lands = [at_s for at_s in self.stages.ordered(Order.LAND) if lost_s <= at_s <= end_s]
-            gaps = [later - earlier for earlier, later in pairwise(lands)]
-            if max(gaps, default=0.0) > 1.0 + SLACK_S:
+            gaps = [
+                later - earlier
+                for earlier, later in pairwise(lands)
+                if later - earlier > (1.0 if earlier < lost_s + 4.0 else LAND_AGAIN_S[self.case.autopilot]) + SLACK_S
+            ]
+            if gaps:
                 yield f"Land was not repeated for {max(gaps):.1f} s while the link was lost"
             if any(lost_s <= at_s < min(end_s, asked_s) for at_s in self.stages.ordered(Order.MOTORS_OFF)):
                 yield "motors off was sent while the link was lost"

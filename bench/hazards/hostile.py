@@ -141,6 +141,13 @@ def _leave(rig: HostileRig, vehicle: MavlinkVehicle) -> str:
 
 
 def _ended(rig: HostileRig, outcome: str, vehicle: str, reason: str, record: Trajectory | None) -> Ended:
+    first = rig.case.mishaps[0]
+    struck = f"{first.kind} from {first.stage} on, for {first.duration_s:g} s"
+    return Ended(outcome, vehicle, reason, struck, judge(rig, outcome, vehicle, record))
+
+
+def judge(rig: HostileRig, outcome: str, vehicle: str, record: Trajectory | None) -> tuple[str, ...]:
+    """What may never be, of what was said of a trial and its vehicle."""
     drone = rig.drone
     wrong: list[str] = []
     stops = [stop.height_m for stop in rig.stops if stop.height_m > LIFTED_M]
@@ -155,9 +162,7 @@ def _ended(rig: HostileRig, outcome: str, vehicle: str, reason: str, record: Tra
     wrong += _gaps(rig)
     if outcome == "completed" and record is not None:
         wrong += _untrue(rig, record)
-    first = rig.case.mishaps[0]
-    struck = f"{first.kind} from {first.stage} on, for {first.duration_s:g} s"
-    return Ended(outcome, vehicle, reason, struck, tuple(wrong))
+    return tuple(wrong)
 
 
 def _gaps(rig: HostileRig) -> Iterator[str]:

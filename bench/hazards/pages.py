@@ -165,4 +165,5 @@ All of it was mended, and is flown again by `tests/bench/test_faults.py`:
   blamed for it.
 
 What the runs do not have: sideways movement, radios that lose single packets, autopilots of other makes, hardware.
+What a link may say of a sound vehicle is in [hostile-links.md](hostile-links.md).
 """

@@ -149,9 +149,9 @@ def test_the_report_says_which_aborts_count(client: TestClient, database: Databa
     [
         ("aborted", "enough", {"enough"}, True),
         ("aborted", "enough 4 of its samples jumped and were dropped.", {"enough"}, True),
-        ("aborted", "The motors were stopped: people below", {"people below"}, True),
+        ("aborted", "Motors off was asked for: people below.", {"people below"}, True),
         ("aborted", "A safety limit was met. It rose to 4.6 m.", {"enough"}, False),
-        ("aborted", "A safety limit was met. It rose to 4.6 m. The motors were stopped: hot", {"hot"}, False),
+        ("aborted", "A safety limit was met. It rose to 4.6 m. Motors off was asked for: hot.", {"hot"}, False),
         ("invalid", "enough", {"enough"}, False),
         ("aborted", "A safety limit was met.", set(), False),
     ],

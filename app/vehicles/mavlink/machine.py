@@ -49,6 +49,8 @@ __all__ = ["Plan", "Trial", "advance", "begin"]
 BASELINE_S: Final = 1.0
 ARMED_WITHIN_S: Final = 2.0
 REPEAT_S: Final = 1.0
+REPEATED_S: Final = 5.0
+"""For so long Land is repeated every second; then as often as the autopilot bears."""
 LANDED_S: Final = 2.0
 DOWN_S: Final = 1.0
 """On the ground for so long while it should hover: its integrator winds up."""
@@ -195,9 +197,15 @@ def _landing(trial: Trial, event: Event) -> Step:
         return _come_down(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
         return quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
-    if now_s - trial.repeated_s >= REPEAT_S and not _obeys(trial, now_s):
+    if _is_land_due(trial, now_s) and not _obeys(trial, now_s):
         return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
     return trial, ()
+
+
+def _is_land_due(trial: Trial, now_s: float) -> bool:
+    """Every second at first. Then less often where every order begins the landing anew, or it would never be over."""
+    every_s = REPEAT_S if now_s - trial.since_s < REPEATED_S else trial.plan.land_again_s
+    return now_s - trial.repeated_s >= every_s
 
 
 def _doubting(trial: Trial) -> Trial:
@@ -231,8 +239,9 @@ def _rests_for(trial: Trial, seconds: float, now_s: float) -> bool:
 
 
 def _has_landed(trial: Trial, now_s: float) -> bool:
-    """At rest for 2 s; or it has disarmed itself near the ground, as some autopilots do."""
-    near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    """At rest for 2 s; or it has disarmed itself near the ground, as some do, and a fresh position says so."""
+    is_high = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    near = watching.is_fresh(trial.watch, now_s) and not is_high
     disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
     return _rests_for(trial, LANDED_S, now_s) or (near and disarmed)
 
@@ -246,7 +255,7 @@ def _link_lost(trial: Trial, event: Event) -> Step:
         return land(trial, State.ABORT_LAND, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
         return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
-    if now_s - trial.repeated_s >= REPEAT_S:
+    if _is_land_due(trial, now_s):
         return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
     return trial, ()
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
+from app.vehicles.base import MOTORS_OFF_ASKED
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Finding, Outcome, Reaction
 from app.vehicles.mavlink.limits import Limits
@@ -21,7 +22,7 @@ GAINS_S: Final = 0.3
 class Plan:
     """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground and the zero of
     the record's altitude are on the vehicle's datum, how long to record after the command, how soon the vehicle has to
-    lift off, and its limits."""
+    lift off, how long a landing is left alone before it is asked for again, and its limits."""
 
     safe_gains: tuple[Setting, ...]
     limits: Limits
@@ -29,6 +30,7 @@ class Plan:
     datum_m: float = 0.0
     record_s: float = 33.0
     lift_off_s: float = 1.5
+    land_again_s: float = 1.0
     stop_settings: tuple[str, ...] = ()
 
 
@@ -146,7 +148,7 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
     """At once, wherever the vehicle is; the trial is aborted, whatever came before. It is repeated from disarm."""
     if trial.stopped:
         return trial, ()
-    why = joined(trial.why, f"Motors off was asked for: {reason}.")
+    why = joined(trial.why, f"{MOTORS_OFF_ASKED}{reason}.")
     trial = replace(trial, failure=Failure.OPERATOR, why=why, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)

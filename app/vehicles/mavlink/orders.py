@@ -8,6 +8,7 @@ from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.signals import Action, Heard
 
 REPEAT_S: Final = 1.0
+REPEATED_S: Final = 5.0
 STOPPING_S: Final = 5.0
 """For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""
 _DESCENDING_M_S: Final = -0.2
@@ -30,8 +31,13 @@ class StandingOrder:
         now_s = self._radio.clock.now_s()
         is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
         self._is_over = self._is_over or is_late or self._is_obeyed()
-        if not self._is_over and now_s - self._sent_s >= REPEAT_S:
+        if not self._is_over and now_s - self._sent_s >= self._every_s(now_s):
             self._send()
+
+    def _every_s(self, now_s: float) -> float:
+        """Every second at first; then a landing is left alone for as long as it takes to be over."""
+        is_landing = self._action is Action.LAND and now_s - self._asked_s >= REPEATED_S
+        return self._radio.profile.land_again_s if is_landing else REPEAT_S
 
     def _send(self) -> None:
         """Every message once, waiting for no answer."""

@@ -19,6 +19,7 @@ _SAME_CLOCK_S: Final = 0.6
 """Two time stamps that differ by less from what has passed are of one clock: packets may be held up."""
 _RATE_OVER_S: Final = 1.0
 _PEAK_OVER_S: Final = 10.0
+_AT_ONCE: Final = 16
 _LATE: Final = 100
 """A number that lies so little behind the latest, and was not used yet, is of a packet that was held up."""
 _OF_A_ROUND: Final = 0.9
@@ -116,8 +117,14 @@ class _Rate:
         return max(self._peak, self._former_peak) / _RATE_OVER_S
 
     def pass_on(self, numbers: int, now_s: float) -> None:
-        self._passed.append((now_s, numbers))
-        self._sum += numbers
+        """What comes at one instant was held up: most of it was not sent within the last second."""
+        at_once = self._passed[-1][1] if self._passed and self._passed[-1][0] == now_s else 0
+        counted = min(numbers, _AT_ONCE - at_once)
+        if at_once:
+            self._passed[-1] = (now_s, at_once + counted)
+        else:
+            self._passed.append((now_s, counted))
+        self._sum += counted
         while now_s - self._passed[0][0] > _RATE_OVER_S:
             self._sum -= self._passed.popleft()[1]
         if now_s - self._since_s > _PEAK_OVER_S:

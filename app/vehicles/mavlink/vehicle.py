@@ -386,6 +386,7 @@ class MavlinkVehicle:
             ground_m=ground.altitude_m,
             datum_m=datum_m,
             lift_off_s=profile.lift_off_s,
+            land_again_s=profile.land_again_s,
             stop_settings=profile.stop_settings,
             limits=limits_of(self._options, self._radio, datum_m=datum_m),
         )

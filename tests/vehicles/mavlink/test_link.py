@@ -28,7 +28,7 @@ from app.vehicles.mavlink.dialects import (
     number,
     text,
 )
-from app.vehicles.mavlink.link import INBOX, UNATTENDED_AFTER_S, Link, LinkError, LossCounter
+from app.vehicles.mavlink.link import GONE_AFTER_S, INBOX, UNATTENDED_AFTER_S, Link, LinkError, LossCounter
 from tests.clocks import ClockByHand
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (
@@ -47,6 +47,14 @@ GAIN: dict[str, FieldValue] = {
     "param_id": "gui_v_kp",
     "param_value": 283.0,
     "param_type": 9,
+}
+BEAT: dict[str, FieldValue] = {
+    "type": 2,
+    "autopilot": 9,
+    "base_mode": 0,
+    "custom_mode": 0,
+    "system_status": 3,
+    "mavlink_version": 3,
 }
 CLOCK = ScaledClock()
 
@@ -118,6 +126,49 @@ def test_another_sender_with_the_vehicles_system_id_is_dropped_and_counted(papar
         paparazzi.say("LOCAL_POSITION_NED", **position(40))
         assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [40]
     assert link.health.foreign == 1
+
+
+def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(paparazzi: Speaker, link: Link) -> None:
+    with Speaker(PAPARAZZI, component=190) as other:
+        other.ground = paparazzi.ground
+        paparazzi.send(heartbeat(paparazzi, autopilot=9))
+        collect(link, 1)
+        assert link.doubled == ""
+        other.send(heartbeat(other, autopilot=9))
+        assert becomes(lambda: bool(link.doubled))
+    assert link.doubled == "Another vehicle with its system id speaks from another port."
+
+
+def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: Speaker) -> None:
+    clock = ClockByHand()
+    with (
+        Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
+        Speaker(PAPARAZZI, component=190) as again,
+    ):
+        paparazzi.send(heartbeat(paparazzi, autopilot=9))
+        collect(link, 1)
+        clock.time_s += GONE_AFTER_S + 0.1
+        again.ground = paparazzi.ground
+        again.send(heartbeat(again, autopilot=9))
+        assert becomes(lambda: link.health.foreign == 1)
+        again.say("LOCAL_POSITION_NED", **position(60))
+        assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [60]
+        link.send("PARAM_SET", **GAIN)
+        assert [message.get_type() for message in again.hear()] == ["PARAM_SET"]
+        assert link.doubled == ""
+
+
+def test_another_component_is_handed_on_but_is_no_sign_of_the_autopilots_life(paparazzi: Speaker, link: Link) -> None:
+    paparazzi.send(heartbeat(paparazzi, autopilot=9))
+    [beat] = collect(link, 1)
+    companion = PAPARAZZI.codec(system=31, component=191)
+    paparazzi.send(companion.pack(PAPARAZZI.message("LOCAL_POSITION_NED", position(20))))
+    [sample] = collect(link, 1)
+    assert sample.message.get_srcComponent() == 191
+    assert link.health.last_packet_s == beat.received_s
+    paparazzi.send(companion.pack(PAPARAZZI.message("HEARTBEAT", BEAT | {"autopilot": 9})))
+    collect(link, 1)
+    assert link.health.last_heartbeat_s == beat.received_s
 
 
 def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(paparazzi: Speaker) -> None:

@@ -36,6 +36,7 @@ class ArduPilot:
     autopilot: Final = 3
     heartbeat_s: Final = 1.0
     lift_off_s: Final = 6.0
+    land_again_s: Final = 1.0
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({str(GUIDED)})
     landing_modes: Final = frozenset({str(LAND)})

@@ -168,6 +168,11 @@ class Profile(Protocol):
         ...
 
     @property
+    def land_again_s(self) -> float:
+        """How long a landing takes on the ground to be over, where every order to land begins it anew."""
+        ...
+
+    @property
     def climbs_from_ground(self) -> bool:
         """Whether the altitude commanded is above the place of take-off, rather than above the autopilot's origin."""
         ...

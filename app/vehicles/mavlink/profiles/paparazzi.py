@@ -36,6 +36,7 @@ class Paparazzi:
     autopilot: Final = 9
     heartbeat_s: Final = 0.5
     lift_off_s: Final = 1.5
+    land_again_s: Final = 6.0
     climbs_from_ground: Final = False
     flying_modes: Final = frozenset({_NAV})
     landing_modes: Final = frozenset({_NAV})

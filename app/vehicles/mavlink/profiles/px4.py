@@ -33,6 +33,7 @@ class Px4:
     autopilot: Final = 12
     heartbeat_s: Final = 1.0
     lift_off_s: Final = 8.0
+    land_again_s: Final = 1.0
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
