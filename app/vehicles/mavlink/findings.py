@@ -86,7 +86,7 @@ def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
 def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bool) -> Finding | None:
     why = ""
     if watch.breached:
-        why = "The vehicle's own fence was crossed."
+        why = f"The vehicle's own fence was crossed: {watch.breached}."
     elif watch.last is not None and watch.origin is not None:
         last, origin = watch.last, watch.origin
         away_m = ((last.north_m - origin.north_m) ** 2 + (last.east_m - origin.east_m) ** 2) ** 0.5

@@ -69,7 +69,9 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """The vehicle's own fence was crossed."""
+    """The vehicle's own fence was crossed; which limit of it, where it is told."""
+
+    limit: str = ""
 
 
 @dataclass(frozen=True, slots=True)

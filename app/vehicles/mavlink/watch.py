@@ -93,7 +93,8 @@ class Watch:
     grounded_since_s: float | None = None
     second: Second | None = None
     rebooted: bool = False
-    breached: bool = False
+    breached: str = ""
+    """Which limit of its own fence it has crossed; empty while none."""
     doubled: str = ""
     """Why it is believed that two speak under its id; empty while one does."""
 
@@ -128,8 +129,8 @@ def hear(
             low = volts < limits.min_battery_v
             since = (watch.low_since_s if watch.low_since_s is not None else now_s) if low else None
             watch = replace(watch, battery_v=volts, battery_s=now_s, low_since_s=since)
-        case Breach():
-            watch = replace(watch, breached=True)
+        case Breach(limit=limit):
+            watch = replace(watch, breached=limit or "some limit")
         case LandedState(on_ground=landed):
             watch = replace(watch, landed=landed, landed_s=now_s)
         case BlockEntered(number=number):

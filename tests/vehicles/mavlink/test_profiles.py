@@ -286,7 +286,7 @@ def test_a_command_under_way_is_no_answer_yet() -> None:
 
 def test_a_breached_fence_is_told() -> None:
     known = {"breach_count": 1, "breach_type": 2, "breach_time": 0}
-    assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=1, **known) == Breach()
+    assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=1, **known) == Breach("its greatest altitude")
     assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=0, **known) is None
 
 

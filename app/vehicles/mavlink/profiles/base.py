@@ -41,6 +41,8 @@ FORCED: Final = 21196.0
 REAL32: Final = 9
 AUTOPILOT: Final = 1
 """The component id that autopilots have unless somebody changed it."""
+_FENCES: Final = MappingProxyType({1: "its least altitude", 2: "its greatest altitude", 3: "its boundary"})
+"""FENCE_BREACH."""
 _ON_GROUND: Final = 1
 _PREARM_CHECK: Final = 1 << 28
 """Among the sensors of SYS_STATUS: MAV_SYS_STATUS_PREARM_CHECK."""
@@ -357,7 +359,8 @@ def spoken(message: Message) -> Spoken:
 
 def breach(message: Message) -> Breach | None:
     """FENCE_STATUS."""
-    return Breach() if number(message, "breach_status") else None
+    kind = int(number(message, "breach_type"))
+    return Breach(_FENCES.get(kind, "")) if number(message, "breach_status") else None
 
 
 def landed_state(message: Message) -> LandedState | None:
