@@ -72,7 +72,8 @@ def test_ripples_within_the_band_are_no_crossings() -> None:
 
 
 def test_the_vehicles_own_fence_counts() -> None:
-    assert envelope(told(watch_of(3.0), Breach("its greatest altitude"), at_s=10.1)) == "The vehicle's own fence was crossed: its greatest altitude."
+    watch = told(watch_of(3.0), Breach("its greatest altitude"), at_s=10.1)
+    assert envelope(watch) == "The vehicle's own fence was crossed: its greatest altitude."
 
 
 def test_a_lone_jump_is_dropped_and_counted() -> None:
