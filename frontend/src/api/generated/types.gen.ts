@@ -1711,7 +1711,7 @@ export type Health = {
     /**
      * Worker
      */
-    worker: 'running' | 'absent';
+    worker: 'running' | 'not answering' | 'absent';
 };
 
 /**
@@ -2907,7 +2907,7 @@ export type System = {
     /**
      * Worker
      */
-    worker: 'running' | 'absent';
+    worker: 'running' | 'not answering' | 'absent';
     /**
      * Host
      */

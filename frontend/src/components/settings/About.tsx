@@ -13,7 +13,7 @@ export function About({ system }: { system: System }) {
     <Panel title="This server">
       <dl className={fleet["facts"]}>
         <Fact title="Gainline" value={system.version} />
-        <Fact title="Worker" value={system.worker} bad={system.worker === "absent"} />
+        <Fact title="Worker" value={system.worker} bad={system.worker !== "running"} />
         <Fact title="Database" value={`revision ${system.database_revision}`} />
         <Fact title="Data" value={bytesText(system.data_bytes)} />
         <Fact title={scarce ? "Free disk, scarce" : "Free disk"} value={bytesText(system.free_bytes)} bad={scarce} />
