@@ -108,6 +108,10 @@ def _storage_error(error: DBAPIError | sqlite3.Error, database_file: Path) -> St
     return None
 
 
+_DAMAGED: Final = (
+    "The database {file} is damaged.",
+    "Stop Gainline and restore the last backup; keep the damaged file, most of it can be recovered.",
+)
 _TROUBLES: Final = {
     "is full": (
         "The disk that holds {file} is full; nothing of this request was stored.",
@@ -129,10 +133,9 @@ _TROUBLES: Final = {
         "The database {file} cannot be opened.",
         "Check that its folder exists and that this user may write there.",
     ),
-    "malformed": (
-        "The database {file} is damaged.",
-        "Stop Gainline and restore the last backup; keep the damaged file, most of it can be recovered.",
-    ),
+    "malformed": _DAMAGED,
+    "no such table": _DAMAGED,
+    "unsupported file format": _DAMAGED,
     "not a database": (
         "The file {file} is not a Gainline database.",
         "Choose another data folder (GAINLINE_DATA_DIR), or move this file away.",
