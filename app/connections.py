@@ -22,6 +22,8 @@ FOR_OTHERS: Final = 256
 """Descriptors that are left to the database, files and processes."""
 FOR_STOPPING: Final = 64
 """Connections beyond the limit that serve nothing but what ends a flight."""
+FOR_ARRIVING: Final = 32
+"""Connections beyond those that are on their way in, or were dropped and are on their way out."""
 MOST: Final = 1024
 MOST_OF_A_DEVICE: Final = 64
 """This computer itself has no limit of its own: the operator is one of its users."""
@@ -54,11 +56,17 @@ class Connection:
 
 @dataclass(slots=True)
 class Connections:
-    """All of them. One event loop only."""
+    """All of them. One event loop only. `held` counts descriptors: those of connections that were dropped go a moment
+    later."""
 
     most: int
     clock: Clock
     open: dict[Connection, None] = field(default_factory=dict)
+    held: int = 0
+
+    def has_room(self, arriving: int) -> bool:
+        """Whether another one can be taken while so many are on their way in; in a moment it can be."""
+        return self.held + arriving < self.most + FOR_STOPPING + FOR_ARRIVING
 
     def add(self, connection: Connection) -> bool:
         """Take it in, if need be in another's place. False when it must be closed: everybody is being answered."""
@@ -104,7 +112,7 @@ class Connections:
 
 def room_for_connections(descriptors: int) -> int:
     """How many connections there may be beside `FOR_STOPPING`, where the process may have so many open files."""
-    return min(MOST, max(descriptors - FOR_OTHERS, descriptors // 2) - FOR_STOPPING)
+    return min(MOST, max(descriptors - FOR_OTHERS, descriptors // 2) - FOR_STOPPING - FOR_ARRIVING)
 
 
 def _standing(connection: Connection, now_s: float) -> Phase:

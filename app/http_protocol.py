@@ -41,6 +41,7 @@ class LimitedProtocol(HttpToolsProtocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as Uvicorn has it
         super().connection_made(transport)
+        self._all.held += 1
         peer = "" if self.client is None else self.client[0].removeprefix("::ffff:")
         own = Connection("" if is_loopback(peer) else peer, transport.abort, lambda: self.flow.read_paused)
         if self._all.add(own):
@@ -49,6 +50,7 @@ class LimitedProtocol(HttpToolsProtocol):
             transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
+        self._all.held -= 1
         if self._own is not None:
             self._all.remove(self._own)
         super().connection_lost(exc)

@@ -25,7 +25,6 @@ from app.settings import Settings, is_loopback
 
 STREAMS_END_WITHIN_S: Final = 3
 TICKS_A_SECOND: Final = 10
-TAKEN_AT_ONCE: Final = 64
 WITHOUT_DESCRIPTORS_S: Final = 0.05
 NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
 NUMERICS_AFTER_S: Final = 5.0
@@ -76,10 +75,10 @@ class _Server(uvicorn.Server):
         asyncio.get_running_loop().add_reader(self._listener, self._accept)
 
     def _accept(self) -> None:
-        """Take a few of those who wait. An event loop of its own would take all of them before it closes the first, and
-        be without descriptors meanwhile."""
+        """Take those who wait, as far as there is room. An event loop by itself would take all of them before it closed
+        the first, and be without descriptors meanwhile."""
         loop = asyncio.get_running_loop()
-        for _ in range(TAKEN_AT_ONCE):
+        while self._connections.has_room(len(self._arriving)):
             try:
                 arrived, _ = self._listener.accept()
             except (BlockingIOError, ConnectionAbortedError):

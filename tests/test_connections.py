@@ -7,6 +7,7 @@ import pytest
 from app.connections import (
     BODY_SILENCE_S,
     BODY_WITHIN_S,
+    FOR_ARRIVING,
     FOR_STOPPING,
     HEAD_WITHIN_S,
     MOST_OF_A_DEVICE,
@@ -138,7 +139,7 @@ def test_a_body_that_we_do_not_read_on_is_not_held_against_its_client() -> None:
     assert table.dropped == []
 
 
-@pytest.mark.parametrize(("descriptors", "most"), [(1024, 704), (256, 64), (4096, 1024), (2**20, 1024)])
+@pytest.mark.parametrize(("descriptors", "most"), [(1024, 672), (256, 32), (4096, 1024), (2**20, 1024)])
 def test_descriptors_are_left_for_all_else(descriptors: int, most: int) -> None:
     assert room_for_connections(descriptors) == most
-    assert most + FOR_STOPPING <= descriptors // 2 or descriptors - most - FOR_STOPPING >= 256
+    assert descriptors - most - FOR_STOPPING - FOR_ARRIVING >= min(256, descriptors // 2)
