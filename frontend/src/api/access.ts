@@ -5,13 +5,16 @@ import { type WatchedVehicle, watchOnly } from "../lib/access";
 import { answer } from "./client";
 import { getAccess } from "./generated";
 
-/** Read again whenever one comes back to the page: the link that unlocks it is opened in another tab. */
+const LOOK_AGAIN_MS = 5000;
+
+/** Read again until it is unlocked: the link that does it is opened in another tab. */
 function useAccess() {
   return useQuery({
     queryKey: ["access"],
     queryFn: () => answer(getAccess()),
     staleTime: 0,
     refetchOnWindowFocus: "always",
+    refetchInterval: ({ state }) => (state.data?.hint ? LOOK_AGAIN_MS : false),
   }).data;
 }
 

@@ -111,7 +111,11 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
         <LinkPanel vehicle={vehicle} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
         <Panel title="In control">
-          <Control vehicle={vehicle} />
+          {watching === null ? (
+            <Control vehicle={vehicle} />
+          ) : (
+            <p>{vehicle.control?.operator ?? "Nobody"} is in control.</p>
+          )}
         </Panel>
         <BatteryPanel vehicle={vehicle} />
         <Panel
