@@ -16,6 +16,7 @@ import uvicorn
 
 from app.connections import Connections, room_for_connections
 from app.core.clock import REAL_TIME
+from app.db.outbox import latest_event_id
 from app.http_protocol import LimitedProtocol
 from app.keyring import Keyring
 from app.main import create_app
@@ -102,8 +103,14 @@ class _Server(uvicorn.Server):
 
 
 def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
-    """Serve on a listening socket until SIGINT or SIGTERM; `announce` gets a line when it is ready."""
+    """Serve on a listening socket until SIGINT or SIGTERM; `announce` gets a line when it is ready.
+
+    Raises StorageError when the database or the secret of the data folder cannot be read.
+    """
     application = create_app(settings)
+    with application.state.database.read() as session:
+        latest_event_id(session)  # what the start needs, refused here in a sentence and not by the event loop
+    Keyring.open(settings.data_dir)
     address = web_address(settings.host, listener.getsockname()[1])
 
     def ready() -> None:
