@@ -25,12 +25,11 @@ _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _COSTLY: Final = ("/api/system/backup", "/report.pdf", "/bundle")
 """How the paths end whose reading computes for long or fills a disk, while something may fly: read by who may change
 things."""
-_FORWARDED: Final = frozenset(
-    {"forwarded", "via", "x-real-ip", "x-client-ip", "true-client-ip", "x-original-host", "x-original-url", "cdn-loop"}
-)
+_FORWARDED: Final = frozenset({"forwarded", "via", "x-real-ip", "x-client-ip", "true-client-ip", "cdn-loop"})
 _FORWARDED_BEGINS: Final = (
-    *("x-forwarded", "x-envoy-", "x-amzn-", "x-tunnel"),
-    *("cf-", "fly-", "fastly-", "tailscale-", "ngrok-"),
+    *("x-forwarded", "x-original-", "x-proxy", "x-remote-", "x-cluster-", "x-tunnel", "proxy-client-"),
+    *("x-amzn-", "x-appengine-", "x-arr-", "x-azure-", "x-envoy-", "x-vercel-"),
+    *("cf-", "do-connecting-", "fastly-", "fly-", "ngrok-", "tailscale-"),
 )
 """Headers that proxies and tunnels add; no browser does."""
 

@@ -120,6 +120,14 @@ def test_headers_without_end_are_refused(serving: Serving, parts: tuple[bytes, .
     assert b"larger than 64 KiB" in answer
 
 
+@pytest.mark.complete
+@pytest.mark.parametrize("first", [b"", BEGIN], ids=["silent", "half a head"])
+def test_a_connection_that_does_not_go_on_is_closed(serving: Serving, first: bytes) -> None:
+    with connected(serving) as connection:
+        connection.sendall(first)
+        assert connection.recv(1) == b"", "the server closed it"
+
+
 def test_headers_of_a_usual_size_are_taken_in_any_parts(serving: Serving) -> None:
     whole = BEGIN + 50 * LINE + b"\r\n"
     for parts in ((whole,), (BEGIN, *(50 * (LINE,)), b"\r\n")):
