@@ -101,8 +101,8 @@ def serve(
         str | None,
         typer.Option(
             help="Address to listen on. 0.0.0.0 lets other devices in, a tablet for instance: whoever reaches this "
-            "machine over the network can then see, change and delete every campaign and start simulated flights, and "
-            "real vehicles do not fly.  [default: GAINLINE_HOST, else 127.0.0.1]"
+            "machine over the network can then see every campaign, and change them and fly simulations with a link of "
+            "`gainline unlock`; vehicles with a link do not fly.  [default: GAINLINE_HOST, else 127.0.0.1]"
         ),
     ] = None,
     port: Annotated[
@@ -116,6 +116,20 @@ def serve(
     from app.serve import serve as run
 
     run(_settings(host=host, port=port, data_dir=data_dir), with_worker=worker)
+
+
+@app.command()
+@plainly
+def unlock(
+    script: Annotated[
+        bool, typer.Option("--script", help="Print what a script sends instead, as `Authorization: Bearer TOKEN`.")
+    ] = False,
+    data_dir: DataDir = None,
+) -> None:
+    """Print a link that lets one browser command the real vehicles of the running server."""
+    from app.commands.unlock import unlock as run
+
+    run(_settings(data_dir=data_dir), script=script)
 
 
 @app.command()

@@ -10,6 +10,7 @@ refuses is raised with the server's own words:
 
     GainlineError
     └── RefusedError              status, title, problems; str() of it says what happened and what to do
+        ├── NotAllowedError       403: a token is missing, or it is not done from here
         ├── NotFoundError         404
         ├── ConflictError         409: not possible now, or somebody else was faster
         ├── InvalidError          413, 415, 422: `problems` names the fields
@@ -68,6 +69,10 @@ class RefusedError(GainlineError):
         self.title = title
 
 
+class NotAllowedError(RefusedError):
+    """Not from there, or not by who has shown no token for it."""
+
+
 class NotFoundError(RefusedError):
     """There is no such thing."""
 
@@ -85,6 +90,7 @@ class UnavailableError(RefusedError):
 
 
 _REFUSALS: Final[Mapping[int, type[RefusedError]]] = {
+    403: NotAllowedError,
     404: NotFoundError,
     409: ConflictError,
     413: InvalidError,
@@ -95,12 +101,23 @@ _REFUSALS: Final[Mapping[int, type[RefusedError]]] = {
 
 
 class Client:
-    """A connection to one server; give your own `http` client for special needs (proxies, tests)."""
+    """A connection to one server; give your own `http` client for special needs (proxies, tests).
+
+    `token` is what `gainline unlock --script` prints: needed for real vehicles, and on another device for all that
+    changes something.
+    """
 
     def __init__(
-        self, address: str = "http://127.0.0.1:8000", *, timeout_s: float = 30.0, http: httpx2.Client | None = None
+        self,
+        address: str = "http://127.0.0.1:8000",
+        *,
+        token: str = "",
+        timeout_s: float = 30.0,
+        http: httpx2.Client | None = None,
     ) -> None:
         self._http = http or httpx2.Client(base_url=address, timeout=timeout_s)
+        if token:
+            self._http.headers["Authorization"] = f"Bearer {token}"
 
     def __enter__(self) -> Self:
         return self

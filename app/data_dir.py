@@ -2,10 +2,15 @@
 
 import errno
 import os
+import stat
 from contextlib import suppress
 from pathlib import Path
+from typing import Final
 
 from app.errors import Problem, StorageError
+
+PRIVATE: Final = 0o700
+OTHERS: Final = 0o077
 
 
 def prepare_data_dir(folder: Path) -> None:
@@ -14,7 +19,7 @@ def prepare_data_dir(folder: Path) -> None:
     Raises StorageError naming the option when it cannot be used.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
         if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, "this user may not write there")
     except OSError as error:
@@ -23,6 +28,28 @@ def prepare_data_dir(folder: Path) -> None:
             problems=(Problem("--data-dir", f"{error.strerror or error}"),),
             hint="Choose a folder that this user may write, with --data-dir or GAINLINE_DATA_DIR.",
         ) from error
+
+
+def make_private(folder: Path) -> str:
+    """Take the data folder from all other users of this computer: it holds the secret by which a browser commands real
+    vehicles, and the worker's socket. Gives a sentence where that changed something, else nothing.
+
+    Raises StorageError when it belongs to somebody else, or stays open to others all the same.
+    """
+    before = stat.S_IMODE(folder.stat().st_mode)
+    if not before & OTHERS:
+        return ""
+    with suppress(OSError):
+        folder.chmod(before & ~OTHERS)
+    status = folder.stat()
+    if stat.S_IMODE(status.st_mode) & OTHERS:
+        raise StorageError(
+            f"Other users of this computer may open {folder}, and this cannot be changed.",
+            problems=(Problem("--data-dir", f"has the mode {stat.S_IMODE(status.st_mode):o}"),),
+            hint="Gainline keeps there what lets a browser command real vehicles. Choose a folder of your own, on a "
+            "disk that knows file permissions, with --data-dir or GAINLINE_DATA_DIR.",
+        )
+    return f"{folder} was open to other users of this computer (mode {before:o}); now it is yours alone."
 
 
 def folder_bytes(folder: Path) -> int:

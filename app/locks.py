@@ -62,6 +62,18 @@ def exclusive(
         os.close(descriptor)
 
 
+def signature(path: Path) -> Holder | None:
+    """Who holds the lock file at `path`, or held it last; None where nobody has signed it."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        return _holder(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def _take(descriptor: int) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -10,12 +10,12 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
-from app.api import catalogue, errors, events, figures, landscapes, system, vehicle_figures
+from app.api import catalogue, errors, events, figures, landscapes, system, unlock, vehicle_figures
+from app.api.access import AccessMiddleware
 from app.api.assets import Assets
 from app.api.headers import HeadersMiddleware
 from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
-from app.api.origin import OriginMiddleware
 from app.bundles.router import router as bundles
 from app.campaigns.router import router as campaigns
 from app.compare.router import router as compare
@@ -26,6 +26,7 @@ from app.db.session import Database
 from app.errors import NotFoundError
 from app.fleet.router import router as fleet
 from app.jobs.router import router as jobs
+from app.keyring import Keyring
 from app.live.link import live_link
 from app.reports.router import router as reports
 from app.settings import Settings
@@ -51,6 +52,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         require_current(settings.database_file)
+        app.state.keyring = Keyring.open(settings.data_dir)
         async with live_link(settings.data_dir, database) as live:
             app.state.live = live
             yield
@@ -71,6 +73,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     own = (
         catalogue.router,
         system.router,
+        unlock.router,
         campaigns,
         trials,
         records,
@@ -92,7 +95,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     errors.install(app)
     describe(app)
     app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.own_error)
-    app.add_middleware(OriginMiddleware, host=settings.host, refuse=errors.foreign)
+    app.add_middleware(AccessMiddleware, host=settings.host, refuse_foreign=errors.foreign, refuse=errors.own_error)
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=COMPRESSION)
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():

@@ -9,8 +9,9 @@ from typing import Final
 from app.settings import is_loopback
 
 EXPOSES: Final = (
-    "anybody who can reach this machine over the network can see, change and delete every campaign and start simulated "
-    "flights: Gainline has no accounts yet. Real vehicles fly only from a server on loopback (--host 127.0.0.1)."
+    "anybody who can reach this machine over the network can see every campaign, and who has opened a link of "
+    "`gainline unlock` can change and delete them and start simulated flights: Gainline has no accounts yet. Real "
+    "vehicles fly only from a server on loopback (--host 127.0.0.1), and so do simulated ones with a link."
 )
 """What listening beyond loopback means, as the rest of a sentence."""
 
@@ -31,6 +32,11 @@ def web_address(host: str, port: int) -> str:
     """What to type into a browser on this machine."""
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - compared, not bound
     return f"http://[{shown}]:{port}" if ":" in shown else f"http://{shown}:{port}"
+
+
+def unlock_link(address: str, token: str) -> str:
+    """What unlocks a browser that opens it."""
+    return f"{address}/unlock?token={token}"
 
 
 def exposure(host: str) -> str | None:

@@ -2,7 +2,10 @@
 
 from typing import Annotated, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+from app.core.control_characters import find_control_characters
 
 T = TypeVar("T")
 
@@ -16,7 +19,19 @@ Gains = dict[str, int | float]
 """Gains by name; whole numbers where the controller takes counts."""
 
 Text = Annotated[str, Field(max_length=2000)]
-Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120)]
+
+
+def _shown_as_it_is(name: str) -> str:
+    """The name, unless it holds what moves a terminal's cursor or turns text around."""
+    if found := find_control_characters(name):
+        raise PydanticCustomError(
+            "control_character", "must not hold control characters ({found})", {"found": ", ".join(found)}
+        )
+    return name
+
+
+Shown = AfterValidator(_shown_as_it_is)
+Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120), Shown]
 Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
 Version = Annotated[int, Field(ge=1, strict=True, description="the version that was edited, as last read")]
 

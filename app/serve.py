@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Final
 
-from app.data_dir import prepare_data_dir
+from app.data_dir import make_private, prepare_data_dir
 from app.db.revision import is_current
 from app.errors import AddressError, AlreadyRunningError, Problem
 from app.locks import LockedError, exclusive
@@ -39,6 +39,8 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
     and StorageError when the data folder cannot be used or the database cannot be opened or brought up to date.
     """
     prepare_data_dir(settings.data_dir)
+    if narrowed := make_private(settings.data_dir):
+        announce(narrowed)
     with ExitStack() as stack:
         for number in (signal.SIGINT, signal.SIGTERM):
             stack.callback(signal.signal, number, signal.signal(number, _leave))

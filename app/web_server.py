@@ -1,22 +1,32 @@
 """The web server of `gainline serve`: Uvicorn with the application."""
 
+import asyncio
 import gc
 import importlib
+import resource
 import socket
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 import structlog
 import uvicorn
 
+from app.connections import Connections, room_for_connections
+from app.core.clock import REAL_TIME
+from app.db.outbox import latest_event_id
+from app.http_protocol import LimitedProtocol
+from app.keyring import Keyring
 from app.main import create_app
-from app.network import addresses_elsewhere, web_address
+from app.network import addresses_elsewhere, unlock_link, web_address
 from app.qr import qr_text
-from app.settings import Settings
+from app.settings import Settings, is_loopback
 
 STREAMS_END_WITHIN_S: Final = 3
+TICKS_A_SECOND: Final = 10
+WITHOUT_DESCRIPTORS_S: Final = 0.05
 NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
 NUMERICS_AFTER_S: Final = 5.0
 """How long after it is ready the server loads what charts and judgements need, if nobody has asked for any by then."""
@@ -25,25 +35,82 @@ _log = structlog.get_logger(__name__)
 
 
 class _Server(uvicorn.Server):
-    """Uvicorn, which says when it is ready, and ends the open event streams before it waits for them."""
+    """Uvicorn, which takes connections as far as there is room for them, says when it is ready, and ends the open event
+    streams before it waits for them."""
 
-    def __init__(self, config: uvicorn.Config, *, ready: Callable[[], None], closing: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        listener: socket.socket,
+        connections: Connections,
+        *,
+        ready: Callable[[], None],
+        closing: Callable[[], None],
+    ) -> None:
         super().__init__(config)
+        self._listener = listener
+        self._connections = connections
         self._ready = ready
         self._closing = closing
+        self._arriving: set[asyncio.Task[None]] = set()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        await super().startup(sockets)
+        assert not sockets, "the listener is its own"
+        await super().startup([])
+        self._listener.setblocking(False)
+        self._listen()
         self._ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        assert not sockets
+        asyncio.get_running_loop().remove_reader(self._listener)
         self._closing()
-        await super().shutdown(sockets)
+        await super().shutdown([self._listener])
+
+    async def on_tick(self, counter: int) -> bool:
+        if counter % TICKS_A_SECOND == 0:
+            self._connections.drop_overdue()
+        return await super().on_tick(counter)
+
+    def _listen(self) -> None:
+        asyncio.get_running_loop().add_reader(self._listener, self._accept)
+
+    def _accept(self) -> None:
+        """Take those who wait, as far as there is room. An event loop by itself would take all of them before it closed
+        the first, and be without descriptors meanwhile."""
+        loop = asyncio.get_running_loop()
+        while self._connections.has_room(len(self._arriving)):
+            try:
+                arrived, _ = self._listener.accept()
+            except (BlockingIOError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                _log.error("no connection can be taken", why=str(error))
+                loop.remove_reader(self._listener)
+                loop.call_later(WITHOUT_DESCRIPTORS_S, self._listen)
+                return
+            arrived.setblocking(False)
+            task = loop.create_task(self._serve_one(arrived))
+            self._arriving.add(task)
+            task.add_done_callback(self._arriving.discard)
+
+    async def _serve_one(self, arrived: socket.socket) -> None:
+        with suppress(OSError):  # it is gone already
+            await asyncio.get_running_loop().connect_accepted_socket(self._protocol, arrived)
+
+    def _protocol(self) -> asyncio.Protocol:
+        return LimitedProtocol(self._connections, self.config, self.server_state, self.lifespan.state)
 
 
 def run(settings: Settings, listener: socket.socket, announce: Callable[[str], None]) -> None:
-    """Serve on a listening socket until SIGINT or SIGTERM; `announce` gets a line when it is ready."""
+    """Serve on a listening socket until SIGINT or SIGTERM; `announce` gets a line when it is ready.
+
+    Raises StorageError when the database or the secret of the data folder cannot be read.
+    """
     application = create_app(settings)
+    with application.state.database.read() as session:
+        latest_event_id(session)  # what the start needs, refused here in a sentence and not by the event loop
+    Keyring.open(settings.data_dir)
     address = web_address(settings.host, listener.getsockname()[1])
 
     def ready() -> None:
@@ -53,19 +120,23 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
         loading.start()
         _log.info("ready", address=address)
         announce(f"Gainline is ready at {address}")
-        _announce_elsewhere(settings.host, listener.getsockname()[1], announce)
+        _announce_links(settings, listener.getsockname()[1], application.state.keyring, announce)
 
     def closing() -> None:
         application.state.live.close()
 
+    connections = Connections(room_for_connections(resource.getrlimit(resource.RLIMIT_NOFILE)[0]), REAL_TIME)
     config = uvicorn.Config(
         application,
+        http="httptools",
+        ws="none",
+        proxy_headers=False,
         log_config=None,
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=STREAMS_END_WITHIN_S,
     )
-    _Server(config, ready=ready, closing=closing).run(sockets=[listener])
+    _Server(config, listener, connections, ready=ready, closing=closing).run()
 
 
 def _load_numerics() -> None:
@@ -80,10 +151,18 @@ def _spare_what_stays() -> None:
     gc.freeze()
 
 
-def _announce_elsewhere(host: str, port: int, announce: Callable[[str], None]) -> None:
-    """Say where a tablet finds the dashboard, to a person with a code to point its camera at."""
-    addresses = addresses_elsewhere(host, port)
+def _announce_links(settings: Settings, port: int, keyring: Keyring, announce: Callable[[str], None]) -> None:
+    """The link that lets a browser command real vehicles; of a server that others reach, where a tablet finds it and
+    the link that lets it fly simulations, to a person with a code to point its camera at."""
+    addresses = addresses_elsewhere(settings.host, port)
     for address in addresses:
         announce(f"On a tablet: {address.url}" + (f" ({address.interface})" if address.interface else ""))
-    if addresses and sys.stdout.isatty():
-        announce(qr_text(addresses[0].url))
+    if is_loopback(settings.host):
+        link = unlock_link(web_address(settings.host, port), keyring.new_link())
+        announce(f"Open {link} to command real vehicles from that browser.")
+    elif addresses:
+        link = unlock_link(addresses[0].url, keyring.new_link())
+        announce(f"Open {link} on a tablet to create and fly simulated campaigns from it.")
+        if sys.stdout.isatty():
+            announce(qr_text(link))
+    announce("The link works once, within 15 minutes; `gainline unlock` prints another.")

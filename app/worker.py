@@ -27,7 +27,7 @@ from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.tasks import Proposer, Surveyor
 from app.core.clock import REAL_TIME, Clock
-from app.data_dir import prepare_data_dir
+from app.data_dir import make_private, prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import AlreadyRunningError, StorageError
@@ -104,7 +104,10 @@ def run_supervised_worker(settings: Settings) -> None:
 
 def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting: Callable[[], bool]) -> None:
     prepare_data_dir(settings.data_dir)
+    narrowed = make_private(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
+    if narrowed:
+        _log.warning("data folder made private", why=narrowed)
     sys.setswitchinterval(SWITCH_EVERY_S)
     with exclusive(settings.data_dir / "worker.lock", keep_waiting=keep_waiting):
         require_current(settings.database_file)
@@ -182,7 +185,7 @@ class Worker:
             publish,
             worker=self._name,
             closing=closing,
-            real=is_loopback(self._settings.host),
+            links=is_loopback(self._settings.host),
             clock=self._clock,
         )
         live = LiveServer(live_address(data_dir), abort=self._airspace.abort, order=sessions.order, hello=self._hello)

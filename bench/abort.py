@@ -1,12 +1,14 @@
 """How soon an abort is on the wire: from the request to the server until the first packet that carries it out.
 
-    ./dev exec python -m bench.abort [--seconds 25]
+    ./dev exec python -m bench.abort [--seconds 25] [--idle 2000] [--files 1024]
 
 A real server, its worker and two simulated drones, each a process of its own, as people run them. Between each vehicle
 and its link a tap hands every packet on and takes down when the operating system received it. 20 clients follow the
 event stream all the while. Flights are aborted over HTTP at random instants after their take-off; in between, Land is
-ordered of whatever stands on the ground. Prints the figures; exits 1 when the 99th percentile of either is above 50 ms,
-when one never came on the wire, or when a client saw no telemetry.
+ordered of whatever stands on the ground. With `--idle` somebody keeps so many connections open besides that say
+nothing, and opens one again that the server has closed, 200 a second; the server may have `--files` open. Prints the
+figures; exits 1 when the 99th percentile of either is above 50 ms, when one never came on the wire, or when a client
+saw no telemetry.
 """
 
 import argparse
@@ -15,6 +17,7 @@ import json
 import multiprocessing
 import os
 import random
+import resource
 import select
 import signal
 import socket
@@ -50,6 +53,9 @@ ENDS_WITHIN_S: Final = 90.0
 ORDERS_EVERY_S: Final = 0.4
 """Each is written down afterwards, which costs the worker more than to pass it on."""
 SEED: Final = 20261121
+LONG: Final = {"kind": "budget", "max_flights": 100}
+OPENED_EVERY_S: Final = 0.1
+OPENED_AT_ONCE: Final = 20
 
 Frames = list[tuple[int, bytes]]
 """What the ground sent, and when that was received, ns since 1970."""
@@ -119,8 +125,9 @@ def free_port() -> int:
 
 
 @contextlib.contextmanager
-def program(*arguments: str, until: str) -> Iterator[str]:
-    """`gainline …` from its line that contains `until`, which is given, to the end of the block."""
+def program(*arguments: str, until: str, files: int | None = None) -> Iterator[str]:
+    """`gainline …` from its line that contains `until`, which is given, to the end of the block; with at most so many
+    open files."""
     with tempfile.TemporaryFile("w+") as said:
         process = subprocess.Popen(
             [sys.executable, "-m", "app.cli", *arguments],
@@ -130,6 +137,8 @@ def program(*arguments: str, until: str) -> Iterator[str]:
             text=True,
             start_new_session=True,
         )
+        if files is not None:
+            resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (files, files))
         assert process.stdout is not None
         while until not in (line := process.stdout.readline()):
             assert line, f"gainline {arguments[0]} ended"
@@ -180,6 +189,29 @@ def watch(url: str, pipe: Connection) -> None:
     done.set()
 
 
+def idle(address: tuple[str, int], connections: int, pipe: Connection) -> None:
+    """A process: so many connections that say nothing, until told to end; tells when all were open once, and then how
+    often one was closed."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, connections + 256), most))
+    kept = [socket.create_connection(address) for _ in range(connections)]
+    poll = select.poll()
+    for each in kept:
+        poll.register(each, select.POLLIN | select.POLLHUP | select.POLLERR)
+    open_ones, closed = {each.fileno(): each for each in kept}, 0
+    pipe.send("open")
+    while not pipe.poll(OPENED_EVERY_S):
+        for descriptor, _ in poll.poll(0):
+            poll.unregister(descriptor)
+            open_ones.pop(descriptor).close()
+            closed += 1
+        for _ in range(min(OPENED_AT_ONCE, connections - len(open_ones))):
+            again = socket.create_connection(address)
+            open_ones[again.fileno()] = again
+            poll.register(again, select.POLLIN | select.POLLHUP | select.POLLERR)
+    pipe.send(closed)
+
+
 # ---- what is asked
 
 
@@ -195,7 +227,8 @@ class Operator:
     """One person with one vehicle: flights, each aborted soon after its take-off, until the time is over."""
 
     def __init__(self, url: str, index: int, address: str, asked: Asked) -> None:
-        self._api = httpx2.Client(base_url=f"{url}/api", timeout=PATIENCE_S)
+        each_its_own = httpx2.Limits(max_keepalive_connections=0)
+        self._api = httpx2.Client(base_url=f"{url}/api", timeout=PATIENCE_S, limits=each_its_own)
         self._index, self._asked = index, asked
         self._randomness = random.Random(SEED + index)
         options = {"address": address, "simulated": True}
@@ -203,7 +236,9 @@ class Operator:
         self._post(f"/vehicles/{self._vehicle}/connect")
         self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")
         chosen = {"kind": "mavlink", "id": self._vehicle}
-        self._campaign = self._post("/campaigns", {"name": "Aborts", "vehicle": chosen, "definition": {}})["id"]
+        self._campaign = self._post("/campaigns", {"name": "Aborts", "vehicle": chosen, "definition": {"stop": LONG}})[
+            "id"
+        ]
         self._until(f"/campaigns/{self._campaign}", lambda campaign: campaign["state"] == "ready")
 
     def order_landings(self, seconds: float) -> None:
@@ -288,12 +323,16 @@ def together(work: list[Callable[[], None]]) -> None:
 def main() -> int:
     arguments = argparse.ArgumentParser(prog="bench.abort")
     arguments.add_argument("--seconds", type=float, default=25.0, help="of flights")
-    seconds = arguments.parse_args().seconds
+    arguments.add_argument("--idle", type=int, default=0, help="connections that say nothing")
+    arguments.add_argument("--files", type=int, help="that the server may have open")
+    chosen = arguments.parse_args()
+    seconds = chosen.seconds
     asked = Asked()
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         drones = [stack.enter_context(tapped_drone()) for _ in range(VEHICLES)]
-        line = stack.enter_context(program("serve", "--port", "0", "--data-dir", str(folder), until="ready at"))
+        command = ("serve", "--port", "0", "--data-dir", str(folder))
+        line = stack.enter_context(program(*command, until="ready at", files=chosen.files))
         url = line.rpartition(" ")[2].strip()
         wait_for_worker(url)
         operators = [Operator(url, index, drone.address, asked) for index, drone in enumerate(drones)]
@@ -301,6 +340,12 @@ def main() -> int:
         clients, theirs = context.Pipe()
         context.Process(target=watch, args=(url, theirs), daemon=True).start()
         clients.recv()
+        if chosen.idle:
+            silent, theirs = context.Pipe()
+            where = LOOPBACK, int(url.rpartition(":")[2])
+            context.Process(target=idle, args=(where, chosen.idle, theirs), daemon=True).start()
+            silent.recv()
+            stack.callback(_told, silent, chosen.idle)
         together([partial(each.order_landings, seconds / 4.0) for each in operators])
         together([partial(each.abort_flights, seconds) for each in operators])
         clients.send("count")
@@ -310,6 +355,11 @@ def main() -> int:
     failed |= judge("Land ordered on the ground", delays_s(asked.orders, sent, is_landing))
     print(f"telemetry messages of the slowest client: {heard}, of {len(asked.aborts)} flights")
     return int(failed or heard == 0)
+
+
+def _told(silent: Connection, connections: int) -> None:
+    silent.send("end")
+    print(f"{connections} idle connections; the server closed {silent.recv()} of them, opened again each time")
 
 
 def wait_for_worker(url: str) -> None:

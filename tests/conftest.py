@@ -15,6 +15,7 @@ from app.db.migrate import migrate
 from app.db.session import Database
 from app.main import create_app
 from app.settings import Settings
+from tests.unlocking import client_here
 
 # Errors that a test provokes are logged with their places, not with every value there, which takes seconds to print.
 structlog.configure(
@@ -84,5 +85,5 @@ def listen() -> Iterator[Listen]:
 @pytest.fixture
 def client(application: FastAPI) -> Iterator[TestClient]:
     """HTTP to the running application, in this process. Errors come as answers, as from a server."""
-    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as running:
+    with client_here(application) as running:
         yield running

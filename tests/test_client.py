@@ -6,12 +6,24 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from app.access import Key
 from app.campaigns.schemas import Definition, StopRule
-from app.client import Client, ConflictError, InvalidError, NotFoundError, RefusedError, UnavailableError
+from app.client import (
+    Client,
+    ConflictError,
+    InvalidError,
+    NotAllowedError,
+    NotFoundError,
+    RefusedError,
+    UnavailableError,
+)
 from app.db.session import Database
+from app.keyring import Keyring
+from app.settings import Settings
 from app.trials import flights
 from app.trials.schemas import Classification
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
+from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.logs.recorded import TLOGS, recorded
 
 
@@ -44,6 +56,21 @@ def test_ask_and_tell(gainline: Client, database: Database, tmp_path: Path) -> N
     run_jobs(database)
     classed = gainline.classify(trial, Classification(version=trial.version, outcome="invalid", reason="rain"))
     assert classed.state == "invalid"
+
+
+def test_a_script_with_its_token_plans_on_a_real_vehicle_and_is_refused_in_words_without(
+    client: TestClient, database: Database, settings: Settings
+) -> None:
+    real = create_connected(client, database, real=True)
+    campaign = create_campaign_on(client, database, real)
+    client.cookies.clear()
+    with pytest.raises(NotAllowedError, match="gainline unlock --script") as refused:
+        Client(http=client).fly(campaign["id"], {"kp": 300, "ki": 20, "kd": 90})
+    assert (refused.value.status, refused.value.title) == (403, "Not allowed")
+    script = Client(http=client, token=Keyring.open(settings.data_dir).value(Key.SCRIPT))
+    with pytest.raises(NotAllowedError, match="takes off only on its operator's own act"):
+        script.fly(campaign["id"], {"kp": 300, "ki": 20, "kd": 90})
+    assert script.ask(campaign["id"]).kind == "start"
 
 
 def test_a_log_is_handed_in_by_its_takeoff_and_with_the_gains_it_was_flown_with(

@@ -1,5 +1,6 @@
 """Data folders that cannot be used: refused by the name of the option, before anything else happens."""
 
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.data_dir import prepare_data_dir
+from app.data_dir import make_private, prepare_data_dir
 from app.errors import StorageError
 from app.locks import exclusive
 from tests.runtime.processes import PATIENCE_S, environment
@@ -51,6 +52,39 @@ def test_a_missing_data_folder_is_made(tmp_path: Path) -> None:
     prepare_data_dir(tmp_path / "a" / "b")
     prepare_data_dir(tmp_path / "a" / "b")
     assert (tmp_path / "a" / "b").is_dir()
+
+
+def mode_of(folder: Path) -> int:
+    return stat.S_IMODE(folder.stat().st_mode)
+
+
+def test_a_new_data_folder_is_its_users_alone(tmp_path: Path) -> None:
+    prepare_data_dir(tmp_path / "data")
+    assert mode_of(tmp_path / "data") == 0o700
+    assert make_private(tmp_path / "data") == ""
+
+
+@pytest.mark.parametrize("wide", [0o755, 0o750, 0o701, 0o777])
+def test_a_folder_that_others_may_open_is_narrowed_and_says_so(tmp_path: Path, wide: int) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    folder.chmod(wide)
+    assert (
+        make_private(folder)
+        == f"{folder} was open to other users of this computer (mode {wide:o}); now it is yours alone."
+    )
+    assert mode_of(folder) == 0o700
+
+
+def test_a_folder_that_stays_open_to_others_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a disk that knows no permissions, or one that belongs to somebody else."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    folder.chmod(0o755)
+    monkeypatch.setattr(Path, "chmod", lambda *_: None)
+    with pytest.raises(StorageError, match="Other users of this computer may open") as refused:
+        make_private(folder)
+    assert [problem.field for problem in refused.value.problems] == ["--data-dir"]
 
 
 def test_a_lock_that_cannot_be_opened_says_where_it_is(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from app import __version__
 from app.main import create_app
 from app.settings import Settings
 from tests.builders import create_campaign
+from tests.unlocking import client_here
 
 PAGE = {"Accept": "text/html"}
 OPENAPI = Path(__file__).parent.parent / "frontend" / "openapi.json"
@@ -21,7 +22,7 @@ def dashboard(settings: Settings) -> TestClient:
     (settings.ui_dir / "assets").mkdir(parents=True)
     (settings.ui_dir / "index.html").write_text("<title>Gainline</title>")
     (settings.ui_dir / "assets" / "index-abc123.js").write_text("console.log(1);\n" * 200)
-    return TestClient(create_app(settings), base_url="http://127.0.0.1:8000", raise_server_exceptions=False)
+    return client_here(create_app(settings))
 
 
 def test_the_dashboard_is_served_at_every_address_of_its_own(dashboard: TestClient) -> None:

@@ -8,12 +8,13 @@ from fastapi import Depends, Header, Path, Query, Request
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
+from app.api.access import caller_of
 from app.db.idempotency import carry_out_once
 from app.db.session import Database
 from app.errors import MediaTypeError
 from app.fleet.control import Asker
 from app.live.link import Live as LiveLink
-from app.settings import Settings, is_loopback
+from app.settings import Settings
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -69,7 +70,7 @@ async def _asker(request: Request, settings: CurrentSettings, token: ControlToke
     """No script in a page can set Sec-Fetch-Site: browsers do."""
     return Asker(
         token=token,
-        on_loopback=is_loopback(settings.host),
+        caller=caller_of(request),
         from_our_page=request.headers.get("sec-fetch-site") == "same-origin",
         simulation_hosts=settings.simulation_hosts,
     )

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.api.deps import CurrentDatabase, Id
+from app.access import Act, is_allowed
+from app.api.deps import Asking, CurrentDatabase, Id
 from app.api.figures import FigureCard, Theme, figure_card
 from app.campaigns import landscapes
 
@@ -14,17 +15,19 @@ router = APIRouter(prefix="/api", tags=["figures"])
 @router.get("/campaigns/{campaign_id}/figures/landscape")
 def get_landscape(
     database: CurrentDatabase,
+    asking: Asking,
     campaign_id: Id,
     theme: Theme = "light",
     stacked: Annotated[bool, Query(description="slices one below the other, for a narrow page")] = False,
 ) -> FigureCard:
     """The gains as a path over the error that the strategy's model predicts, two gains at a time.
 
-    A job computes it for each proposal, started when it is first asked for; until that is done the card is `waiting`.
+    A job computes it for each proposal, started when somebody who may change things first asks for it; until that is
+    done the card is `waiting`.
     """
     with database.read() as session:
         asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
-    if asked.wanted:
+    if asked.wanted and is_allowed(Act.CHANGE, asking.caller):
         with database.write() as session:
             landscapes.request_landscape(session, campaign_id)
     return figure_card(asked.card)

@@ -68,6 +68,18 @@ class Upload:
     companion: BinaryIO | None
     once: Once
 
+    def content(self) -> bytes:
+        """All of the file, which the limit on bodies has bounded."""
+        self.file.seek(0)
+        return self.file.read()
+
+    def beside(self) -> bytes | None:
+        """All of the companion, if there is one."""
+        if self.companion is None:
+            return None
+        self.companion.seek(0)
+        return self.companion.read()
+
 
 @dataclass(frozen=True, slots=True)
 class _Arrived:

@@ -25,7 +25,13 @@ from app.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.trials.photos import media_type_of
 
 MAX_PARTS: Final = 20_000
+MAX_DIRECTORY_BYTES: Final = 4 * 2**20
+"""Of the zip's own list of its parts."""
+MAX_MANIFEST_BYTES: Final = 4 * 2**20
+"""So many parts with their names and digests need less."""
 MAX_JSON_BYTES: Final = 64 * 2**20
+MAX_VALUES: Final = 2_000_000
+"""In one JSON part: each takes some hundred times the room of the two bytes that it may be written with."""
 MAX_PART_BYTES: Final = 256 * 2**20
 MAX_TOTAL_BYTES: Final = 4 * 2**30
 MAX_NUMBERS: Final = 20_000_000
@@ -60,17 +66,33 @@ class _Unpacked:
         self._file.close()
 
 
+class _Opening:
+    """A file as `zipfile` reads it: while it is opened, never more at once than the directory may take."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.seek, self.tell, self.seekable = file.seek, file.tell, file.seekable
+        self.is_open = False
+
+    def read(self, size: int = -1) -> bytes:
+        if not self.is_open and size > MAX_DIRECTORY_BYTES:
+            raise ValueError(f"its directory takes more than {MAX_DIRECTORY_BYTES / 2**20:g} MiB")
+        return self._file.read(size)
+
+
 class Bundle:
     """An opened bundle whose manifest and contents were read; `check` looks at everything else, and unpacks it."""
 
     def __init__(self, file: BinaryIO) -> None:
         """Raises InputError naming what is wrong with it."""
+        opening = _Opening(file)
         try:
-            self._zip = zipfile.ZipFile(file)
+            self._zip = zipfile.ZipFile(opening)
+            opening.is_open = True
         except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
             _refuse("file", f"is no zip file: {error}")
         self._look_at_directory()
-        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_JSON_BYTES), Manifest, look=_version)
+        self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest, look=_version)
         listed = self.manifest.parts.keys() | {MANIFEST}
         if odd := sorted(listed ^ set(self._zip.namelist())):
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip are not the same: {odd[0][:80]!r}")
@@ -215,6 +237,8 @@ def _version(document: object) -> None:
 
 
 def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], None] | None = None) -> M:
+    if (values := sum(map(data.count, (b",", b"[", b"{")))) > MAX_VALUES:
+        _refuse(name, f"holds some {values / 1e6:.0f} million values; {MAX_VALUES / 1e6:g} million are the most")
     try:
         document: Any = json.loads(data, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:

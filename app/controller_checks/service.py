@@ -1,19 +1,23 @@
 """What people do with controller checks: have a recording checked, read what came of it, remove it."""
 
+from collections.abc import Mapping
+from io import BytesIO
 from pathlib import PurePath
-from typing import BinaryIO, Final
+from typing import Final
 
 from sqlalchemy.orm import Session
 
 from app.controller_checks import repository, schemas
 from app.controller_checks.checking import check_recording, check_trace, parse_gains
 from app.controller_checks.results import FIGURES, Result, result_from_json, result_of
+from app.core.control_characters import without_control_characters
 from app.db.models import ControllerCheckRow
 from app.db.paging import decode_cursor, encode_cursor
 from app.errors import NotFoundError, StorageError
 from app.figures.base import Card, card_of
 from app.figures.controller import ControllerFigure
 from app.figures.theme import ThemeName
+from app.limited import FILE, run_limited
 from app.logs.loop_trace import read_loop_trace
 from app.schemas import Page
 from app.studies.controller import RECORDED_TAKEOFF
@@ -22,10 +26,16 @@ _NAME_LENGTH: Final = 120
 _UNNAMED: Final = "recording"
 
 
-def examine(stream: BinaryIO, *, name: str, companion: BinaryIO | None, gains: str | None) -> Result:
-    """Hold a recording against the replica; nothing is stored yet. Raises InputError naming what is wrong with it."""
+def examine(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
+    """Hold a recording that somebody has sent against the replica, in a process with limits; nothing is stored yet.
+    Raises InputError naming what is wrong with it."""
     given = None if gains is None else parse_gains(gains)
-    return result_of(check_recording(stream, name=named(name), companion=companion, given=given))
+    return run_limited(FILE, _examine, content, named(name), companion, given)
+
+
+def _examine(content: bytes, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
+    beside = None if companion is None else BytesIO(companion)
+    return result_of(check_recording(BytesIO(content), name=name, companion=beside, given=given))
 
 
 def examine_example() -> Result:
@@ -81,8 +91,8 @@ def delete_check(session: Session, check_id: int) -> None:
 
 
 def named(name: str) -> str:
-    """The name of an uploaded file, short and without folders."""
-    return PurePath(name.replace("\\", "/")).name.strip()[:_NAME_LENGTH] or _UNNAMED
+    """The name of an uploaded file, short, without folders and without what moves a terminal's cursor."""
+    return without_control_characters(PurePath(name.replace("\\", "/")).name).strip()[:_NAME_LENGTH] or _UNNAMED
 
 
 def _result(row: ControllerCheckRow) -> Result:

@@ -35,6 +35,16 @@ class GainlineError(Exception):
             (self.message, *(f"{p.field}: {p.reason.removesuffix('.')}." for p in self.problems), self.hint)
         )
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """For the way between processes: an exception's own is to be made of its message alone."""
+        return _made_again, (type(self), self.args, self.__dict__)
+
+
+def _made_again(kind: type[GainlineError], args: tuple[object, ...], state: dict[str, object]) -> GainlineError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
+
 
 class InputError(GainlineError):
     """Something that came in from outside cannot be used; `problems` names the fields."""

@@ -16,12 +16,13 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.access import Act
 from app.core.policy import Gains
 from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.errors import ConflictError
 from app.fleet import repository
-from app.fleet.control import Asker, record_act, require_near, require_no_other
+from app.fleet.control import Asker, record_act, require_may, require_may_command, require_no_other
 from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, move_vehicle, require_idle
@@ -67,13 +68,18 @@ class ActTask:
 
 def ask_vehicle(session: Session, vehicle_id: int, kind: ActKind, asker: Asker) -> VehicleAct:
     """What a person asks. Raises ConflictError in states in which it is not possible or while somebody else is in
-    control, BusyError while something else is under way, NotAllowedError for a real vehicle on an exposed server."""
+    control, BusyError while something else is under way, NotAllowedError for who may not command it."""
     row = repository.get_one(session, vehicle_id)
     if not row.registered:
         raise ConflictError(
             f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, in one go."
         )
     return act_view(_requested(session, row, kind, asker))
+
+
+def require_may_stop_motors(session: Session, vehicle_id: int, asker: Asker) -> None:
+    """Raises NotAllowedError for who may not command a real vehicle, NotFoundError."""
+    require_may(Act.STOP, repository.get_one(session, vehicle_id), asker)
 
 
 def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: Asker) -> Vehicle:
@@ -93,8 +99,10 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: As
 
 def _requested(session: Session, row: VehicleRow, kind: ActKind, asker: Asker, *, reason: str = "") -> VehicleActRow:
     check_action(ACTIONS, kind, row.state, row.name)
-    if kind != ActKind.DISCONNECT:
-        require_near(row, asker)
+    if kind == ActKind.DISCONNECT:
+        require_may(Act.STOP, row, asker)
+    else:
+        require_may_command(row, asker)
     by = "" if kind in _LOOKS_ONLY else require_no_other(row, asker)
     require_idle(session, row)
     if kind in {ActKind.CONNECT, ActKind.DISCONNECT}:
@@ -162,26 +170,20 @@ def forget_connections(session: Session) -> None:
         move_vehicle(row, VehicleState.DISCONNECTED)
 
 
-def request_reconnections(session: Session, *, real: bool = True) -> list[int]:
-    """At a worker's start: the acts that connect again those vehicles that were wanted connected. Gives their ids.
-    `real`: whether real ones may be, which they may only for a server that nobody else reaches."""
-    return [_add(session, row, ActKind.CONNECT, by=BY_WORKER).id for row in _wanted(session, real=real)]
+def request_reconnections(session: Session) -> list[int]:
+    """At a worker's start: the acts that connect again those vehicles that were wanted connected. Gives their ids."""
+    return [_add(session, row, ActKind.CONNECT, by=BY_WORKER).id for row in _wanted(session)]
 
 
-def wanted_links(session: Session, *, real: bool = True) -> list[LinkedVehicle]:
-    """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it.
-    `real` as in `request_reconnections`."""
-    rows = _wanted(session, real=real)
+def wanted_links(session: Session) -> list[LinkedVehicle]:
+    """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it."""
+    rows = _wanted(session)
     return [_linked(row) for row in rows if repository.flight_under_way(session, row.id) is None]
 
 
-def _wanted(session: Session, *, real: bool) -> list[VehicleRow]:
+def _wanted(session: Session) -> list[VehicleRow]:
     rows = repository.registered_in(session, VehicleState.DISCONNECTED, VehicleState.QUARANTINED)
-    return [
-        row
-        for row in rows
-        if row.wanted_connected and (real or not row.is_real) and repository.act_under_way(session, row.id) is None
-    ]
+    return [row for row in rows if row.wanted_connected and repository.act_under_way(session, row.id) is None]
 
 
 def vehicle_found(

@@ -13,6 +13,7 @@ from typing import Final
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
+from app.access import COMMAND_LINE, Act, Caller, require
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.errors import ConflictError, NotAllowedError
@@ -26,11 +27,11 @@ LEASE: Final = timedelta(seconds=15)
 
 @dataclass(frozen=True, slots=True)
 class Asker:
-    """Where a request comes from: the lease's token that it carries, whether the server that took it is reached from
-    this computer only, whether a page of ours sent it, and the hosts that the administrator says simulate vehicles."""
+    """Where a request comes from: the lease's token that it carries, who sent it and from where, whether a page of ours
+    did, and the hosts that the administrator says simulate vehicles."""
 
     token: str | None = None
-    on_loopback: bool = True
+    caller: Caller = COMMAND_LINE
     from_our_page: bool = False
     simulation_hosts: frozenset[str] = frozenset()
 
@@ -46,12 +47,14 @@ def control_of(row: VehicleRow) -> Control | None:
     return Control(operator=row.operator, until=row.operator_until)
 
 
-def take_control(session: Session, vehicle_id: int, asked: LeaseRequest) -> Lease:
+def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, asker: Asker) -> Lease:
     """A new lease, or the same one renewed by its token; with `take_over` also somebody else's, which an act records.
 
-    Raises ConflictError naming who is in control, or saying that the token's lease is no longer there.
+    Raises ConflictError naming who is in control, or saying that the token's lease is no longer there; NotAllowedError
+    for who may not command the vehicle.
     """
     row = repository.get_one(session, vehicle_id)
+    require_may_command(row, asker)
     if asked.token is not None and holds(row, asked.token):
         return _granted(session, row, asked.operator, asked.token)
     held = control_of(row)
@@ -97,9 +100,9 @@ def require_no_other(row: VehicleRow, asker: Asker) -> str:
 
 
 def require_control(row: VehicleRow, asker: Asker) -> str:
-    """The operator in control, who asks from a page of ours on this computer: the only one who may have a real vehicle
-    take off. Raises NotAllowedError or ConflictError otherwise."""
-    require_near(row, asker)
+    """The operator in control, who asks from a page of ours in an unlocked browser on this computer: the only one who
+    may have a real vehicle take off. Raises NotAllowedError or ConflictError otherwise."""
+    require(Act.TAKE_OFF, asker.caller, row.name)
     if not asker.from_our_page:
         raise NotAllowedError(
             f"{row.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
@@ -111,19 +114,16 @@ def require_control(row: VehicleRow, asker: Asker) -> str:
     return operator
 
 
-def require_near(row: VehicleRow, asker: Asker) -> None:
-    """Raises NotAllowedError when a real vehicle is asked something over a server that others can reach."""
-    if row.is_real:
-        refuse_real(row.name, asker)
+def require_may_command(row: VehicleRow, asker: Asker) -> None:
+    """Raises NotAllowedError for who may not command a vehicle that has a link; simulations without one are for all."""
+    if row.registered:
+        require(Act.REAL if row.is_real else Act.LINK, asker.caller, row.name)
 
 
-def refuse_real(name: str, asker: Asker) -> None:
-    """Raises NotAllowedError unless the server listens on loopback."""
-    if not asker.on_loopback:
-        raise NotAllowedError(
-            f"{name} is a real vehicle, and this server can be reached over the network, where it has no accounts yet.",
-            hint="Start the server with --host 127.0.0.1 on the computer that is linked to the vehicle.",
-        )
+def require_may(act: Act, row: VehicleRow, asker: Asker) -> None:
+    """Raises NotAllowedError for who may not do this with a real vehicle that has a link; any other is for all."""
+    if row.registered and row.is_real:
+        require(act, asker.caller, row.name)
 
 
 def record_act(

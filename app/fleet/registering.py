@@ -4,12 +4,13 @@ from collections.abc import Mapping
 
 from sqlalchemy.orm import Session
 
+from app.access import Act, require
 from app.core.experiments import get_experiment
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
 from app.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.fleet import repository
-from app.fleet.control import Asker, record_act, refuse_real, require_near, require_no_other
+from app.fleet.control import Asker, record_act, require_may_command, require_no_other
 from app.fleet.kinds import is_registered_one_by_one, settings_of
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
@@ -25,7 +26,7 @@ def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle
     """A vehicle of its own, not connected yet.
 
     Raises InputError naming what cannot be used, ConflictError when the name is taken, UnconfirmedError when nobody has
-    looked at a real vehicle's safe gains, NotAllowedError for a real one on an exposed server.
+    looked at a real vehicle's safe gains, NotAllowedError for who may not command it.
     """
     kind = get_kind(new.kind, field="kind")
     if not is_registered_one_by_one(kind):
@@ -34,13 +35,14 @@ def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle
             hint=f"Create a campaign with the vehicle {kind.name}.",
             problems=(Problem("kind", "has no vehicles of its own"),),
         )
+    require(Act.LINK, asker.caller, new.name)
     options = kind.check(new.options, field="options", simulation_hosts=asker.simulation_hosts)
     is_real = kind.is_real_with(options, asker.simulation_hosts)
     space = _space(kind, options, new.safe_gains)
     gains = space.check(new.safe_gains, field="safe_gains") if new.safe_gains else space.mapping(space.default)
     _require_free(session, new.name)
     if is_real:
-        refuse_real(new.name, asker)
+        require(Act.REAL, asker.caller, new.name)
         _require_confirmed(new, gains)
     row = VehicleRow(
         kind=kind.name,
@@ -60,11 +62,11 @@ def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle
 
 def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: Asker) -> Vehicle:
     """Raises ConflictError when somebody else was faster or is in control, or the vehicle is not at rest; InputError
-    naming what cannot be used, NotAllowedError for a real vehicle on an exposed server."""
+    naming what cannot be used, NotAllowedError for who may not command the vehicle."""
     row = repository.get_one(session, vehicle_id)
     check_version(edit.version, row.version, row.name, _differences(row, edit))
     _require_own(row)
-    require_near(row, asker)
+    require_may_command(row, asker)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     by = require_no_other(row, asker)
@@ -89,7 +91,7 @@ def promote_gains(
     """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
     check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
     _require_own(row)
-    require_near(row, asker)
+    require_may_command(row, asker)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     _set_safe_gains(session, row, gains, statement=reason, by=require_no_other(row, asker))

@@ -3,8 +3,11 @@
 from typing import Final, Literal
 
 from fastapi import APIRouter, Depends, status
+from starlette.concurrency import run_in_threadpool
 
-from app.api.deps import Act, Asking, CursorText, Id, Limit, Live, Reader, Writer, json_only
+from app import access
+from app.access import is_allowed
+from app.api.deps import Act, Asking, CurrentDatabase, CursorText, Id, Limit, Live, Reader, Writer, json_only
 from app.campaigns import service as campaigns
 from app.fleet import acts, control, registering, service, views
 from app.fleet.schemas import (
@@ -102,9 +105,19 @@ async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = N
 
 
 @router.post("/{vehicle_id}/motors-off", status_code=status.HTTP_202_ACCEPTED)
-async def stop_motors(live: Live, vehicle_id: Id, body: VehicleOrder | None = None) -> OrderAnswer:
-    """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage."""
+async def stop_motors(
+    live: Live, database: CurrentDatabase, asking: Asking, vehicle_id: Id, body: VehicleOrder | None = None
+) -> OrderAnswer:
+    """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage,
+    unless whoever asks may not command real vehicles: then the database says whether it is one."""
+    if not is_allowed(access.Act.STOP, asking.caller):
+        await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The vehicle is told to stop its motors.")
+
+
+def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: Asking) -> None:
+    with database.read() as session:
+        acts.require_may_stop_motors(session, vehicle_id, asking)
 
 
 async def _order(
@@ -123,9 +136,9 @@ def release_vehicle(act: Act, asking: Asking, vehicle_id: Id, body: Release) -> 
 
 
 @router.put("/{vehicle_id}/control")
-def take_control(session: Writer, vehicle_id: Id, body: LeaseRequest) -> Lease:
+def take_control(session: Writer, asking: Asking, vehicle_id: Id, body: LeaseRequest) -> Lease:
     """Take control for 15 s, or renew it with one's token; a take-over from somebody else is recorded as an act."""
-    return control.take_control(session, vehicle_id, body)
+    return control.take_control(session, vehicle_id, body, asking)
 
 
 @router.delete("/{vehicle_id}/control", status_code=status.HTTP_204_NO_CONTENT)

@@ -68,7 +68,7 @@ class SessionDeck:
         *,
         worker: str,
         closing: threading.Event,
-        real: bool = True,
+        links: bool = True,
         clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
@@ -77,7 +77,7 @@ class SessionDeck:
         self._publish = publish
         self._worker = worker
         self._closing = closing
-        self._real = real
+        self._links = links
         self._clock = clock
         self._berths: dict[int, Berth] = {}
         self._look_due_s = 0.0
@@ -89,7 +89,8 @@ class SessionDeck:
         with self._database.write() as transaction:
             acts.withdraw_acts(transaction)
             acts.forget_connections(transaction)
-            acts.request_reconnections(transaction, real=self._real)
+            if self._links:
+                acts.request_reconnections(transaction)
 
     def close(self) -> None:
         """When nothing is carried out any more: every vehicle is let go, with its safe gains."""
@@ -194,11 +195,11 @@ class SessionDeck:
         for vehicle_id, berth in tuple(self._berths.items()):
             if (session := berth.session) is not None and not session.alive:
                 self._let_go(vehicle_id, berth, session)
-        if self._clock.now_s() < self._look_due_s:
+        if not self._links or self._clock.now_s() < self._look_due_s:
             return
         self._look_due_s = self._clock.now_s() + LOOK_FOR_LINKS_EVERY_S
         with self._database.read() as transaction:
-            wanted = acts.wanted_links(transaction, real=self._real)
+            wanted = acts.wanted_links(transaction)
         for vehicle in wanted:
             self._look_for(vehicle)
 

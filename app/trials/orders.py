@@ -15,7 +15,7 @@ from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
 from app.errors import ConflictError, NotAllowedError
 from app.fleet import service as fleet
-from app.fleet.control import Asker, require_control, require_near, require_no_other
+from app.fleet.control import Asker, require_control, require_may_command, require_no_other
 from app.moves import check_action
 from app.trials import history, repository
 from app.trials.judging import judge_gains
@@ -45,7 +45,7 @@ def fly_trial(session: Session, trial_id: int, order: FlightOrder, asker: Asker)
 def stage_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
     """Have a registered vehicle take the gains of a planned trial, and wait with them for its operator's word.
 
-    Raises as `fly_trial` does; NotAllowedError for a real vehicle on a server that others can reach."""
+    Raises as `fly_trial` does; NotAllowedError for who may not command the vehicle."""
     return _asked_for(session, trial_id, "stage", None, asker)
 
 
@@ -73,7 +73,7 @@ def request_flight(
     vehicle = campaign.vehicle
     if mode == "stage" and not vehicle.registered:
         raise ConflictError(f"{vehicle.name} is flown in one go.", hint="Fly it; only registered vehicles are staged.")
-    require_near(vehicle, asker)
+    require_may_command(vehicle, asker)
     if mode == "fly" and fleet.needs_staging(vehicle):
         raise NotAllowedError(
             f"{vehicle.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
@@ -102,7 +102,7 @@ def request_flight(
 
 def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
     """The operator's own act, after which a staged vehicle takes off. For a real one it has to come from a page of
-    ours, with the token of who is in control, on a server that nobody else reaches.
+    ours in an unlocked browser on this computer, with the token of who is in control.
 
     Raises ConflictError when nothing is staged, the word was given already, somebody else is in control, or the
     rehearsal does not stand any more; NotAllowedError otherwise.
@@ -117,6 +117,7 @@ def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
         require_control(vehicle, asker)
         rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may have been found bad while staged
     else:
+        require_may_command(vehicle, asker)
         require_no_other(vehicle, asker)
     flight.take_off_at = utc_now()
     return trial_view(session, campaign, row)

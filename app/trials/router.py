@@ -122,9 +122,9 @@ def cancel_trial(act: Act, trial_id: Id) -> Trial:
 
 
 @router.post("/trials/{trial_id}/classify")
-def classify_trial(act: Act, trial_id: Id, body: Classification) -> Trial:
+def classify_trial(act: Act, asking: Asking, trial_id: Id, body: Classification) -> Trial:
     """Say what a finished flight is worth; whatever was computed from it is computed again."""
-    return act(Trial, lambda session: service.classify_trial(session, trial_id, body))
+    return act(Trial, lambda session: service.classify_trial(session, trial_id, body, asking))
 
 
 @router.post("/trials/{trial_id}/judge-abort")
@@ -225,7 +225,7 @@ def upload_trajectory(
     which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
     and optionally the other channels, at most 200 000 rows. It is scored and classed at once.
     """
-    flown = service.read_record(record.file, name=record.name, takeoff=takeoff, companion=record.companion)
+    flown = service.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.beside())
     return record.once(Trial, lambda session: service.import_record(session, trial_id, flown, confirmed=confirm))
 
 

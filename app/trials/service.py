@@ -2,12 +2,14 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.access import Act
 from app.campaigns import proposing
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
@@ -21,7 +23,8 @@ from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import ConflictError, NotFoundError
 from app.fleet import service as fleet
-from app.fleet.control import NOBODY, Asker
+from app.fleet.control import NOBODY, Asker, require_may
+from app.limited import FILE, run_limited
 from app.logs.takeoffs import Takeoff
 from app.moves import check_action, check_move, check_version
 from app.schemas import Page
@@ -58,9 +61,11 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Asker
     """Plan a trial and, with `fly`, ask for its flight.
 
     Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
-    ready; GainsError naming what the gate refuses, unless that is overruled; and what `fly_trial` raises.
+    ready; GainsError naming what the gate refuses, unless that is overruled; NotAllowedError for who may not command a
+    real vehicle; and what `fly_trial` raises.
     """
     campaign = campaigns.get_row(session, campaign_id)
+    require_may(Act.REVIEW, campaign.vehicle, asker)
     require_open(session, campaign, IN_BUDGET)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
@@ -102,13 +107,14 @@ def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     return _seen(session, row)
 
 
-def classify_trial(session: Session, trial_id: int, said: Classification) -> Trial:
+def classify_trial(session: Session, trial_id: int, said: Classification, asker: Asker = NOBODY) -> Trial:
     """A person's word on a flight; the next gains are computed again from what counts now.
 
     Raises ConflictError when the states' table does not lead there or somebody else was faster, InputError when a
-    flight without a usable record is to count.
+    flight without a usable record is to count, NotAllowedError for who may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
+    require_may(Act.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, asker)
     outcome = TrialState(said.outcome)
     check_version(
         said.version,
@@ -157,6 +163,16 @@ def read_record(
     from app.logs.readers import read_takeoff  # noqa: PLC0415 - every reader there is
 
     return read_takeoff(stream, name=name, number=takeoff, companion=companion)
+
+
+def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
+    """The same of a file that somebody has sent: in a process with limits. Raises InputError when it passes them."""
+    return run_limited(FILE, _read_content, content, name, takeoff, companion)
+
+
+def _read_content(content: bytes, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
+    beside = None if companion is None else BytesIO(companion)
+    return read_record(BytesIO(content), name=name, takeoff=takeoff, companion=beside)
 
 
 def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed: bool = False) -> Trial:

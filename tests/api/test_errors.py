@@ -17,6 +17,7 @@ from app.main import create_app
 from app.settings import Settings
 from tests.builders import create_campaign, create_ready_campaign, get, problems_of
 from tests.conftest import Listen
+from tests.unlocking import client_here
 
 CAMPAIGN = "/api/campaigns"
 
@@ -227,7 +228,7 @@ def test_a_full_disk_outside_of_the_database_is_503_too(settings: Settings) -> N
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as client:
+    with client_here(application) as client:
         answer = client.get("/api/full")
     assert (answer.status_code, is_problem(answer)) == (503, True)
 
@@ -239,7 +240,7 @@ def test_a_mistake_of_ours_is_500_with_a_number(settings: Settings) -> None:
     def mistake() -> None:
         raise ZeroDivisionError
 
-    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as client:
+    with client_here(application) as client:
         answer = client.get("/api/mistake")
     assert (answer.status_code, is_problem(answer)) == (500, True)
     assert "ZeroDivisionError" not in answer.text

@@ -16,6 +16,7 @@ from fastapi.testclient import TestClient
 from app.db.session import Database
 from app.main import create_app
 from app.settings import Settings
+from tests.unlocking import client_here
 
 
 @contextmanager
@@ -24,7 +25,7 @@ def another_installation(folder: Path, migrated_file: Path) -> Iterator[tuple[Te
     settings.data_dir.mkdir(parents=True)
     shutil.copyfile(migrated_file, settings.database_file)
     application = create_app(settings)
-    with TestClient(application, base_url="http://127.0.0.1:8000", raise_server_exceptions=False) as client:
+    with client_here(application) as client:
         yield client, application.state.database
 
 

@@ -2,6 +2,7 @@
 
 import json
 import struct
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from io import BytesIO
@@ -128,6 +129,44 @@ def test_a_bomb_in_the_zip_is_refused_before_it_goes_off(
     assert found["contents.json"] == "is larger than 1 MiB"
     monkeypatch.setattr(reading, "MAX_TOTAL_BYTES", 2**21)
     assert "unpack" in refused(client, database, sealed({**parts, "contents.json": b" " * 2**22}))["file"]
+
+
+def peak_bytes(work: Callable[[], object]) -> int:
+    """The most that Python held meanwhile beyond what it holds now."""
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        work()
+        return tracemalloc.get_traced_memory()[1] - before
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "contents.json"])
+@pytest.mark.parametrize("value", ["[]", '{"a":0}', "0"])
+def test_a_small_bundle_of_many_values_stays_small_in_memory(
+    client: TestClient, database: Database, parts: Parts, name: str, value: str
+) -> None:
+    """It took 1.3 GB for 60 KiB."""
+    many = "[" + ",".join([value] * (60 * 2**20 // (len(value) + 1))) + "]"
+    hostile = {**parts, name: many.encode()}
+    bundle = zipped(hostile) if name == "manifest.json" else sealed(hostile)
+    assert len(bundle) < 2**18
+    found: dict[str, str] = {}
+    peak = peak_bytes(lambda: found.update(refused(client, database, bundle)))
+    assert peak < 250 * 2**20
+    assert found[name] == "is larger than 4 MiB" or "million values" in found[name]
+
+
+def test_a_directory_without_end_is_not_read(client: TestClient, database: Database) -> None:
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w") as out:
+        for number in range(70_000):
+            out.writestr(f"records/{number:040}.zst", b"")
+    found: dict[str, str] = {}
+    peak = peak_bytes(lambda: found.update(refused(client, database, file.getvalue())))
+    assert "directory takes more than 4 MiB" in found["file"]
+    assert peak < 50 * 2**20
 
 
 def test_a_part_that_lies_about_its_size_is_bounded(client: TestClient, database: Database, parts: Parts) -> None:

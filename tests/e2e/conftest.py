@@ -22,6 +22,7 @@ from playwright.sync_api import Browser, BrowserContext, Error, Page, expect, sy
 from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport
 from tests.e2e.states import States
 from tests.runtime.processes import wait_for
+from tests.unlocking import new_link
 
 HERE = Path(__file__).parent
 BUILT = HERE.parents[1] / "frontend" / "dist" / "index.html"
@@ -39,6 +40,8 @@ EVERYDAY = {
     "test_pages.py::test_the_ui_stays_light_before_its_charts",
 }
 """What `./dev test` runs of the browser tests; all others belong to the complete ring."""
+DATA_DIRS: dict[str, Path] = {}
+"""Of the servers that were started, by address."""
 T = TypeVar("T")
 
 
@@ -136,6 +139,7 @@ class Server:
             time.sleep(0.05)
         self.url = found.group()
         self._port = urlsplit(self.url).port or 0
+        DATA_DIRS[self.url] = self.data_dir
         if "--no-worker" not in self._options:
             wait_for("the worker", self._works)  # what is asked for before is withdrawn
 
@@ -249,8 +253,13 @@ class Tabs:
             self._contexts.pop(url).close()
 
 
-def new_context(browser: Browser, url: str) -> BrowserContext:
-    return browser.new_context(base_url=url, viewport=TABLET, accept_downloads=True, reduced_motion="reduce")
+def new_context(browser: Browser, url: str, *, unlocked: bool = True) -> BrowserContext:
+    """A browser profile of its own; whoever sits before it has opened a link of `gainline unlock`."""
+    context = browser.new_context(base_url=url, viewport=TABLET, accept_downloads=True, reduced_motion="reduce")
+    if unlocked and url in DATA_DIRS:
+        opened = context.request.get(new_link(DATA_DIRS[url]), max_redirects=0)
+        assert opened.status == 303, opened.text()
+    return context
 
 
 @pytest.fixture(scope="module")
@@ -262,26 +271,32 @@ def tabs(browser: Browser) -> Tabs:
 def open_dashboard(browser: Browser, tabs: Tabs) -> Iterator[Opener]:
     """Opens a dashboard in a tab whose store is empty; afterwards nothing must have gone wrong in any of them.
 
-    With `alone` the tab has a browser profile of its own: for tests that put scripts or a clock of their own into
-    their pages, take the browser's network away, or look at what it fetches. So has one of a server of one's own.
+    Without `unlocked` nobody has opened a link of `gainline unlock` in it. With `alone` the tab has a browser profile
+    of its own: for tests that put scripts or a clock of their own into their pages, take the browser's network away, or
+    look at what it fetches. So has one of a server of one's own.
     """
     tabs.wrong.clear()
     taken: list[tuple[str, Page]] = []
     with ExitStack() as stack:
 
-        def own(url: str) -> Page:
-            context = new_context(browser, url)
+        def own(url: str, *, unlocked: bool) -> Page:
+            context = new_context(browser, url, unlocked=unlocked)
             stack.callback(context.close)
             page = context.new_page()
             watch(page, url, tabs.wrong)
             return page
 
         def open_one(
-            url: str, *, theme: Theme = "light", viewport: Viewport = TABLET, alone: bool = False
+            url: str,
+            *,
+            theme: Theme = "light",
+            viewport: Viewport = TABLET,
+            alone: bool = False,
+            unlocked: bool = True,
         ) -> Dashboard:
             shared = STARTED.begun("server", Server)
-            if alone or shared is None or url != shared.url:
-                page = own(url)
+            if alone or not unlocked or shared is None or url != shared.url:
+                page = own(url, unlocked=unlocked)
             else:
                 page = tabs.take(url)
                 taken.append((url, page))

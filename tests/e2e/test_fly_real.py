@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
-from tests.e2e.conftest import Opener, Server
+from tests.e2e.conftest import Opener, Server, new_context
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard
 from tests.e2e.flying_by_hand import (
     DRONE_SPEED,
@@ -36,7 +36,7 @@ from tests.runtime.drones import SAFE, TRIED, Drone
 def vehicle_id(shared_server: Server, states: States, browser: Browser) -> Iterator[int]:
     """A drone on loopback, registered as REAL and connected."""
     states.clear()
-    with Drone(speed=DRONE_SPEED) as drone, browser.new_context(base_url=shared_server.url) as context:
+    with Drone(speed=DRONE_SPEED) as drone, new_context(browser, shared_server.url) as context:
         office = Dashboard(context.new_page(), shared_server.url)
         vehicle = register(office, drone)
         yield vehicle

@@ -1,5 +1,6 @@
 """What a registered vehicle is asked beside its flights: when it may be, once at a time, and what comes of it."""
 
+import threading
 from datetime import timedelta
 
 import pytest
@@ -10,8 +11,10 @@ from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
 from app.fleet.states import ActKind, VehicleState
+from app.fleet.tasks import SessionDeck
 from app.main import create_app
 from app.settings import Settings
+from app.trials.flying import Airspace
 from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
 from tests.fleet.vehicles import (
@@ -26,6 +29,7 @@ from tests.fleet.vehicles import (
     register,
     seen,
 )
+from tests.unlocking import HERE, unlock
 
 # What the domain allows, written apart from the program's table.
 POSSIBLE = {
@@ -269,7 +273,7 @@ def test_a_connection_that_a_person_asked_for_and_that_failed_is_not_tried_again
         assert acts.request_reconnections(session) == []
 
 
-def test_a_real_vehicle_is_asked_nothing_but_to_be_let_go_over_a_server_that_others_reach(
+def test_a_vehicle_with_a_link_is_asked_nothing_but_to_be_let_go_over_a_server_that_others_reach(
     settings: Settings, client: TestClient, database: Database
 ) -> None:
     met, doubted = create_connected(client, database, "Real", real=True), register(client, "Doubted", real=True)
@@ -278,28 +282,40 @@ def test_a_real_vehicle_is_asked_nothing_but_to_be_let_go_over_a_server_that_oth
     asked = [(register(client, "Away", real=True), "connect", {}), (doubted, "release", {"statement": "seen by Ada"})]
     asked += [(met, kind, {}) for kind in ("check", "restore", "parameters")]
     exposed = settings.model_copy(update={"host": "0.0.0.0"})
-    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000") as network:
+    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000", client=HERE) as network:
         for vehicle, kind, body in asked:
             refused = network.post(f"/api/vehicles/{vehicle['id']}/{kind}", json=body)
             assert refused.status_code == 403, kind
             assert "is a real vehicle, and this server can be reached over the network" in refused.json()["detail"]
         edit = {"version": met["version"], "safe_gains": {"kp": 300, "ki": 13, "kd": 82}, "statement": "Ada says so"}
         assert network.patch(f"/api/vehicles/{met['id']}", json=edit).status_code == 403
+        assert network.post(f"/api/vehicles/{met['id']}/disconnect").status_code == 403
+        unlock(network)
         assert network.post(f"/api/vehicles/{met['id']}/disconnect").status_code == 202
-        assert network.post(f"/api/vehicles/{simulated['id']}/connect").status_code == 202
+        refused = network.post(f"/api/vehicles/{simulated['id']}/connect")
+        assert (refused.status_code, "is flown over a link" in refused.json()["detail"]) == (403, True)
 
 
-def test_a_worker_beside_a_server_that_others_reach_connects_no_real_vehicle_again(
-    client: TestClient, database: Database
+@pytest.mark.parametrize("links", [False, True])
+def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
+    client: TestClient, database: Database, settings: Settings, links: bool
 ) -> None:
-    simulated = create_connected(client, database, "Simulated")
-    create_connected(client, database, "Real", real=True)
-    with database.write() as session:
-        acts.forget_connections(session)
-        assert [link.name for link in acts.wanted_links(session, real=False)] == ["Simulated"]
-        assert [link.name for link in acts.wanted_links(session)] == ["Simulated", "Real"]
-        assert len(acts.request_reconnections(session, real=False)) == 1
-    assert newest(client, simulated)["by"] == "the worker"
+    vehicles = [create_connected(client, database, name, real=name == "Real") for name in ("Simulated", "Real")]
+    before = [newest(client, vehicle)["id"] for vehicle in vehicles]
+    deck = SessionDeck(
+        database,
+        settings.data_dir,
+        Airspace(),
+        lambda _shown: None,
+        worker=WORKER,
+        closing=threading.Event(),
+        links=links,
+    )
+    deck.recover()
+    deck.tend()
+    deck.close()
+    after = [newest(client, vehicle)["id"] for vehicle in vehicles]
+    assert [now != known for now, known in zip(after, before, strict=True)] == [links, links]
 
 
 def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(

@@ -19,6 +19,7 @@ from tests.fleet.vehicles import (
     register,
     seen,
 )
+from tests.unlocking import HERE, unlock
 
 
 def test_a_registered_vehicle_has_settings_of_its_own_and_is_not_connected(client: TestClient) -> None:
@@ -54,12 +55,13 @@ def test_a_vehicle_is_real_unless_it_is_registered_as_simulated_on_this_computer
     assert refused.status_code == 422
     assert "not believed" in problems_of(refused)["options.simulated"]
     named = settings.model_copy(update={"simulation_hosts": frozenset({"10.1.2.3"})})
-    with TestClient(create_app(named), base_url="http://127.0.0.1:8000") as informed:
+    with TestClient(create_app(named), base_url="http://127.0.0.1:8000", client=HERE) as informed:
         assert not register(informed, "B", options=far)["is_real"]
         assert register(informed, "C", real=True, options={**far, "simulated": False})["is_real"]
 
 
 def test_a_person_has_looked_at_a_real_vehicles_safe_gains(client: TestClient) -> None:
+    unlock(client)
     asked = {"name": "Drone", "kind": "mavlink", "options": {}}
     refused = client.post("/api/vehicles", json=asked)
     assert refused.status_code == 409
@@ -72,13 +74,17 @@ def test_a_person_has_looked_at_a_real_vehicles_safe_gains(client: TestClient) -
     assert act["asked"] == DEFAULT_GAINS
 
 
-def test_a_real_vehicle_is_registered_only_where_nobody_else_reaches_the_server(settings: Settings) -> None:
+def test_a_vehicle_with_a_link_is_registered_only_where_nobody_else_reaches_the_server(settings: Settings) -> None:
     exposed = settings.model_copy(update={"host": "0.0.0.0"})
-    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000") as client:
+    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000", client=HERE) as client:
         refused = client.post("/api/vehicles", json={"name": "Drone", "kind": "mavlink", "options": {}, **SEEN})
         assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
         assert "can be reached over the network" in refused.json()["detail"]
-        assert not register(client)["is_real"]
+        refused = client.post(
+            "/api/vehicles", json={"name": "Drone", "kind": "mavlink", "options": {"simulated": True}}
+        )
+        assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
+        assert get(client, "/api/vehicles")["total"] == 0
 
 
 def test_the_autopilot_decides_which_gains_a_vehicle_has(client: TestClient) -> None:

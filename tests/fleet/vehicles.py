@@ -11,6 +11,7 @@ from app.fleet.states import VehicleState
 from app.trials.states import TrialState
 from app.vehicles.base import Identity
 from tests.builders import WORKER, Json, get, run_jobs
+from tests.unlocking import unlock
 
 DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
 SEEN = {"safe_gains_confirmed": True, "statement": "Ada compared them with the airframe file"}
@@ -19,7 +20,9 @@ OUR_PAGE = {"Sec-Fetch-Site": "same-origin"}
 
 
 def register(client: httpx2.Client, name: str = "Drone", *, real: bool = False, **fields: object) -> Json:
-    """One that is not connected yet."""
+    """One that is not connected yet. Who registers a real one has unlocked the browser."""
+    if real:
+        unlock(client)
     asked: dict[str, Any] = {"name": name, "kind": "mavlink", "options": {"simulated": not real}, **fields}
     answer = client.post("/api/vehicles", json={**(SEEN if real else {}), **asked})
     assert answer.status_code == 201, answer.text

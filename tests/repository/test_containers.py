@@ -39,8 +39,11 @@ def test_one_service_serves_one_works_and_one_is_a_simulated_drone_for_who_asks(
     assert [name for name, service in SERVICES.items() if "profiles" in service] == ["sim-drone"]
 
 
-def test_the_simulated_drone_is_on_the_workers_own_loopback() -> None:
-    assert SERVICES["sim-drone"]["network_mode"] == "service:worker"
+def test_server_worker_and_simulated_drone_are_on_the_hosts_loopback_for_nobody_else() -> None:
+    for service in SERVICES.values():
+        assert service["network_mode"] == "host"
+        assert service["environment"]["GAINLINE_HOST"] == "127.0.0.1"
+        assert "ports" not in service
 
 
 @pytest.mark.parametrize("name", SERVICES)

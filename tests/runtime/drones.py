@@ -156,6 +156,8 @@ class Registered:
 
 def register(serving: Serving, drone: Drone, name: str = "Drone", *, real: bool = False) -> Registered:
     options = {"address": drone.address, "simulated": not real}
+    if real:
+        serving.unlock()
     confirmed = {"safe_gains_confirmed": True, "statement": "Ada has looked"} if real else {}
     vehicle = serving.post("/vehicles", {"name": name, "kind": "mavlink", "options": options, **confirmed})
     return Registered(serving, vehicle["id"])

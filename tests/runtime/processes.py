@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -61,7 +62,18 @@ class Serving:
             assert line, self.logged()
             self.said.append(line)
         self.url = line.rpartition(" ")[2].strip()
+        self._unlocked = False
         self.api = httpx2.Client(base_url=f"{self.url}/api", timeout=PATIENCE_S)
+
+    def unlock(self) -> None:
+        """Open the link that was printed at the start, as a person does in the browser."""
+        if self._unlocked:
+            return
+        assert self.process.stdout is not None
+        while (link := re.search(r"http://\S+/unlock\?token=\S+", self.process.stdout.readline())) is None:
+            assert self.process.poll() is None, self.logged()
+        assert self.api.get(link.group()).status_code == 303
+        self._unlocked = True
 
     def logged(self) -> str:
         """What the server and its worker wrote to standard error, until `stop`."""

@@ -37,6 +37,7 @@ from tests.fleet.vehicles import (
     seen,
     take_control,
 )
+from tests.unlocking import HERE, unlock
 
 
 @pytest.fixture
@@ -159,9 +160,10 @@ def test_real_vehicles_fly_only_from_a_server_that_nobody_else_reaches(
 ) -> None:
     exposed = settings.model_copy(update={"host": "0.0.0.0"})
     headers = {**OUR_PAGE, **control_header(client, real)}
-    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000") as network:
+    with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000", client=HERE) as network:
         refused = network.post(f"/api/trials/{planned['id']}/stage", headers=headers)
         assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
+        unlock(network)
         assert client.post(f"/api/trials/{planned['id']}/stage", headers=headers).status_code == 202
         stage_claimed(database)
         status, sentence = take_off(network, planned, headers)

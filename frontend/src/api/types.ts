@@ -1,6 +1,7 @@
 /** The API's types under the names that pages use. */
 
 export type {
+  Access,
   ActKind,
   Advice,
   Campaign,

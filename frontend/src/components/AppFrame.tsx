@@ -1,6 +1,7 @@
 import { useQueryClient } from "@tanstack/react-query";
 import { Suspense, useEffect, useRef } from "react";
 import { Link, Outlet, useLocation, useMatch } from "react-router";
+import { useWatchOnly } from "../api/access";
 import { useRenewedControl } from "../api/control";
 import { followEvents } from "../api/events";
 import { useAbort, useFlying } from "../api/flying";
@@ -18,6 +19,7 @@ import { MainNav } from "./MainNav";
 import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleBadge } from "./VehicleBadge";
 import { VehicleStrip } from "./VehicleStrip";
+import { WatchOnly } from "./WatchOnly";
 
 /**
  * Space ends the flight, whatever has the focus, a text too: losing a blank is cheaper.
@@ -75,6 +77,7 @@ export function AppFrame() {
   useRenewedControl();
   useEffect(fetchEveryPage, []);
   const { state } = useConnection();
+  const watching = useWatchOnly(null);
   useSpaceAborts(flying, campaignId, abort.press);
   return (
     <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
@@ -111,6 +114,7 @@ export function AppFrame() {
       </header>
       <Announcer />
       <main id="main" className={classes["main"]} tabIndex={-1} data-stale={state === "away" || undefined}>
+        <WatchOnly why={watching} />
         <PageGuard path={pathname}>
           <Suspense fallback={<div aria-busy="true" />}>
             <Outlet context={abort} />

@@ -1,6 +1,7 @@
 import { Skeleton, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
+import { useWatchOnly } from "../api/access";
 import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useStanding, useTrials } from "../api/queries";
 import type { Campaign, Trial } from "../api/types";
 import { ByFlightPanels, CurvesPanel } from "../components/CampaignCharts";
@@ -15,6 +16,7 @@ import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import { useUnits } from "../components/useUnits";
 import { VerdictPanel } from "../components/VerdictPanel";
+import { WatchOnly } from "../components/WatchOnly";
 import { pointAt } from "../lib/pointing";
 import { shownTrial } from "../lib/verdict";
 import classes from "./CampaignPage.module.css";
@@ -76,6 +78,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
   const shown = shownTrial(trials, chosen);
+  const watching = useWatchOnly(campaign.vehicle);
   const choose = useCallback(
     (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
     [],
@@ -87,6 +90,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
         {campaign.flying ? `Flight ${campaign.flying.trial_number} is under way.` : (trials.at(-1)?.verdict ?? "")}
       </p>
       <CampaignHeader campaign={campaign} />
+      <WatchOnly why={watching} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
         <div className={classes["flown"]}>
           <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} onChoose={choose} />

@@ -2,6 +2,7 @@ import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
 import { IconChevronLeft } from "@tabler/icons-react";
 import { useCallback, useMemo } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
+import { useWatchOnly } from "../api/access";
 import { useVehicleOrders } from "../api/fly";
 import type { AbortControl } from "../api/flying";
 import { useCampaign, useCampaignFigure, useTrial } from "../api/queries";
@@ -18,6 +19,7 @@ import { Missing } from "../components/Missing";
 import { useTitle } from "../components/useTitle";
 import { useGainTitles, useUnits } from "../components/useUnits";
 import { VehicleBadge } from "../components/VehicleBadge";
+import { WatchOnly } from "../components/WatchOnly";
 import { endOfTime, type FlyStep, flyStep, stateWord } from "../lib/flyScreen";
 import { type PlotlyFigure, withChosen } from "../lib/traces";
 import { useLiveFlight, useVehicleStatus } from "../live/store";
@@ -51,7 +53,7 @@ interface Props {
   vehicle: Vehicle | null;
 }
 
-/** The steps at which a quarantine leaves nothing else to do. */
+/** The steps at which a quarantine, or a browser that may only watch, leaves nothing else to do. */
 const BARRED: ReadonlySet<FlyStep> = new Set<FlyStep>(["plan", "staging", "staged", "unstaging"]);
 
 /** Everything that one looks at and touches while a flight is staged, flown and judged. */
@@ -69,6 +71,8 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const quarantined = vehicle !== null && (vehicle.state === "quarantined" || (status?.status.concern ?? "") !== "");
   const { word, tone } = stateWord(trial, step, status, quarantined);
   const isFlying = step === "flying";
+  const watching = useWatchOnly(vehicle);
+  const barred = BARRED.has(step) && (quarantined || watching !== null);
   const steps = { campaign, trial, step, abort };
   return (
     <div className={classes["screen"]} data-step={step}>
@@ -109,9 +113,9 @@ function Screen({ campaign, trial, vehicle }: Props) {
         </div>
       </div>
       <section className={classes["steps"]} aria-label="What to do now">
+        <WatchOnly why={vehicle === null ? null : watching} />
         {quarantined && vehicle !== null && <Quarantine vehicle={vehicle} concern={concern} orders={orders} />}
-        {!(quarantined && BARRED.has(step)) &&
-          (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}
+        {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}
         <Gains
           asked={trial.gains}
           readBack={trial.read_back}
@@ -120,7 +124,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           areSet={step !== "plan"}
         />
       </section>
-      {vehicle !== null && <MotorsOff vehicle={vehicle} status={status} orders={orders} />}
+      {vehicle !== null && <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching !== null} />}
     </div>
   );
 }

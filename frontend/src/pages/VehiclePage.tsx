@@ -1,6 +1,7 @@
 import { Anchor, Button, Skeleton } from "@mantine/core";
 import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
 import { Link, useParams } from "react-router";
+import { useWatchOnly } from "../api/access";
 import { type Asked, useAskVehicle } from "../api/fleet";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
@@ -19,6 +20,7 @@ import { StateBadge } from "../components/StateBadge";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import { VehicleBadge } from "../components/VehicleBadge";
+import { WatchOnly } from "../components/WatchOnly";
 import { vehicleWords } from "../lib/fleet";
 import { NotFoundPage } from "./NotFoundPage";
 import classes from "./VehiclePage.module.css";
@@ -59,7 +61,8 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
 /** One registered vehicle: its link, what it holds, what it was given and asked, and who is in control. */
 function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const ask = useAskVehicle(vehicle.id);
-  const may = (act: Asked): boolean => vehicle.actions.includes(act);
+  const watching = useWatchOnly(vehicle);
+  const may = (act: Asked): boolean => watching === null && vehicle.actions.includes(act);
   const asking = ask.isPending ? ask.variables : null;
   return (
     <>
@@ -101,13 +104,18 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           )}
         </div>
       </div>
+      <WatchOnly why={watching} />
       <Trouble error={ask.error} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
       <div className={classes["grid"]}>
         <LinkPanel vehicle={vehicle} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
         <Panel title="In control">
-          <Control vehicle={vehicle} />
+          {watching === null ? (
+            <Control vehicle={vehicle} />
+          ) : (
+            <p>{vehicle.control?.operator ?? "Nobody"} is in control.</p>
+          )}
         </Panel>
         <BatteryPanel vehicle={vehicle} />
         <Panel

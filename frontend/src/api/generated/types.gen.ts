@@ -56,6 +56,36 @@ export type AbortJudgement = {
 };
 
 /**
+ * Access
+ *
+ * What whoever asks may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
+ * link, `may_command` real ones. `elsewhere`: they are not on this computer. `hint` says how a browser is unlocked;
+ * empty where no link would change anything.
+ */
+export type Access = {
+    /**
+     * Elsewhere
+     */
+    elsewhere: boolean;
+    /**
+     * May Change
+     */
+    may_change: boolean;
+    /**
+     * May Link
+     */
+    may_link: boolean;
+    /**
+     * May Command
+     */
+    may_command: boolean;
+    /**
+     * Hint
+     */
+    hint: string;
+};
+
+/**
  * ActKind
  *
  * What a registered vehicle was asked, or what was decided about it, beside its flights.
@@ -3898,6 +3928,31 @@ export type GetBackupResponses = {
 
 export type GetBackupResponse = GetBackupResponses[keyof GetBackupResponses];
 
+export type GetAccessData = {
+    body?: never;
+    path?: never;
+    query?: never;
+    url: '/api/access';
+};
+
+export type GetAccessErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type GetAccessError = GetAccessErrors[keyof GetAccessErrors];
+
+export type GetAccessResponses = {
+    /**
+     * Successful Response
+     */
+    200: Access;
+};
+
+export type GetAccessResponse = GetAccessResponses[keyof GetAccessResponses];
+
 export type ListCampaignsData = {
     body?: never;
     path?: never;
@@ -4783,6 +4838,12 @@ export type ClassifyTrialData = {
          * a text of the caller's own, new for each act: the same request sent again with it is harmless
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -5631,6 +5692,14 @@ export type StopMotorsData = {
      * Body
      */
     body?: VehicleOrder | null;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
     path: {
         /**
          * Vehicle Id
@@ -5743,6 +5812,14 @@ export type GiveUpControlResponse = GiveUpControlResponses[keyof GiveUpControlRe
 
 export type TakeControlData = {
     body: LeaseRequest;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
     path: {
         /**
          * Vehicle Id
@@ -6544,6 +6621,14 @@ export type BringInBundleResponse = BringInBundleResponses[keyof BringInBundleRe
 
 export type GetLandscapeData = {
     body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
     path: {
         /**
          * Campaign Id

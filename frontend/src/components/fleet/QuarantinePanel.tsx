@@ -1,6 +1,7 @@
 import { Button, TextInput } from "@mantine/core";
 import { IconAlertOctagonFilled, IconArrowBarToDown } from "@tabler/icons-react";
 import { useState } from "react";
+import { useWatchOnly } from "../../api/access";
 import { useRelease } from "../../api/fleet";
 import { useVehicleOrders } from "../../api/fly";
 import type { Vehicle } from "../../api/types";
@@ -15,6 +16,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.id);
   const orders = useVehicleOrders(vehicle.id);
   const release = useRelease(vehicle.id);
+  const watching = useWatchOnly(vehicle) !== null;
   return (
     <section className={classes["quarantine"]}>
       <div role="alert">
@@ -37,7 +39,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         >
           Land now
         </Button>
-        <MotorsOff vehicle={vehicle} status={status} orders={orders} />
+        <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching} />
       </div>
       <form
         className={classes["row"]}

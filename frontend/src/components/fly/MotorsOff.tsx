@@ -8,11 +8,14 @@ interface Props {
   vehicle: Vehicle;
   status: Aged | null;
   orders: ReturnType<typeof useVehicleOrders>;
+  /** Whether this browser may only watch the vehicle: then it cannot have it fall. */
+  watching?: boolean;
 }
 
 /** The last resort, in a corner of its own. */
-export function MotorsOff({ vehicle, status, orders }: Props) {
-  const enabled = vehicle.actions.includes("motors off") || status?.status.armed === true;
+export function MotorsOff({ vehicle, status, orders, watching = false }: Props) {
+  const asked = vehicle.actions.includes("motors off") || status?.status.armed === true;
+  const enabled = asked && !watching;
   return (
     <div className={classes["motorsOff"]}>
       <SlideToConfirm

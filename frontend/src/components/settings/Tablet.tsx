@@ -36,7 +36,8 @@ function Reached({ system: { addresses, exposes, host, in_container } }: { syste
           <Anchor href={chosen} className={classes["address"] ?? ""}>
             {chosen}
           </Anchor>
-          Both devices have to be in the same network.
+          Both devices have to be in the same network. It may look at everything then; to change campaigns and fly
+          simulations from it, open the link that <code>gainline unlock</code> prints here.
         </p>
       </div>
       {in_container && (

@@ -1,0 +1,148 @@
+"""Who may do what: the one table that routes and services ask. Pure decisions; `app.api.access` reads the caller from a
+request, `app.keyring` keeps the secret behind the keys.
+
+A caller is on this computer or elsewhere, and holds a key or none. What is forwarded comes from elsewhere: a proxy or a
+tunnel on this computer connects from loopback for whoever stands behind it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, IntEnum, auto
+from typing import Final
+
+from app.errors import NotAllowedError
+
+
+class Place(Enum):
+    """Where a request comes from."""
+
+    HERE = "here"
+    ELSEWHERE = "elsewhere"
+
+
+class Key(IntEnum):
+    """What a caller has shown, each worth more than those before it."""
+
+    NONE = 0
+    REMOTE = 1
+    """Of a browser or script on another device."""
+    SCRIPT = 2
+    """Of a script on this computer."""
+    BROWSER = 3
+    """Of a browser on this computer, which a person has unlocked."""
+
+
+class Act(Enum):
+    """What can be asked, as far as it matters who asks."""
+
+    CHANGE = auto()
+    """Whatever changes or computes something, an abort and an order to land included."""
+    LINK = auto()
+    """A vehicle with a link: registering and editing it, connecting it, asking it something, flying it."""
+    REAL = auto()
+    """The same of a real vehicle."""
+    TAKE_OFF = auto()
+    """The take-off of a real vehicle."""
+    STOP = auto()
+    """Stopping a real vehicle's motors, or closing the link to it: also where none may be opened."""
+    REVIEW = auto()
+    """Planning and judging flights of a real vehicle, which moves nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """The least key that an act needs, by place; None: it is never done from there. `exposed`: whether it is done on a
+    server that other devices can reach."""
+
+    here: Key
+    elsewhere: Key | None
+    exposed: bool
+
+
+RULES: Final[Mapping[Act, Rule]] = {
+    Act.CHANGE: Rule(here=Key.NONE, elsewhere=Key.REMOTE, exposed=True),
+    Act.LINK: Rule(here=Key.NONE, elsewhere=None, exposed=False),
+    Act.REAL: Rule(here=Key.SCRIPT, elsewhere=None, exposed=False),
+    Act.TAKE_OFF: Rule(here=Key.BROWSER, elsewhere=None, exposed=False),
+    Act.STOP: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
+    Act.REVIEW: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
+}
+"""Reading needs no rule: everybody who reaches the server may look."""
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who asks. `exposed`: the server listens beyond loopback; `because`: how it is known that they are elsewhere."""
+
+    place: Place = Place.HERE
+    key: Key = Key.NONE
+    exposed: bool = False
+    because: str = ""
+
+
+COMMAND_LINE: Final = Caller(key=Key.BROWSER)
+"""Whoever runs a command on the data folder itself."""
+
+UNLOCK: Final = (
+    "Open the link that the terminal printed at the start, or run `gainline unlock` on the computer that Gainline runs "
+    "on and open the link that it prints."
+)
+
+
+def is_allowed(act: Act, caller: Caller) -> bool:
+    rule = RULES[act]
+    if caller.exposed and not rule.exposed:
+        return False
+    needed = rule.here if caller.place is Place.HERE else rule.elsewhere
+    return needed is not None and caller.key >= needed
+
+
+def require(act: Act, caller: Caller, vehicle: str = "") -> None:
+    """Raises NotAllowedError saying what is missing. `vehicle` is the name of the one that it is about."""
+    if is_allowed(act, caller):
+        return
+    rule = RULES[act]
+    if caller.exposed and not rule.exposed:
+        raise _exposed(act, vehicle)
+    if caller.place is Place.ELSEWHERE:
+        raise _elsewhere(act, caller, vehicle) if rule.elsewhere is None else _no_key_elsewhere(caller)
+    raise _locked(act, vehicle)
+
+
+def _what(act: Act, vehicle: str) -> str:
+    return f"{vehicle} is flown over a link" if act is Act.LINK else f"{vehicle} is a real vehicle"
+
+
+def _exposed(act: Act, vehicle: str) -> NotAllowedError:
+    return NotAllowedError(
+        f"{_what(act, vehicle)}, and this server can be reached over the network, where it has no accounts yet.",
+        hint="Start the server with --host 127.0.0.1 on the computer that is linked to the vehicle.",
+    )
+
+
+def _elsewhere(act: Act, caller: Caller, vehicle: str) -> NotAllowedError:
+    return NotAllowedError(
+        f"{_what(act, vehicle)}: it is commanded from this computer alone, and the request came {caller.because}.",
+        hint="Use a browser on the computer that Gainline runs on, at the address that the terminal printed, without a "
+        "proxy or tunnel between them.",
+    )
+
+
+def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
+    return NotAllowedError(
+        f"The request came {caller.because}: from there one may look, and needs this server's token for all else.",
+        hint=f"{UNLOCK} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`.",
+    )
+
+
+def _locked(act: Act, vehicle: str) -> NotAllowedError:
+    if act is Act.TAKE_OFF:
+        return NotAllowedError(
+            f"{vehicle} is a real vehicle: it takes off only on its operator's own act in an unlocked browser.",
+            hint=f"{UNLOCK} A script can propose gains and stage the flight.",
+        )
+    return NotAllowedError(
+        f"{vehicle} is a real vehicle, and whoever asks has not shown that they may command it.",
+        hint=f"{UNLOCK} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`. Abort "
+        "and land need neither.",
+    )

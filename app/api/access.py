@@ -1,0 +1,149 @@
+"""Who sends a request: read from the connection, its headers, and the key that it shows.
+
+A page from elsewhere can make a browser send an act to a server on loopback; a foreign name can be pointed at this
+machine so that its pages count as ours; and a proxy or a tunnel on this machine connects from loopback for strangers.
+What is checked here stands in the way of each. Headers alone prove nothing: what commands a real vehicle shows a key
+(`app.keyring`) besides.
+"""
+
+import ipaddress
+from collections.abc import Callable, Iterator
+from typing import Final
+from urllib.parse import urlsplit
+
+from fastapi import Request
+from starlette.datastructures import Headers
+from starlette.responses import Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.access import Act, Caller, Key, Place, require
+from app.errors import GainlineError, NotAllowedError
+from app.keyring import Keyring
+from app.settings import is_loopback
+
+_READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+_COSTLY: Final = ("/api/system/backup", "/report.pdf", "/bundle")
+"""How the paths end whose reading computes for long or fills a disk, while something may fly: read by who may change
+things."""
+_FORWARDED: Final = frozenset({"forwarded", "via", "x-real-ip", "x-client-ip", "true-client-ip", "cdn-loop"})
+_FORWARDED_BEGINS: Final = (
+    *("x-forwarded", "x-original-", "x-proxy", "x-remote-", "x-cluster-", "x-tunnel", "proxy-client-"),
+    *("x-amzn-", "x-appengine-", "x-arr-", "x-azure-", "x-envoy-", "x-vercel-"),
+    *("cf-", "do-connecting-", "fastly-", "fly-", "ngrok-", "tailscale-"),
+)
+"""Headers that proxies and tunnels add; no browser does."""
+
+
+class AccessMiddleware:
+    """Refuses requests under a foreign name, those that another site's page asks of the API, and changes by who has no
+    key for them.
+
+    `host` is the name that the dashboard was told to listen on; `refuse_foreign` makes the answer from a sentence and a
+    hint, `refuse` from one of our errors.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        host: str,
+        refuse_foreign: Callable[[str, str], Response],
+        refuse: Callable[[GainlineError], Response],
+    ) -> None:
+        self._app = app
+        self._host = host.lower()
+        self._refuse_foreign = refuse_foreign
+        self._refuse = refuse
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and (refusal := self._refusal(scope)) is not None:
+            await refusal(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        headers = Headers(scope=scope)
+        address = headers.get("host", "")
+        name = _name_of(address)
+        if name not in {"localhost", self._host} and not _is_ip_address(name):  # an address cannot be pointed elsewhere
+            return self._refuse_foreign(
+                f"This server does not answer to the name “{address}”.",
+                "Use localhost or the machine's address, or start it with that name as --host (GAINLINE_HOST).",
+            )
+        path: str = scope["path"]
+        changes = scope["method"] not in _READS
+        if (changes or path.startswith("/api/")) and _is_foreign(headers, address):
+            return self._refuse_foreign(
+                "This was asked for by a page of another site; nothing was done.",
+                "Do it in the dashboard itself, or send it from a program, without the header Origin.",
+            )
+        if changes or path.endswith(_COSTLY):
+            try:
+                require(Act.CHANGE, read_caller(scope, host=self._host))
+            except NotAllowedError as error:
+                return self._refuse(error)
+        return None
+
+
+def caller_of(request: Request) -> Caller:
+    """Who sent the request."""
+    return read_caller(request.scope, host=request.app.state.settings.host)
+
+
+def read_caller(scope: Scope, *, host: str) -> Caller:
+    """Who sent what is in the scope, to a server that listens on this host."""
+    headers = Headers(scope=scope)
+    because = _came(scope.get("client"), headers)
+    keyring: Keyring = scope["app"].state.keyring
+    return Caller(
+        place=Place.ELSEWHERE if because else Place.HERE,
+        key=max(map(keyring.key_of, _shown(headers, keyring.cookie)), default=Key.NONE),
+        exposed=not is_loopback(host),
+        because=because,
+    )
+
+
+def _came(client: tuple[str, int] | None, headers: Headers) -> str:
+    """How a request came that is not from this computer; empty for one that is."""
+    for header in headers:
+        if header in _FORWARDED or header.startswith(_FORWARDED_BEGINS):
+            return f"through a proxy or tunnel (header {header})"
+    peer = "" if client is None else client[0]
+    if not is_loopback(peer.removeprefix("::ffff:")):
+        return f"from another device ({peer})"
+    address = headers.get("host", "")
+    return "" if is_loopback(_name_of(address)) else f"under a name that is not this computer's own ({address})"
+
+
+def _shown(headers: Headers, cookie: str) -> Iterator[str]:
+    """Every value that may show a key. A page at another port of this computer can put a second cookie of the name
+    beside ours, which must not hide it."""
+    for each in headers.get("cookie", "").split(";"):
+        name, _, value = each.strip().partition("=")
+        if name == cookie:
+            yield value
+    scheme, _, token = headers.get("authorization", "").partition(" ")
+    if scheme.lower() == "bearer":
+        yield token.strip()
+
+
+def _name_of(address: str) -> str:
+    try:
+        return urlsplit(f"//{address}").hostname or ""
+    except ValueError:
+        return ""
+
+
+def _is_ip_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_foreign(headers: Headers, address: str) -> bool:
+    origin = headers.get("origin")
+    return headers.get("sec-fetch-site") in {"cross-site", "same-site"} or (
+        origin is not None and origin.partition("://")[2] != address
+    )

@@ -1,0 +1,82 @@
+"""How a person unlocks a browser: a link that works once, and a cookie in its place."""
+
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import HTMLResponse, RedirectResponse
+from pydantic import BaseModel
+
+from app.access import UNLOCK, Act, Caller, Key, Place, is_allowed
+from app.api.access import caller_of
+from app.keyring import LINK_VALID_S, Keyring
+
+router = APIRouter(tags=["system"])
+
+KEPT_S: Final = 90 * 24 * 3600
+_HEADERS: Final = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
+"""The token stands in the address: neither a cache nor the next page learns of it."""
+
+_SPENT: Final = f"""<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>Gainline: this link is spent</title>
+<style>
+:root {{ color-scheme: light dark; font: 18px/1.5 system-ui, sans-serif }}
+main {{ max-width: 34rem; margin: 15vh auto; padding: 0 1.5rem }}
+</style>
+<main>
+<h1>This link is spent</h1>
+<p>A link unlocks one browser, within {LINK_VALID_S // 60} minutes. Run <code>gainline unlock</code> on the computer
+that Gainline runs on, and open the link that it prints.</p>
+<p><a href="/">To the dashboard</a>, where this browser may watch.</p>
+</main>
+</html>
+"""
+
+
+class Access(BaseModel):
+    """What whoever asks may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
+    link, `may_command` real ones. `elsewhere`: they are not on this computer. `hint` says how a browser is unlocked;
+    empty where no link would change anything."""
+
+    elsewhere: bool
+    may_change: bool
+    may_link: bool
+    may_command: bool
+    hint: str
+
+
+@router.get("/api/access")
+def get_access(request: Request) -> Access:
+    """What whoever asks may do here."""
+    caller = caller_of(request)
+    may_change, may_command = is_allowed(Act.CHANGE, caller), is_allowed(Act.TAKE_OFF, caller)
+    return Access(
+        elsewhere=caller.place is Place.ELSEWHERE,
+        may_change=may_change,
+        may_link=is_allowed(Act.LINK, caller),
+        may_command=may_command,
+        hint="" if may_command or not _would_help(caller) else UNLOCK,
+    )
+
+
+def _would_help(caller: Caller) -> bool:
+    if caller.place is Place.ELSEWHERE:
+        return caller.key < Key.REMOTE
+    return not caller.exposed
+
+
+@router.get("/unlock", include_in_schema=False)
+def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") -> Response:
+    """Take a link's token for a cookie, once. What the cookie is worth depends on where the browser is."""
+    keyring: Keyring = request.app.state.keyring
+    caller = caller_of(request)
+    given = keyring.given_to(caller.place)
+    if not keyring.open_link(token):
+        if caller.key >= given:  # opened twice in the same browser
+            return RedirectResponse("/", 303, headers=_HEADERS)
+        return HTMLResponse(_SPENT, 403, headers=_HEADERS)
+    answer = RedirectResponse("/", 303, headers=_HEADERS)
+    answer.set_cookie(keyring.cookie, keyring.value(given), max_age=KEPT_S, httponly=True, samesite="strict")
+    return answer

@@ -1,0 +1,111 @@
+"""The secret by which this server knows its people, and the links that unlock a browser.
+
+Everything lies in `access/` of the data folder, which only the user that runs Gainline can read:
+
+    secret          from which the keys of browsers and scripts are derived; made at the first start
+    links/DIGEST    one file for each link that was not opened yet, named by the SHA-256 of its token
+
+Whoever takes a link's file away has opened it: a link works once, across processes and restarts, and nothing but its
+digest is stored. Deleting `access/` while Gainline is stopped locks every browser and script out.
+"""
+
+import errno
+import hashlib
+import hmac
+import os
+import secrets
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, Self
+
+from app.access import Key, Place
+from app.errors import StorageError
+
+LINK_VALID_S: Final = 15 * 60
+_SECRET_BYTES: Final = 32
+_GIVEN_BY_PLACE: Final = {Place.HERE: Key.BROWSER, Place.ELSEWHERE: Key.REMOTE}
+
+
+class Keyring:
+    """The keys of one data folder. Several processes may have it open."""
+
+    def __init__(self, folder: Path, secret: bytes, *, now_s: Callable[[], float] = time.time) -> None:
+        self._links = folder / "links"
+        self._secret = secret
+        self._now_s = now_s
+        self._values = {self.value(key): key for key in (Key.REMOTE, Key.SCRIPT, Key.BROWSER)}
+        self.cookie = f"gainline-{self._derived('cookie')[:8]}"
+        """Name of the browser's cookie: browsers do not tell the ports of a host apart, and several servers may run."""
+
+    @classmethod
+    def open(cls, data_dir: Path, *, now_s: Callable[[], float] = time.time) -> Self:
+        """The data folder's keyring, made where there is none. Raises StorageError when it cannot be read or made."""
+        folder = data_dir / "access"
+        try:
+            folder.mkdir(mode=0o700, exist_ok=True)
+            (folder / "links").mkdir(mode=0o700, exist_ok=True)
+            return cls(folder, _secret(folder / "secret"), now_s=now_s)
+        except OSError as error:
+            raise StorageError(
+                f"The folder {folder}, which keeps the secret of this server, cannot be used: {error.strerror}.",
+                hint="Give this user the right to read and write it, or stop Gainline and delete it: browsers are then "
+                "unlocked anew.",
+            ) from error
+
+    def value(self, key: Key) -> str:
+        """What a browser's cookie or a script's header holds to show this key."""
+        return self._derived(f"key {key.name}")
+
+    def given_to(self, place: Place) -> Key:
+        """The key that a browser there gets for a link."""
+        return _GIVEN_BY_PLACE[place]
+
+    def key_of(self, shown: str) -> Key:
+        """The key that this value shows; `Key.NONE` for any other."""
+        same = [key for value, key in self._values.items() if hmac.compare_digest(value.encode(), shown.encode())]
+        return max(same, default=Key.NONE)
+
+    def new_link(self) -> str:
+        """The token of a new link, good once and for a quarter of an hour."""
+        self._drop_old()
+        token = secrets.token_urlsafe(_SECRET_BYTES)
+        self._file(token).touch(mode=0o600)
+        os.utime(self._file(token), (self._now_s(), self._now_s()))
+        return token
+
+    def open_link(self, token: str) -> bool:
+        """Whether a link has this token and was not opened before; it is open from now on."""
+        try:
+            age_s = self._now_s() - self._file(token).stat().st_mtime
+            self._file(token).unlink()
+        except OSError:
+            return False
+        return age_s <= LINK_VALID_S
+
+    def _derived(self, purpose: str) -> str:
+        return hmac.new(self._secret, purpose.encode(), hashlib.sha256).hexdigest()
+
+    def _file(self, token: str) -> Path:
+        return self._links / hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
+
+    def _drop_old(self) -> None:
+        for file in self._links.iterdir():
+            with suppress(FileNotFoundError):
+                if self._now_s() - file.stat().st_mtime > LINK_VALID_S:
+                    file.unlink()
+
+
+def _secret(file: Path) -> bytes:
+    """What the file holds; made whole or not at all."""
+    if not file.exists():
+        draft = file.with_name(f"{file.name}.new")
+        draft.unlink(missing_ok=True)
+        with os.fdopen(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as out:
+            out.write(secrets.token_bytes(_SECRET_BYTES))
+        draft.rename(file)
+    found = file.read_bytes()
+    if len(found) != _SECRET_BYTES:
+        raise OSError(errno.EINVAL, f"{file.name} does not hold {_SECRET_BYTES} bytes")
+    return found

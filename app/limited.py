@@ -1,0 +1,112 @@
+"""Reading what a stranger sends: in a process of its own, with limits of memory and time, so that the worst that a file
+can do is not to be read."""
+
+import os
+import resource
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Final, ParamSpec, TypeVar
+
+from app.computing import Done, Refused
+from app.errors import InputError, Problem, UnavailableError
+from app.processes import process_context
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+AT_ONCE: Final = 2
+WAITS_S: Final = 20.0
+"""For one of those that are being read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Of one process: seconds of a processor, seconds until its answer, and bytes beside those of the program."""
+
+    processor_s: int = 60
+    wall_s: float = 120.0
+    memory_bytes: int = 2**30
+
+
+FILE: Final = Limits()
+"""For a file of the size that is taken over HTTP."""
+
+_places = threading.BoundedSemaphore(AT_ONCE)
+
+
+def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """Call a pure, picklable function in a new process and wait.
+
+    Raises what it raises, InputError naming the file when it passes a limit, and UnavailableError while others are
+    read.
+    """
+    if not _places.acquire(timeout=WAITS_S):
+        raise UnavailableError(
+            f"{AT_ONCE} files are being read already.",
+            hint="Send this one again once they are done; nothing was stored.",
+        )
+    try:
+        return _run(limits, partial(function, *args, **kwargs))
+    finally:
+        _places.release()
+
+
+def _run(limits: Limits, task: Callable[[], T]) -> T:
+    context = process_context()
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_perform, args=(theirs, limits, task), name="reading", daemon=True)
+    with ours:
+        process.start()
+        theirs.close()
+        try:
+            if not ours.poll(limits.wall_s):
+                raise _too_much(limits)
+            outcome: Done[T] | Refused = ours.recv()
+        except EOFError as error:  # the processor's time was up, or the system had no memory left
+            raise _too_much(limits) from error
+        finally:
+            process.kill()
+            process.join()
+    if isinstance(outcome, Refused):
+        if isinstance(outcome.error, MemoryError):
+            raise _too_much(limits) from outcome.error
+        raise outcome.error
+    return outcome.result
+
+
+def _perform(pipe: Connection, limits: Limits, task: Callable[[], T]) -> None:
+    """In the new process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_CPU, (limits.processor_s, limits.processor_s + 1))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with suppress(OSError, ValueError):  # where the system has no such limit the one of time holds
+        most = _address_space() + limits.memory_bytes
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    try:
+        outcome: Done[T] | Refused = Done(task())
+    except Exception as error:  # noqa: BLE001 - the edge of the process
+        outcome = Refused(error)
+    with suppress(OSError):  # nobody waits any more
+        pipe.send(outcome)
+
+
+def _address_space() -> int:
+    """What the program takes already, bytes. Raises OSError where the system does not tell."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _too_much(limits: Limits) -> InputError:
+    return InputError(
+        "This file cannot be read here; nothing was stored.",
+        problems=(
+            Problem("file", f"takes more than {limits.processor_s} s or {limits.memory_bytes / 2**30:g} GiB to read"),
+        ),
+        hint="Check that it is the log that it is meant to be. `gainline import` and `gainline controller check` read "
+        "without limits.",
+    )

@@ -1,0 +1,81 @@
+"""A browser that has opened no link: it watches a REAL vehicle, says so, and is unlocked by the terminal's link."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Theme, Viewport
+from tests.e2e.states import States
+from tests.runtime.drones import TRIED
+from tests.unlocking import new_link
+
+WATCHING = "This browser may only watch Bee."
+
+
+def picture(page: Page, name: str) -> None:
+    """For a person to look at, where a folder for pictures is named."""
+    if folder := os.environ.get("PICTURES"):
+        page.screenshot(path=Path(folder) / f"{name}.png")
+
+
+@pytest.fixture
+def bee(empty_server: Server, states: States) -> int:
+    """A REAL vehicle that nobody has connected."""
+    return states.vehicle("Bee", safe_gains_confirmed=True, statement="Ada has seen it fly on these")
+
+
+def notice(dashboard: Dashboard) -> None:
+    expect(dashboard.page.get_by_role("main")).to_contain_text(WATCHING)
+    expect(dashboard.page.get_by_role("main")).to_contain_text("gainline unlock")
+    expect(dashboard.page.get_by_role("main")).to_contain_text("Abort and Land work from here all the same.")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("viewport", [TABLET, PHONE], ids=["tablet", "phone"])
+def test_a_browser_that_was_not_unlocked_says_on_every_page_of_a_real_vehicle_that_it_may_only_watch(
+    open_dashboard: Opener, shared_server: Server, states: States, bee: int, theme: Theme, viewport: Viewport
+) -> None:
+    campaign = states.campaign("mavlink", name="Up to 3 m", vehicle_id=bee)
+    trial = states.plan(campaign, TRIED)
+    dashboard = open_dashboard(shared_server.url, unlocked=False, theme=theme, viewport=viewport)
+    for path in (f"/vehicles/{bee}", f"/campaigns/{campaign}", f"/fly/{trial}"):
+        dashboard.open(path)
+        notice(dashboard)
+        picture(dashboard.page, f"watch-{path.split('/')[1]}-{theme}-{viewport['width']}")
+        assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    for name in ("Stage", "Take control", "Connect"):
+        expect(dashboard.button(name)).to_have_count(0)
+    expect(dashboard.page.get_by_role("button", name="Motors off – the drone falls")).to_be_disabled()
+    dashboard.open("/campaigns")
+    expect(dashboard.page.get_by_text("may only watch")).to_have_count(0)
+
+
+def test_opening_the_link_in_another_tab_unlocks_the_page_that_one_comes_back_to(
+    open_dashboard: Opener, shared_server: Server, bee: int
+) -> None:
+    dashboard = open_dashboard(shared_server.url, unlocked=False)
+    dashboard.open(f"/vehicles/{bee}")
+    notice(dashboard)
+    expect(dashboard.button("Connect")).to_have_count(0)
+    link = new_link(shared_server.data_dir)
+    tab = dashboard.page.context.new_page()
+    tab.goto(f"{shared_server.url}{link}")
+    expect(tab).to_have_url(re.compile(r"/(campaigns)?$"))
+    tab.close()
+    dashboard.page.bring_to_front()
+    expect(dashboard.button("Connect")).to_be_visible()
+    expect(dashboard.page.get_by_text("may only watch")).to_have_count(0)
+
+
+def test_a_spent_link_says_so_and_how_to_get_another(open_dashboard: Opener, shared_server: Server) -> None:
+    dashboard = open_dashboard(shared_server.url, unlocked=False)
+    dashboard.page.goto("/unlock?token=spent")
+    expect(dashboard.page.get_by_role("heading", name="This link is spent")).to_be_visible()
+    expect(dashboard.page.get_by_text("gainline unlock")).to_be_visible()
+    picture(dashboard.page, "spent")
+    dashboard.page.get_by_role("link", name="To the dashboard").click()
+    expect(dashboard.page.get_by_role("navigation").first).to_be_visible()

@@ -1,0 +1,141 @@
+"""A real server while its connections are all taken, and what it takes no more of; how soon an abort is answered then:
+bench/abort.py."""
+
+import resource
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+import httpx2
+import pytest
+
+from app.connections import FOR_STOPPING, room_for_connections
+from tests.runtime.processes import Serving
+
+FILES: Final = 256
+"""That the server may have open."""
+
+
+@pytest.fixture(scope="module")
+def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, hard))
+    try:
+        one = Serving(tmp_path_factory.mktemp("connections") / "data")
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    with one:
+        one.worker_pid()
+        yield one
+
+
+def connected(serving: Serving) -> socket.socket:
+    host, port = serving.url.removeprefix("http://").split(":")
+    return socket.create_connection((host, int(port)), timeout=20.0)
+
+
+def is_closed(connection: socket.socket) -> bool:
+    """Whether the server has closed it, without waiting for that."""
+    connection.setblocking(False)
+    try:
+        return connection.recv(1) == b""
+    except BlockingIOError:
+        return False
+    except ConnectionResetError:
+        return True
+
+
+def open_files(serving: Serving) -> int:
+    return len(list(Path(f"/proc/{serving.process.pid}/fd").iterdir()))
+
+
+@pytest.mark.parametrize("first", [b"", b"GET /api/he", b"POST /api/campaigns HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
+def test_an_abort_is_answered_while_idle_connections_fill_every_place(serving: Serving, first: bytes) -> None:
+    trial_id = serving.fly(serving.campaign(), speed=1.0)
+    serving.trial(trial_id, "flying")
+    with ExitStack() as stack:
+        idle = [stack.enter_context(connected(serving)) for _ in range(2 * FILES)]
+        for connection in idle:
+            if not is_closed(connection):
+                connection.setblocking(True)
+                connection.sendall(first)
+        with httpx2.Client(base_url=serving.url, timeout=20.0) as operator:
+            answer = operator.post(f"/api/trials/{trial_id}/abort", json={"reason": "too close"})
+        assert (answer.status_code, answer.json()["accepted"]) == (202, True)
+        assert open_files(serving) < FILES
+        places = room_for_connections(FILES) + FOR_STOPPING
+        assert sum(not is_closed(connection) for connection in idle) <= places
+    assert serving.trial(trial_id, "aborted")["reason"] == "too close"
+    assert "no connection can be taken" not in serving.logged()
+
+
+def test_event_streams_without_end_make_room_for_an_abort(serving: Serving) -> None:
+    request = b"GET /api/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    with ExitStack() as stack:
+        for _ in range(FILES):
+            stream = stack.enter_context(connected(serving))
+            stream.sendall(request)
+        with httpx2.Client(base_url=serving.url, timeout=20.0) as operator:
+            answer = operator.post("/api/vehicles/4711/land")
+        assert answer.status_code == 202
+        with httpx2.Client(base_url=serving.url, timeout=20.0) as somebody:
+            try:
+                status = somebody.get("/api/health").status_code
+            except httpx2.TransportError:
+                status = 503  # the last places may be taken as well
+            assert status in {200, 503}
+
+
+def answered(serving: Serving, *parts: bytes) -> bytes:
+    """What comes back for a request that is sent in these parts."""
+    with connected(serving) as connection:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for part in parts:
+            connection.sendall(part)
+        received = b""
+        while b"\r\n\r\n" not in received and (more := connection.recv(2**16)):
+            received += more
+        return received
+
+
+BEGIN = b"GET /api/health HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+LINE = b"X-Long: " + 1000 * b"a" + b"\r\n"
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (BEGIN + 70 * LINE + b"\r\n",),
+        (BEGIN, *(65 * (LINE,))),
+        (BEGIN, b"X-One: ", *(66 * (1000 * b"a",))),
+        (b"GET /api/health?" + 70_000 * b"a" + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",),
+    ],
+    ids=["at once", "line by line", "one line", "address"],
+)
+def test_headers_without_end_are_refused(serving: Serving, parts: tuple[bytes, ...]) -> None:
+    answer = answered(serving, *parts)
+    assert answer.startswith(b"HTTP/1.1 431 ")
+    assert b"larger than 64 KiB" in answer
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize("first", [b"", BEGIN], ids=["silent", "half a head"])
+def test_a_connection_that_does_not_go_on_is_closed(serving: Serving, first: bytes) -> None:
+    with connected(serving) as connection:
+        connection.sendall(first)
+        assert connection.recv(1) == b"", "the server closed it"
+
+
+def test_headers_of_a_usual_size_are_taken_in_any_parts(serving: Serving) -> None:
+    whole = BEGIN + 50 * LINE + b"\r\n"
+    for parts in ((whole,), (BEGIN, *(50 * (LINE,)), b"\r\n")):
+        assert answered(serving, *parts).startswith(b"HTTP/1.1 200 ")
+
+
+def test_a_connection_serves_one_request_after_the_other(serving: Serving) -> None:
+    with httpx2.Client(base_url=serving.url, limits=httpx2.Limits(max_connections=1)) as client:
+        for _ in range(5):
+            assert client.get("/api/health").status_code == 200
+            assert client.post("/api/campaigns", content=b"x" * 200_000).status_code == 415
