@@ -42,7 +42,7 @@ ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "check": _DOWN,
     "restore": _DOWN,
     "parameters": frozenset({VehicleState.READY}),
-    "edit": frozenset({VehicleState.DISCONNECTED, VehicleState.READY}),
+    "edit": _DOWN | {VehicleState.DISCONNECTED},
     "land": _MAYBE_UP,
     "motors off": _MAYBE_UP,
     "release": frozenset({VehicleState.QUARANTINED}),

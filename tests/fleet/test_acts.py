@@ -41,7 +41,7 @@ POSSIBLE = {
     "release": {"quarantined"},
     "stage": {"ready"},
     "fly": {"ready"},
-    "edit": {"disconnected", "ready"},
+    "edit": {"disconnected", "ready", "quarantined"},
     "land": {"staged", "flying", "quarantined"},
     "motors off": {"staged", "flying", "quarantined"},
 }

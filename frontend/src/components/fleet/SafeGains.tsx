@@ -23,14 +23,14 @@ interface Props {
 
 /** What the vehicle holds beside what is safe. */
 export function SafeGains({ vehicle, restoring, onRestore }: Props) {
-  const [editing, setEditing] = useState(false);
+  const [entered, setEntered] = useState<Record<string, number>>();
   const status = useVehicleStatus(vehicle.id);
   const { safe_gains: safe } = vehicle;
   const live = status?.status.held ?? {};
   const held = inOrder(Object.keys(live).length > 0 ? live : (vehicle.held ?? {}), Object.keys(safe));
   const isCurrent = status?.isCurrent ?? false;
   const isKnown = Object.keys(held).length > 0;
-  if (editing) return <SafeGainsForm vehicle={vehicle} onDone={() => setEditing(false)} />;
+  if (entered) return <SafeGainsForm vehicle={vehicle} entered={entered} onDone={() => setEntered(undefined)} />;
   return (
     <Panel title="Gains">
       <div className={classes["stack"]}>
@@ -89,7 +89,12 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           >
             Restore safe gains
           </Button>
-          <Button variant="subtle" disabled={!vehicle.actions.includes("edit")} onClick={() => setEditing(true)}>
+          {isKnown && !sameHeld(held, safe) && (
+            <Button variant="default" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(held)}>
+              Make what it holds its safe gains
+            </Button>
+          )}
+          <Button variant="subtle" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(safe)}>
             Change the safe gains
           </Button>
         </div>
@@ -98,8 +103,15 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   );
 }
 
-function SafeGainsForm({ vehicle, onDone }: { vehicle: Vehicle; onDone: () => void }) {
-  const [gains, setGains] = useState<Record<string, Value>>({ ...vehicle.safe_gains });
+interface FormProps {
+  vehicle: Vehicle;
+  /** What the fields hold at first. */
+  entered: Record<string, number>;
+  onDone: () => void;
+}
+
+function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
+  const [gains, setGains] = useState<Record<string, Value>>({ ...vehicle.safe_gains, ...entered });
   const [statement, setStatement] = useState("");
   const edit = useEditVehicle(vehicle.id);
   const fields = ["statement", ...Object.keys(gains).map((name) => `safe_gains.${name}`)];
