@@ -4,6 +4,7 @@ import pytest
 
 from app.vehicles.base import FlightOrder, FlightRecord, Stop
 from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone.autopilots.base import Autopilot
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
@@ -83,9 +84,8 @@ def test_a_vehicle_that_confirms_no_way_to_stop_its_motors_is_not_flown() -> Non
 def test_the_command_is_tried_only_on_a_vehicle_that_stands_disarmed() -> None:
     with LockstepRig(make=of(kill_setting="")) as rig, connected(rig) as vehicle:
         assert not rig.told("COMMAND_LONG")
-        rig.drone.body.altitude_m = 1.0  # carried about, disarmed
-        rig.drone.autopilot._body.climb_rate_m_s = 0.0  # type: ignore[attr-defined]
         vehicle.check()
+        assert [number(message, "param1") for message in rig.told("COMMAND_LONG")] == [0.0]
     with LockstepRig(make=of(kill_setting="")) as rig, connected(rig) as vehicle:
         rig.drone.autopilot._enter(3)  # type: ignore[attr-defined]  # armed by somebody else
         vehicle.check()
