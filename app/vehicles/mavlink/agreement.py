@@ -9,6 +9,7 @@ from app.vehicles.mavlink.signals import Sighted
 APART_M: Final = 0.3
 APART_S: Final = 0.3
 
+_FRESH_S: Final = 0.5
 _ATTENDED_S: Final = 0.1
 """The most that one sighting tells of the time before it: what a stall delayed may come at once."""
 
@@ -36,6 +37,13 @@ def sight(second: Second, sighted: Sighted, vehicle_m: float | None) -> Second:
         (second.apart_since_s if second.apart_since_s is not None else sighted.now_s) if apart_m > APART_M else None
     )
     return replace(second, altitude_m=sighted.altitude_m, blind_s=0.0, apart_m=apart_m, apart_since_s=since_s)
+
+
+def seen_m(second: Second | None, now_s: float) -> float | None:
+    """Where the source sees the vehicle; None while it sees nothing new, or nothing at all."""
+    if second is None or second.blind_s > 0.0 or now_s - second.heard_s > _FRESH_S:
+        return None
+    return second.altitude_m
 
 
 def find_blind(second: Second | None, now_s: float, *, stuck_s: float, silent_s: float) -> Finding | None:

@@ -159,9 +159,8 @@ def settle(watch: Watch, now_s: float, ground_m: float) -> Watch:
 
 def _is_contradicted(watch: Watch, now_s: float, ground_m: float) -> bool:
     says_flying = watch.landed is False and now_s - watch.landed_s < AGREED_S
-    second = watch.second
-    seen_above = second is not None and second.altitude_m is not None and second.altitude_m - ground_m > GROUND_M
-    return says_flying or seen_above
+    seen_m = agreement.seen_m(watch.second, now_s)
+    return says_flying or (seen_m is not None and seen_m - ground_m > GROUND_M)
 
 
 # ---- what may be believed

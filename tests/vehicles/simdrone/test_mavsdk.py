@@ -49,7 +49,9 @@ def station(autopilot: str) -> Iterator[Station]:
             system = next(system for system in mavsdk.get_systems() if system.has_autopilot())
             info = Info(system)
             eventually(lambda: knows(info), FOUND_WITHIN_S)
-            yield Station(Param(system), Action(system), Telemetry(system))
+            telemetry = Telemetry(system)
+            telemetry.set_rate_position(4.0)  # an ArduPilot tells nothing unasked
+            yield Station(Param(system), Action(system), telemetry)
     finally:
         mavsdk.destroy()
 
