@@ -5,7 +5,7 @@ from app.core.errors import GainlineError, InputError, Problem
 
 def test_an_error_goes_from_one_process_to_another_as_it_is() -> None:
     error = InputError("This cannot be used.", problems=(Problem("name", "is empty"),), hint="Give it a name.")
-    again = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
+    again = pickle.loads(pickle.dumps(error))
     assert (type(again), again.message, again.hint, again.problems) == (
         InputError,
         error.message,
