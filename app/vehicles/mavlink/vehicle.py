@@ -225,13 +225,7 @@ class MavlinkVehicle:
         return self._gains.give_back() or self._parameters.put_back()
 
     def land(self, reason: str) -> None:
-        """Tell it to land, at once and whatever state it is in. Raises VehicleError when it cannot be told, or when its
-        motors stand: some do not arm any more after that."""
-        if self._radio.is_disarmed:
-            raise VehicleError(
-                "Its motors stand already, it says; it was not told to land.",
-                hint="If it flies all the same, it is another vehicle that says so: use the remote control.",
-            )
+        """Tell it to land, at once and whatever it says of itself. Raises VehicleError when it cannot be told."""
         self._asked = f"Land was asked for: {reason}."
         self._order = StandingOrder(self._radio, Action.LAND)
 
