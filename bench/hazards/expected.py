@@ -107,7 +107,7 @@ class _Judgement:
             ("preflight", SILENT, 0.15),
             ("preflight", ("frozen-position", "jumping-position", "low-battery"), 0.0),
             ("preflight", MOCAP, 0.0),
-            ("preflight", ("arm-refused",), 0.0),
+            ("preflight", ("arm-refused", OTHER_LANDING), 0.0),
             ("F2", ("param-unconfirmed",), 0.0),
             ("F10", ("reboot", OTHER_MODE), 0.0),
         ):
@@ -226,6 +226,7 @@ class _Judgement:
         yield any(each.stage not in (Stage.CONNECT, *GROUND) for each in self._kinds("reboot", OTHER_MODE))
         yield any(each.kind == OTHER_MODE for each in self.flown.struck)
         yield self.flown.impact_m_s > IMPACT_M_S
+        yield bool(self.of("mocap-drift"))  # the cameras go on seeing it in the air
         for lost_s, _ in self.stages.spans(Stage.LINK_LOST):
             yield any(end_s > lost_s + 60.0 - SLACK_S for _, end_s in self.beatless)
         for begun_s, _ in self.stages.spans(Stage.LAND, Stage.ABORT_LAND):

@@ -91,6 +91,8 @@ class Watch:
     landed: bool | None = None
     landed_s: float = 0.0
     grounded_since_s: float | None = None
+    lifted: bool = False
+    """Whether it was ever above the ground."""
     second: Second | None = None
     rebooted: bool = False
     breached: str = ""
@@ -152,13 +154,15 @@ def settle(watch: Watch, now_s: float, ground_m: float) -> Watch:
     and the second source. A lone sample that jumps says nothing either way."""
     if watch.doubted is not None and is_fresh(watch, now_s):
         return watch
+    watch = replace(watch, lifted=watch.lifted or is_airborne(watch, now_s, ground_m))
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
     grounded = is_grounded(watch, now_s, ground_m) and not _is_contradicted(watch, now_s, ground_m)
     return replace(watch, grounded_since_s=since_s if grounded else None)
 
 
 def _is_contradicted(watch: Watch, now_s: float, ground_m: float) -> bool:
-    says_flying = watch.landed is False and now_s - watch.landed_s < AGREED_S
+    """What it says of itself counts once it has flown: one that was told to climb may believe that it does."""
+    says_flying = watch.lifted and watch.landed is False and now_s - watch.landed_s < AGREED_S
     seen_m = agreement.seen_m(watch.second, now_s)
     return says_flying or (seen_m is not None and seen_m - ground_m > GROUND_M)
 

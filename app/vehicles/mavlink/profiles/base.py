@@ -43,7 +43,8 @@ AUTOPILOT: Final = 1
 """The component id that autopilots have unless somebody changed it."""
 _FENCES: Final = MappingProxyType({1: "its least altitude", 2: "its greatest altitude", 3: "its boundary"})
 """FENCE_BREACH."""
-_ON_GROUND: Final = 1
+_LANDED_STATES: Final = MappingProxyType({1: True, 2: False, 4: False})
+"""MAV_LANDED_STATE: on the ground, in the air, landing."""
 _PREARM_CHECK: Final = 1 << 28
 """Among the sensors of SYS_STATUS: MAV_SYS_STATUS_PREARM_CHECK."""
 _TEXT_LENGTH: Final = 50
@@ -364,9 +365,9 @@ def breach(message: Message) -> Breach | None:
 
 
 def landed_state(message: Message) -> LandedState | None:
-    """EXTENDED_SYS_STATE; None where the vehicle does not know."""
-    told = int(number(message, "landed_state"))
-    return LandedState(on_ground=told == _ON_GROUND) if told else None
+    """EXTENDED_SYS_STATE; None where the vehicle does not know, or is only about to take off."""
+    told = _LANDED_STATES.get(int(number(message, "landed_state")))
+    return None if told is None else LandedState(on_ground=told)
 
 
 def version(message: Message) -> Version | None:
