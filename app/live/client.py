@@ -119,7 +119,8 @@ class LiveClient:
         answered = self._waiting[question.request] = asyncio.get_running_loop().create_future()
         self._writer.write(encode(question))
         try:
-            answer = await asyncio.wait_for(answered, ANSWER_TIMEOUT_S)
+            async with asyncio.timeout(ANSWER_TIMEOUT_S):
+                answer = await answered
         except TimeoutError as error:
             raise _link_down(f"the worker did not answer within {ANSWER_TIMEOUT_S:g} s") from error
         finally:

@@ -81,6 +81,7 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
         live.close()
         for task in running:
             task.cancel()
+        for task in running:
             with suppress(asyncio.CancelledError):
                 await task
         await asyncio.to_thread(tail.stop)

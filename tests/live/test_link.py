@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import shutil
 import socket
 import stat
 import threading
@@ -13,15 +14,18 @@ from pathlib import Path
 import pytest
 
 from app.core.errors import InputError
+from app.db.session import Database
 from app.live import client as client_module
 from app.live.address import LONGEST_PATH_BYTES, live_address
 from app.live.client import LinkDownError, LiveClient
+from app.live.link import live_link
 from app.live.messages import (
     Abort,
     AbortAnswer,
     FlightPhase,
     FromWorker,
     Order,
+    Ping,
     Telemetry,
     VehicleOrder,
     VehicleOrderAnswer,
@@ -294,3 +298,28 @@ def test_a_client_that_talks_nonsense_is_dropped_and_the_others_stay(tmp_path: P
                 assert (await web.client.abort(2, "still heard")).accepted
 
     asyncio.run(scenario())
+
+
+def test_the_web_process_ends_while_a_worker_owes_it_an_answer(tmp_path: Path, migrated_file: Path) -> None:
+    database = Database(Path(shutil.copyfile(migrated_file, tmp_path / "gainline.sqlite3")))
+
+    async def scenario() -> None:
+        owing = asyncio.Event()
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(encode(WorkerHello(pid=1, version="test", flying=[])))
+            assert isinstance(decode(await reader.readline()), Ping)
+            owing.set()
+            await reader.read()
+            writer.close()
+
+        async with await asyncio.start_unix_server(serve, str(live_address(tmp_path))):
+            link = live_link(tmp_path, database)
+            await link.__aenter__()
+            await asyncio.wait_for(owing.wait(), 30)
+            ended = asyncio.create_task(link.__aexit__(None, None, None))
+            done, _ = await asyncio.wait([ended], timeout=30)
+            assert done, "it hangs"
+
+    asyncio.run(scenario())
+    database.close()
