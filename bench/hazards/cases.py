@@ -53,7 +53,7 @@ SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "px4": {"MPC_Z_P": 1.1, "MPC_Z_VEL_P_ACC": 4.4, "MPC_Z_VEL_D_ACC": 0.01, "MPC_Z_VEL_I_ACC": 1.8},
 }
 """Not one of them is what the autopilot holds after its start."""
-_TUNED: Final[Mapping[str, Mapping[str, float]]] = {
+TUNED: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 1600, "ki": 1023, "kd": 127},
     "ardupilot": {"PSC_POSZ_P": 1.5, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.37, "PSC_ACCZ_D": 0.002, "PSC_ACCZ_I": 1.1},
     "px4": {"MPC_Z_P": 1.2, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.02, "MPC_Z_VEL_I_ACC": 1.7},
@@ -172,5 +172,5 @@ def _gains(chance: random.Random, autopilot: str, *, wild: bool) -> dict[str, fl
 
 def tuned_gains(chance: random.Random, autopilot: str) -> dict[str, float]:
     """Gains that fly well, scattered so that none is another's."""
-    scattered = {name: value * chance.uniform(1 - _SPREAD, 1 + _SPREAD) for name, value in _TUNED[autopilot].items()}
+    scattered = {name: value * chance.uniform(1 - _SPREAD, 1 + _SPREAD) for name, value in TUNED[autopilot].items()}
     return {name: round(value) if autopilot == "paparazzi" else round(value, 5) for name, value in scattered.items()}

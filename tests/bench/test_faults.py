@@ -1,13 +1,12 @@
 """The judge of trials with faults is judged; and what a run once found wrong is flown again."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
 import pytest
 
 from app.vehicles.mavlink.dialects import FieldValue
-from bench.hazards.cases import CELLS, SAFE, WILD_GAINS, Case, Mishap, draw
+from bench.hazards.cases import CELLS, SAFE, TUNED, WILD_GAINS, Case, Mishap, draw
 from bench.hazards.expected import faults
 from bench.hazards.flying import Flown
 from bench.hazards.intervals import covers, longest, merged, total
@@ -16,15 +15,10 @@ from bench.hazards.rig import Stopping, Struck
 from bench.hazards.stages import Stage, Stages
 from bench.hazards.wire import DIALECTS, Order, order, stops_motors
 
-GAINS: Final[Mapping[str, Mapping[str, float]]] = {
-    "paparazzi": {"kp": 1600, "ki": 1023, "kd": 127},
-    "px4": {"MPC_Z_P": 1.2, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.02, "MPC_Z_VEL_I_ACC": 1.7},
-}
-
 
 def case(*mishaps: Mishap, autopilot: str = "paparazzi", waits_s: float = 0.0) -> Case:
     return Case(
-        seed=1, autopilot=autopilot, mishaps=mishaps, gains=GAINS[autopilot], warm_s=4.0, waits_s=waits_s, pinned=True
+        seed=1, autopilot=autopilot, mishaps=mishaps, gains=TUNED[autopilot], warm_s=4.0, waits_s=waits_s, pinned=True
     )
 
 
@@ -111,7 +105,7 @@ def flown(*struck: Struck, **differently: object) -> Flown:
         reason="",
         holds_safe=True,
         held=SAFE["paparazzi"],
-        flew_on=GAINS["paparazzi"],
+        flew_on=TUNED["paparazzi"],
         armed=False,
         height_m=0.0,
         impact_m_s=0.8,

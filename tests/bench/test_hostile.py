@@ -2,17 +2,11 @@
 
 import pytest
 
-from bench.hazards.cases import SAFE, Case, Mishap
+from bench.hazards.cases import SAFE, TUNED, Case, Mishap
 from bench.hazards.hostile import HostileRig, carry_out, cases, judge
 from bench.hazards.hostility import HOSTILITIES
 from bench.hazards.rig import Stopping
 from bench.hazards.stages import Stage
-
-TUNED: dict[str, dict[str, float]] = {
-    "paparazzi": {"kp": 1600, "ki": 1023, "kd": 127},
-    "ardupilot": {"PSC_POSZ_P": 1.5, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.37, "PSC_ACCZ_D": 0.002, "PSC_ACCZ_I": 1.1},
-    "px4": {"MPC_Z_P": 1.2, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.02, "MPC_Z_VEL_I_ACC": 1.7},
-}
 
 
 def case(autopilot: str, what: str, stage: Stage, delay_s: float = 5.0, duration_s: float = float("inf")) -> Case:

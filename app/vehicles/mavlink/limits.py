@@ -8,6 +8,11 @@ WITNESSES_APART: Final = 1.05
 """Periods of its heartbeat that lie between two of them which agree: one that said otherwise would come between."""
 GROUND_M: Final = 0.15
 """Nearer to the ground than this a vehicle may stand on it."""
+REPEAT_S: Final = 1.0
+"""How often an order is repeated that a vehicle has not obeyed."""
+_LANDS_ANEW_S: Final = 5.0
+DESCENDING_M_S: Final = -0.2
+"""A vehicle that sinks faster than this is landing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,3 +59,9 @@ class Limits:
             lost_s=self.lost_s * patience,
             slow_s=self.slow_s * patience,
         )
+
+
+def land_every_s(asked_for_s: float, land_again_s: float) -> float:
+    """How often Land is repeated that was first asked `asked_for_s` ago. After some seconds only as often as the
+    autopilot bears: where every order begins the landing anew, it would never be over."""
+    return REPEAT_S if asked_for_s < _LANDS_ANEW_S else land_again_s

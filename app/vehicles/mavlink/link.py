@@ -353,7 +353,7 @@ class Link:
 
     def _is_vehicle(self, message: Message) -> bool:
         """Whether the message shows its sender to be the vehicle that this link is for."""
-        if not is_known(message) or not is_autopilots_heartbeat(message):
+        if not is_autopilots_heartbeat(message):
             return False
         make = int(number(message, "autopilot"))
         if self._make not in (None, make):

@@ -10,7 +10,8 @@ from typing import Final
 from app.vehicles.mavlink import agreement, findings
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.measurements import DISARMING, Heartbeat, Parameter, Reply
+from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
+from app.vehicles.mavlink.measurements import Heartbeat, tells_motors_off
 from app.vehicles.mavlink.moves import (
     Plan,
     Step,
@@ -48,9 +49,6 @@ __all__ = ["Plan", "Trial", "advance", "begin"]
 
 BASELINE_S: Final = 1.0
 ARMED_WITHIN_S: Final = 2.0
-REPEAT_S: Final = 1.0
-REPEATED_S: Final = 5.0
-"""For so long Land is repeated every second; then as often as the autopilot bears."""
 LANDED_S: Final = 2.0
 DOWN_S: Final = 1.0
 """On the ground for so long while it should hover: its integrator winds up."""
@@ -58,7 +56,6 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
-_DESCENDING_M_S: Final = -0.2
 _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
 
@@ -203,9 +200,7 @@ def _landing(trial: Trial, event: Event) -> Step:
 
 
 def _is_land_due(trial: Trial, now_s: float) -> bool:
-    """Every second at first. Then less often where every order begins the landing anew, or it would never be over."""
-    every_s = REPEAT_S if now_s - trial.since_s < REPEATED_S else trial.plan.land_again_s
-    return now_s - trial.repeated_s >= every_s
+    return now_s - trial.repeated_s >= land_every_s(now_s - trial.since_s, trial.plan.land_again_s)
 
 
 def _doubting(trial: Trial) -> Trial:
@@ -216,7 +211,7 @@ def _doubting(trial: Trial) -> Trial:
 
 def _come_down(trial: Trial, now_s: float) -> Step:
     """Its motors are stopped, unless nobody knows any more whose they are."""
-    if trial.doubt and trial.failure is not Failure.FALL and _changed(trial):
+    if trial.failure is not Failure.FALL and _changed(trial):
         return quarantine(trial, "", now_s)
     return disarm(trial, now_s)
 
@@ -282,14 +277,8 @@ def _disarming(trial: Trial, event: Event) -> Step:
 def _answered(trial: Trial, event: Event) -> Trial:
     """Note that it has answered the order to stop its motors: with what its heartbeat says, a second witness."""
     heard = event.measurement if isinstance(event, Heard) else None
-    match heard:
-        case Reply(to=to, accepted=True) if to == DISARMING:
-            yes = True
-        case Parameter(name=name, value=value):
-            yes = name in trial.plan.stop_settings and value != 0.0
-        case _:
-            yes = False
-    return replace(trial, answered=trial.answered or (yes and trial.repeated_s >= trial.since_s))
+    answered = tells_motors_off(heard, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
+    return replace(trial, answered=trial.answered or answered)
 
 
 def _is_stopped(trial: Trial, event: Event) -> bool:
@@ -380,4 +369,4 @@ def _obeys(trial: Trial, now_s: float) -> bool:
     if last is None or not watching.is_fresh(trial.watch, now_s):
         return False
     near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-    return near or last.climb_rate_m_s < _DESCENDING_M_S
+    return near or last.climb_rate_m_s < DESCENDING_M_S

@@ -1,5 +1,6 @@
 """What a vehicle's messages mean, whichever autopilot sent them: SI, altitude and climb positive up."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -124,3 +125,14 @@ Measurement = (
     | BlockEntered
     | Version
 )
+
+
+def tells_motors_off(measurement: Measurement | None, stop_settings: Collection[str]) -> bool:
+    """Whether it answers the order to stop the motors: the command accepted, or a setting that stops them read back."""
+    match measurement:
+        case Reply(to=to, accepted=True):
+            return to == DISARMING
+        case Parameter(name=name, value=value):
+            return name in stop_settings and value != 0.0
+        case _:
+            return False

@@ -3,15 +3,13 @@
 from typing import Final
 
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.measurements import DISARMING, Parameter, Reply
+from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
+from app.vehicles.mavlink.measurements import tells_motors_off
 from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.signals import Action, Heard
 
-REPEAT_S: Final = 1.0
-REPEATED_S: Final = 5.0
 STOPPING_S: Final = 5.0
 """For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""
-_DESCENDING_M_S: Final = -0.2
 
 
 class StandingOrder:
@@ -27,7 +25,9 @@ class StandingOrder:
 
     def proceed(self, heard: list[Heard]) -> None:
         """Take in what came, and send it again when it is due."""
-        self._answered = self._answered or any(self._is_answer(each) for each in heard)
+        if self._action is Action.KILL:
+            settings = self._radio.profile.stop_settings
+            self._answered = self._answered or any(tells_motors_off(each.measurement, settings) for each in heard)
         now_s = self._radio.clock.now_s()
         is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
         self._is_over = self._is_over or is_late or self._is_obeyed()
@@ -35,9 +35,9 @@ class StandingOrder:
             self._send()
 
     def _every_s(self, now_s: float) -> float:
-        """Every second at first; then a landing is left alone for as long as it takes to be over."""
-        is_landing = self._action is Action.LAND and now_s - self._asked_s >= REPEATED_S
-        return self._radio.profile.land_again_s if is_landing else REPEAT_S
+        if self._action is Action.LAND:
+            return land_every_s(now_s - self._asked_s, self._radio.profile.land_again_s)
+        return REPEAT_S
 
     def _send(self) -> None:
         """Every message once, waiting for no answer."""
@@ -51,15 +51,6 @@ class StandingOrder:
             ) from error
         for step in steps:
             self._radio.send(*step.sends)
-
-    def _is_answer(self, heard: Heard) -> bool:
-        match heard.measurement:
-            case Reply(to=to, accepted=True) if to == DISARMING:
-                return self._action is Action.KILL
-            case Parameter(name=name, value=value):
-                return name in self._radio.profile.stop_settings and value != 0.0
-            case _:
-                return False
 
     def _is_obeyed(self) -> bool:
         """By what came since it was given: the motors stand, by two heartbeats or by one and an answer; or, where it
@@ -76,4 +67,4 @@ class StandingOrder:
         if self._radio.block in profile.landing_blocks or mode in profile.landing_modes - profile.flying_modes:
             return True
         at_s, last = seen.positions[-1] if seen.positions else (float("-inf"), None)
-        return last is not None and at_s > self._asked_s and last.climb_rate_m_s < _DESCENDING_M_S
+        return last is not None and at_s > self._asked_s and last.climb_rate_m_s < DESCENDING_M_S

@@ -51,8 +51,7 @@ def write_gains(radio: Radio, gain_set: GainSet, gains: Gains) -> dict[str, floa
     """Write every gain, then read every one back: what the vehicle holds. Raises VehicleError for silence."""
     for gain in gain_set:
         wanted = gain.sent(gains[gain.gain])
-        request = radio.profile.set_parameter(radio.aim, gain.parameter, wanted)
-        if _ask(radio, request, gain.parameter) is None:
+        if write_parameter(radio, gain.parameter, wanted) is None:
             raise _unconfirmed(gain)
     return read_gains(radio, gain_set, gains)
 
@@ -71,6 +70,11 @@ def read_gains(radio: Radio, gain_set: GainSet, asked: Gains | None = None) -> d
 def read_parameter(radio: Radio, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     """None when the vehicle does not answer: it has no such parameter, or no ears."""
     return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter, attempts=attempts)
+
+
+def write_parameter(radio: Radio, parameter: str, value: float) -> float | None:
+    """What it answers to have; None when it does not answer."""
+    return _ask(radio, radio.profile.set_parameter(radio.aim, parameter, value), parameter)
 
 
 def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str, float]:

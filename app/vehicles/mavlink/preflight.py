@@ -14,7 +14,7 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.measurements import DISARMING, Heartbeat, Position, Reply
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import Requirement
+from app.vehicles.mavlink.profiles.base import Requirement, Step
 from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.sources import Lookout
 
@@ -148,8 +148,7 @@ def require_disarmed(radio: Radio) -> None:
 
 def prepare(radio: Radio, telemetry_hz: float) -> None:
     """Ask for telemetry. Raises VehicleError when it is refused."""
-    if why := radio.set_up(radio.profile.prepare(radio.aim, telemetry_hz)):
-        raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
+    _set_up(radio, radio.profile.prepare(radio.aim, telemetry_hz))
 
 
 def make_armable(radio: Radio) -> None:
@@ -160,8 +159,11 @@ def make_armable(radio: Radio) -> None:
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.patience
     while steps and not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
-    if not (steps and radio.is_disarmed):
-        return
+    if steps and radio.is_disarmed:
+        _set_up(radio, steps)
+
+
+def _set_up(radio: Radio, steps: tuple[Step, ...]) -> None:
     if why := radio.set_up(steps):
         raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
 

@@ -1,8 +1,7 @@
 """Parameters beside the gains that a take-off needs otherwise than they are: set for a trial, and put back after it."""
 
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.measurements import Parameter
-from app.vehicles.mavlink.parameters import read_parameter
+from app.vehicles.mavlink.parameters import read_parameter, write_parameter
 from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.signals import Setting
 
@@ -35,8 +34,7 @@ class TrialParameters:
 
     def _write(self, setting: Setting) -> bool:
         """Whether it is read back."""
-        request = self._radio.profile.set_parameter(self._radio.aim, setting.parameter, setting.value)
-        self._radio.ask(request, lambda heard: isinstance(heard, Parameter) and heard.name == setting.parameter)
+        write_parameter(self._radio, setting.parameter, setting.value)
         return read_parameter(self._radio, setting.parameter) == setting.value
 
 

@@ -279,22 +279,15 @@ def _is_same_clock(other: OtherClock, position: Position, now_s: float) -> bool:
 
 def _follows(one: Position, other: Position) -> bool:
     """Whether a vehicle can have come from one sample to the other."""
-    elapsed_s = other.time_boot_s - one.time_boot_s
     sudden = abs(other.climb_rate_m_s) > _JUMP_M_S >= abs(one.climb_rate_m_s)
-    return abs(other.altitude_m - _foreseen_m(one, elapsed_s)) <= _reach_m(elapsed_s) and not sudden
+    return not (sudden or _leaps(one, other))
 
 
 def _leaps(one: Position, other: Position) -> bool:
+    """Whether the other is farther from where the first one's speed leads than a vehicle can accelerate."""
     elapsed_s = other.time_boot_s - one.time_boot_s
-    return abs(other.altitude_m - _foreseen_m(one, elapsed_s)) > _reach_m(elapsed_s)
-
-
-def _foreseen_m(one: Position, elapsed_s: float) -> float:
-    return one.altitude_m + one.climb_rate_m_s * elapsed_s
-
-
-def _reach_m(elapsed_s: float) -> float:
-    return _JUMP_M + 0.5 * _ACCELERATION_M_S2 * elapsed_s**2
+    off_m = other.altitude_m - (one.altitude_m + one.climb_rate_m_s * elapsed_s)
+    return abs(off_m) > _JUMP_M + 0.5 * _ACCELERATION_M_S2 * elapsed_s**2
 
 
 def _accept(watch: Watch, position: Position, now_s: float, limits: Limits) -> Watch:
