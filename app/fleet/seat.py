@@ -29,10 +29,10 @@ from app.trials.crew import (
     Staged,
     StandDown,
     TakeOff,
-    Trouble,
     as_asked,
     in_control,
     mistake,
+    trouble,
 )
 from app.trials.flying import Monitor
 from app.vehicles.base import ConnectedVehicle, FlightRecord, Stop
@@ -97,7 +97,7 @@ def work(pipe: Connection, call: Call) -> None:
     except WorkerGoneError:
         pass
     except GainlineError as error:
-        line.say(Trouble(str(error), unsafe=isinstance(error, SafeGainsError)))
+        line.say(trouble(error))
     except Exception as error:  # noqa: BLE001 - the edge of the process; the worker's log says it
         line.say(mistake(error))
     finally:
@@ -259,7 +259,7 @@ class Seat:
                 finally:
                     self._line.say(Restored(restore_safe_gains(self._vehicle)))
         except GainlineError as error:
-            self._line.say(Trouble(str(error), unsafe=isinstance(error, SafeGainsError)))
+            self._line.say(trouble(error))
         except WorkerGoneError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end

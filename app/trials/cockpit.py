@@ -25,15 +25,14 @@ from app.trials.crew import (
     Staged,
     StandDown,
     TakeOff,
-    Trouble,
     as_asked,
     died,
     in_control,
     mistake,
+    trouble,
 )
 from app.trials.flying import Monitor
 from app.vehicles.base import FlightRecord, ShouldStop, Stop, Vehicle
-from app.vehicles.errors import SafeGainsError
 from app.vehicles.jsbsim.kind import prepare
 from app.vehicles.open import open_vehicle
 
@@ -154,7 +153,7 @@ def _fly(pipe: Connection, orders: Orders) -> None:
             if isinstance(answer, TakeOff):
                 pipe.send(Landed(_take_off(pipe, orders, vehicle, standing_down)))
     except GainlineError as error:
-        pipe.send(Trouble(str(error), unsafe=isinstance(error, SafeGainsError)))
+        pipe.send(trouble(error))
     except (EOFError, OSError):
         raise
     except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end

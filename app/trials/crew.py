@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Protocol
 
 from app.core.clock import REAL_TIME, Clock
+from app.core.errors import GainlineError
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import LockedError, exclusive
 from app.vehicles.base import MOTORS_OFF_ASKED, FlightOrder, FlightRecord, OptionValue
-from app.vehicles.errors import VehicleError
+from app.vehicles.errors import SafeGainsError, VehicleError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,10 +78,12 @@ class Restored:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """Said by the process: what went wrong; `unsafe` when the safe gains could not be verified afterwards."""
+    """Said by the process: what went wrong; `unsafe` when the safe gains could not be verified afterwards, `not_flown`
+    when the vehicle was never told to take off."""
 
     what: str
     unsafe: bool
+    not_flown: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +128,12 @@ def died(exit_code: int | None) -> VehicleError:
         f"The process that flew died (exit code {exit_code}).",
         hint="Look at the vehicle. The worker's log may say more; then fly again.",
     )
+
+
+def trouble(error: GainlineError) -> Trouble:
+    """What went wrong, as an error tells it."""
+    not_flown = isinstance(error, VehicleError) and error.not_flown
+    return Trouble(str(error), unsafe=isinstance(error, SafeGainsError), not_flown=not_flown)
 
 
 def mistake(error: Exception) -> Trouble:

@@ -191,7 +191,8 @@ def record_loss(session: Session, flight_id: int, problem: str) -> None:
 
 
 def record_failure(session: Session, flight_id: int, problem: str) -> None:
-    """It was not flown: the vehicle could not be opened, refused, or took other gains. The trial is as planned."""
+    """It was not flown: the vehicle could not be opened, refused, took other gains, or was never told to take off. The
+    trial is as planned."""
     _not_flown(session, flight_id, FlightState.FAILED, problem)
 
 
@@ -278,9 +279,13 @@ def _not_flown(session: Session, flight_id: int, state: FlightState, problem: st
     flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
-    if flight.trial.state == TrialState.STAGED:
+    was_flying = flight.trial.state == TrialState.FLYING
+    if flight.trial.state in {TrialState.STAGED, TrialState.FLYING}:
         move_trial(flight.trial, TrialState.PLANNED, reason=problem)
+        flight.trial.flown_at = None
     _end(flight, state, problem=problem)
+    if was_flying:
+        campaigns.end_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
 def _end(flight: FlightRow, state: FlightState, *, problem: str = "") -> None:

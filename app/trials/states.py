@@ -28,7 +28,8 @@ class TrialState(StrEnum):
 
         planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
            │  ↑───────┘ │        ├──→ aborted
-           │            │        └──→ lost ──→ captured (record recovered) | invalid
+           │            │        ├──→ lost ──→ captured (record recovered) | invalid
+           │            │        └──→ planned (the vehicle was never told to take off)
            ├────────────┴──→ cancelled
            └──→ captured (flown elsewhere, imported)
 
@@ -51,7 +52,7 @@ class TrialState(StrEnum):
 MOVES: Final[Mapping[TrialState, frozenset[TrialState]]] = {
     TrialState.PLANNED: frozenset({TrialState.STAGED, TrialState.CANCELLED, TrialState.CAPTURED}),
     TrialState.STAGED: frozenset({TrialState.FLYING, TrialState.PLANNED, TrialState.CANCELLED}),
-    TrialState.FLYING: frozenset({TrialState.CAPTURED, TrialState.ABORTED, TrialState.LOST}),
+    TrialState.FLYING: frozenset({TrialState.CAPTURED, TrialState.ABORTED, TrialState.LOST, TrialState.PLANNED}),
     TrialState.CAPTURED: frozenset({TrialState.VALID, TrialState.ABORTED, TrialState.INVALID}),
     TrialState.VALID: frozenset({TrialState.INVALID}),
     TrialState.ABORTED: frozenset({TrialState.INVALID}),

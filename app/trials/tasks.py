@@ -163,8 +163,13 @@ class FlightDeck:
                         ended = Ended(record=record, lifted_off=True)
                     case Restored(held):
                         ended = replace(ended, restored=held)
-                    case Trouble(what, unsafe):
-                        ended = replace(ended, problem=ended.problem or what, concern=what if unsafe else "")
+                    case Trouble(what, unsafe, not_flown):
+                        ended = replace(
+                            ended,
+                            problem=ended.problem or what,
+                            concern=what if unsafe else "",
+                            lifted_off=ended.lifted_off and not not_flown,
+                        )
         except Exception as error:  # noqa: BLE001 - a mistake of the program must not leave the trial without an end
             crew.close()
             return replace(ended, problem=_spoken(error), unheard=True)

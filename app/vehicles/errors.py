@@ -9,7 +9,9 @@ from app.core.errors import GainlineError
 
 
 class VehicleError(GainlineError):
-    """A vehicle could not do what was asked of it."""
+    """A vehicle could not do what was asked of it. `not_flown`: that was to fly, and it was never told to take off."""
+
+    not_flown = False
 
 
 class SafeGainsError(VehicleError):

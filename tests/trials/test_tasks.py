@@ -15,6 +15,7 @@ from app.db.models import FlightRow
 from app.db.session import Database
 from app.live.messages import FlightPhase, Shown
 from app.settings import Settings
+from app.trials.crew import Orders, Restored, Said, Staged, Trouble
 from app.trials.flights import BEGINS_WITHIN
 from app.trials.flying import Airspace
 from app.trials.states import FlightState, TrialState
@@ -259,6 +260,38 @@ def test_a_real_vehicle_is_not_in_doubt_when_nothing_was_sent_to_it(
     field.fly_next()
     assert "no room for the flight's record" in get(client, f"/api/trials/{trial_id}")["flight"]["problem"]
     assert vehicle_state(client) == "ready"
+
+
+class Refusing:
+    """Whoever has a vehicle that takes its gains and then will not arm."""
+
+    alive = True
+
+    def fly(self, orders: Orders) -> Iterator[Said]:
+        yield Staged(dict(orders.gains))
+        yield Restored(dict(orders.safe_gains))
+        yield Trouble("The vehicle would not arm.", unsafe=False, not_flown=True)
+
+    def take_off(self) -> None: ...
+    def decline(self) -> None: ...
+    def stand_down(self, trial_id: int, reason: str) -> None: ...
+    def close(self) -> None: ...
+
+
+def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
+    client: TestClient, field: Airfield, trial_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(field.deck._hangar, "take", Refusing)
+        field.fly_next()
+    after = get(client, f"/api/trials/{trial_id}")
+    assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
+    assert after["reason"] == "The vehicle would not arm."
+    assert get(client, f"/api/campaigns/{after['campaign_id']}")["state"] == "deciding"
+    assert vehicle_state(client) == "ready"
+    assert client.post(f"/api/trials/{trial_id}/fly", json={}).is_success
+    field.fly_next()
+    assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
 
 
 def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(

@@ -128,8 +128,8 @@ class MavlinkVehicle:
 
         The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_stop` is asked every
         10 ms. Raises VehicleError when nothing was staged, the vehicle is not ready, does not hold the staged gains any
-        more or did not lift off; what `on_sample` and `should_stop` raise lands the vehicle, and is raised again once
-        it is down.
+        more or could not be told to take off, which is then `not_flown`; what `on_sample` and `should_stop` raise lands
+        the vehicle, and is raised again once it is down.
         """
         self._require_trust()
         if self._gains.staged is None:
@@ -139,17 +139,16 @@ class MavlinkVehicle:
             )
         try:
             ground, stop = self._stand(STAND_S), should_stop()
-        except BaseException:
+            if stop is None:
+                self._parameters.set()
+        except BaseException as error:
+            if isinstance(error, VehicleError):
+                error.not_flown = True
             self._give_back()
             raise
         if stop is not None:
             self._give_back()
             return self._not_begun(ground, stop.reason)
-        try:
-            self._parameters.set()
-        except BaseException:
-            self._give_back()
-            raise
         flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
@@ -410,7 +409,9 @@ class MavlinkVehicle:
         if start_s is None and trial.failure is Failure.OPERATOR:
             return self._not_begun(ground, reason)
         if start_s is None:
-            raise VehicleError(reason, hint="Look at the vehicle, correct this, then fly again.")
+            refusal = VehicleError(reason, hint="Look at the vehicle, correct this, then fly again.")
+            refusal.not_flown = True
+            raise refusal
         both = Recorded(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
         if self._lookout is not None:
             zero_s, name = start_s + flown.offset_s, self._lookout.source.name
