@@ -2,40 +2,48 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from datetime import timedelta
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Header
+from fastapi import APIRouter, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app import __version__
 from app.api.deps import CurrentDatabase, Live
-from app.db.outbox import holds_everything_after, latest_event_id
+from app.db.outbox import holds_everything_after, latest_event_before, latest_event_id
 from app.db.session import Database
+from app.db.types import utc_now
 from app.live.hub import Change, LinkState
 from app.live.hub import Live as LiveItem
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.live.tail import changes_after
 
 RETRY_MS: Final = 1000
+MOST_SINCE_S: Final = 60.0
 
 router = APIRouter(prefix="/api", tags=["events"])
 
 
 @router.get("/events", response_class=EventSourceResponse)
 async def events(
-    live: Live, database: CurrentDatabase, last_event_id: Annotated[str | None, Header()] = None
+    live: Live,
+    database: CurrentDatabase,
+    last_event_id: Annotated[str | None, Header()] = None,
+    since_s: Annotated[
+        float, Query(ge=0.0, le=MOST_SINCE_S, description="seconds before now whose changes come first")
+    ] = 0.0,
 ) -> AsyncIterator[ServerSentEvent]:
     """Follow everything that happens.
 
     `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
-    entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
-    server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
-    flight, `vehicle` five times a second from a connected vehicle, and `worker` tells whether the worker is there: when
-    it comes or goes, and every three seconds, so that silence means a dead line. These carry no id and may be dropped
-    for a slow client.
+    entity_id, campaign_id), those of the last `since_s` seconds first, for whoever read something just before; its id
+    lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the server included. `reset`: that id
+    is unknown here, load everything anew. `telemetry` and `phase` come from a running flight, `vehicle` five times a
+    second from a connected vehicle, and `worker` tells whether the worker is there: when it comes or goes, and every
+    three seconds, so that silence means a dead line. These carry no id and may be dropped for a slow client.
     """
     with live.hub.subscribe() as stream:
-        sent, known = await asyncio.to_thread(_start, database, last_event_id)
+        sent, known = await asyncio.to_thread(_start, database, last_event_id, since_s)
         yield ServerSentEvent(
             event="hello",
             id=None if last_event_id else str(sent),
@@ -55,12 +63,12 @@ async def events(
             yield _event(live, item)
 
 
-def _start(database: Database, last_event_id: str | None) -> tuple[int, bool]:
+def _start(database: Database, last_event_id: str | None, since_s: float) -> tuple[int, bool]:
     """The event after which the stream begins, and whether the client's own history is known up to there."""
     with database.read() as session:
         latest = latest_event_id(session)
         if not last_event_id:
-            return latest, True
+            return latest_event_before(session, utc_now() - timedelta(seconds=since_s)), True
         if last_event_id.isdecimal() and holds_everything_after(session, int(last_event_id)):
             return int(last_event_id), True
         return latest, False

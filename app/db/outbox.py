@@ -4,6 +4,7 @@ The web process reads them in order and tells the browsers. They say that a thin
 """
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Final
 
 from sqlalchemy import delete, func, insert, select
@@ -34,6 +35,12 @@ def record_changes(session: Session, _context: UOWTransaction) -> None:
 def latest_event_id(session: Session) -> int:
     """The id of the newest event; 0 before the first."""
     return session.scalar(select(func.max(EventRow.id))) or 0
+
+
+def latest_event_before(session: Session, at: datetime) -> int:
+    """The id of the newest event before that time; 0 where there is none."""
+    newest = select(EventRow.id).where(EventRow.at < at).order_by(EventRow.id.desc()).limit(1)
+    return session.scalar(newest) or 0
 
 
 def holds_everything_after(session: Session, event_id: int) -> bool:

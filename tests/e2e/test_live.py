@@ -6,7 +6,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from playwright.sync_api import Locator, Request, expect
+from playwright.sync_api import Locator, Request, Route, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
@@ -82,6 +82,22 @@ def test_two_tabs_show_the_same_truth_over_one_stream_each(open_dashboard: Opene
     one.page.remove_listener("request", note)
     other.page.reload()
     expect(heading(other, "Seen by both")).to_be_visible()
+
+
+def test_what_changed_before_the_stream_was_there_is_shown(dashboard: Dashboard, shared_server: Server) -> None:
+    page, late = dashboard.page, list[Route]()
+
+    def hold(route: Route) -> None:
+        late.append(route)
+
+    campaign_id = new_campaign(dashboard, "Before the stream")
+    page.route("**/api/events*", hold)
+    page.goto(f"{shared_server.url}/campaigns/{campaign_id}")
+    expect(heading(dashboard, "Before the stream")).to_be_visible()
+    rename(dashboard, campaign_id, "Renamed meanwhile")
+    dashboard.until(lambda: bool(late))
+    late.pop().continue_()
+    expect(heading(dashboard, "Renamed meanwhile")).to_be_visible()
 
 
 def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboard: Opener, own_server: Server) -> None:

@@ -1,6 +1,7 @@
 /** The tab's one event stream: changes make cached answers doubtful, telemetry feeds the live curves. */
 
 import type { QueryClient } from "@tanstack/react-query";
+import { followDoubts } from "../lib/doubt";
 import { type Change, changeFrom, doubtfulOnce } from "../lib/events";
 import { telemetryFrom } from "../lib/live";
 import { secondsBetween, statusFrom } from "../lib/vehicle";
@@ -12,6 +13,13 @@ const HIDDEN_MS = 20_000;
 /** The server says something every three seconds; a line that is silent for longer is dead, though it looks open. */
 const SILENT_S = 8;
 const WATCH_MS = 1000;
+const LONGEST_SINCE_S = 60;
+
+/** Seconds since the page began to load, to tell a new stream from when on changes count: its first answers may be
+ * older than the stream. */
+function sinceLoaded(): number {
+  return Math.min(Math.ceil(performance.now() / 1000) + 1, LONGEST_SINCE_S);
+}
 
 /**
  * Follow the stream until the returned function is called. The browser itself comes back with `Last-Event-ID`; a
@@ -20,6 +28,7 @@ const WATCH_MS = 1000;
  * opened anew.
  */
 export function followEvents(queries: QueryClient, somethingFlies: () => boolean): () => void {
+  const doubts = followDoubts(queries);
   let source: EventSource | null = null;
   let again: ReturnType<typeof setTimeout> | undefined;
   let hiding: ReturnType<typeof setTimeout> | undefined;
@@ -35,7 +44,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     const changes = gathered;
     gathered = [];
     gathering = undefined;
-    for (const queryKey of doubtfulOnce(changes)) void queries.invalidateQueries({ queryKey });
+    for (const queryKey of doubtfulOnce(changes)) doubts.raise({ queryKey });
   }
 
   function take(change: Change | null): void {
@@ -47,13 +56,13 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
   function hello(data: string): void {
     const { worker } = JSON.parse(data) as { worker?: boolean };
     setConnection({ state: "live", worker: worker ?? true });
-    if (!fresh) void queries.invalidateQueries();
+    if (!fresh) doubts.raise();
     fresh = false;
   }
 
   function open(): void {
     if (source !== null) return;
-    const stream = new EventSource("/api/events");
+    const stream = new EventSource(`/api/events?since_s=${sinceLoaded()}`);
     source = stream;
     opened = momentNow();
     const on = (name: string, listener: (data: string) => void): void =>
@@ -62,7 +71,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
         listener(event.data);
       });
     on("hello", hello);
-    on("reset", () => void queries.invalidateQueries());
+    on("reset", () => doubts.raise());
     on("change", (data) => take(changeFrom(data)));
     on("worker", (data) => setConnection({ worker: (JSON.parse(data) as { worker: boolean }).worker }));
     on("telemetry", (data) => {
@@ -134,6 +143,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     clearInterval(watching);
     clearTimeout(hiding);
     clearTimeout(gathering);
+    doubts.stop();
     close();
   };
 }

@@ -767,10 +767,10 @@ export const getFlightFigure = <ThrowOnError extends boolean = false>(options: O
  * Follow everything that happens.
  *
  * `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
- * entity_id, campaign_id); its id lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the
- * server included. `reset`: that id is unknown here, load everything anew. `telemetry` and `phase` come from a running
- * flight, `vehicle` five times a second from a connected vehicle, and `worker` tells whether the worker is there: when
- * it comes or goes, and every three seconds, so that silence means a dead line. These carry no id and may be dropped
- * for a slow client.
+ * entity_id, campaign_id), those of the last `since_s` seconds first, for whoever read something just before; its id
+ * lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the server included. `reset`: that id
+ * is unknown here, load everything anew. `telemetry` and `phase` come from a running flight, `vehicle` five times a
+ * second from a connected vehicle, and `worker` tells whether the worker is there: when it comes or goes, and every
+ * three seconds, so that silence means a dead line. These carry no id and may be dropped for a slow client.
  */
 export const events = <ThrowOnError extends boolean = false>(options?: Options<EventsData, ThrowOnError, unknown>): Promise<ServerSentEventsResult<EventsResponses>> => (options?.client ?? client).sse.get<EventsResponses, EventsErrors, ThrowOnError>({ url: '/api/events', ...options });

@@ -3354,7 +3354,8 @@ export type TrialPhoto = {
  *
  * planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
  * │  ↑───────┘ │        ├──→ aborted
- * │            │        └──→ lost ──→ captured (record recovered) | invalid
+ * │            │        ├──→ lost ──→ captured (record recovered) | invalid
+ * │            │        └──→ planned (the vehicle was never told to take off)
  * ├────────────┴──→ cancelled
  * └──→ captured (flown elsewhere, imported)
  *
@@ -6846,7 +6847,14 @@ export type EventsData = {
         'last-event-id'?: string | null;
     };
     path?: never;
-    query?: never;
+    query?: {
+        /**
+         * Since S
+         *
+         * seconds before now whose changes come first
+         */
+        since_s?: number;
+    };
     url: '/api/events';
 };
 
