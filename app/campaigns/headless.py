@@ -100,6 +100,8 @@ def fly_campaign(
                 )
             proposal = _by_hand(gains[number - 1], history)
         overruled = _require_flyable(definition, experiment, proposal, history, overrule, is_real)
+        if overruled:
+            get_kind(vehicle).check_gains(options, proposal.gains)
         watcher.proposed(number, proposal)
         record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
         battery_v = landing_battery_v(record.trajectory.as_stored())

@@ -10,7 +10,9 @@ from app.core.experiments import experiment_of
 from app.core.gate import Gate, check_policy, require_flyable
 from app.core.policy import Gains
 from app.db.models import CampaignRow, JsonObject, ProposalRow
+from app.fleet import service as fleet
 from app.trials import history
+from app.vehicles.open import get_kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,4 +69,6 @@ def judge_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: st
 
 def _judged(campaign: CampaignRow, gains: dict[str, float], gate: Gate, overrule: str | None) -> Judged:
     reason = require_flyable(gate, overrule=overrule or "", is_real=campaign.vehicle.is_real)
+    if reason:
+        get_kind(campaign.vehicle.kind).check_gains(fleet.options_of(campaign), gains)
     return Judged(gains, proposing.gate_json(gate), reason)

@@ -23,6 +23,10 @@ def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
     return False
 
 
+def _take_any(_options: Options, _gains: Gains) -> None:
+    """A simulation flies whatever its controller can hold."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleKind:
     """A registered kind of vehicle.
@@ -33,7 +37,8 @@ class VehicleKind:
     none, and is opened for each flight. It raises VehicleError when nobody answers, or another than `identity` (None:
     whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
     `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
-    says whether a vehicle of a real kind is a simulation all the same.
+    says whether a vehicle of a real kind is a simulation all the same. `check_gains(options, gains)` raises GainsError
+    for gains that such a vehicle is never given, whatever anybody overrules.
     """
 
     name: str
@@ -48,6 +53,7 @@ class VehicleKind:
     conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
     simulates: Callable[[Options, Hosts], bool] = _never
     suits: Callable[[Options], tuple[str, ...]] | None = None
+    check_gains: Callable[[Options, Gains], object] = _take_any
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""

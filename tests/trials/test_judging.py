@@ -28,6 +28,7 @@ from tests.builders import (
     run_jobs,
     upload,
 )
+from tests.fleet.vehicles import create_campaign_on, create_connected
 
 OPEN = {"first_step_fraction": 1.0, "stop": {"kind": "budget", "max_flights": 9}}
 PAPERS = {"kp": 1624, "ki": 1356, "kd": 195}
@@ -81,6 +82,18 @@ def test_a_proposal_that_the_gate_refuses_flies_with_a_reason_only(client: TestC
     assert {problem["field"] for problem in refused["problems"]} == {"gains"}
     status, planned = ask(client, campaign, proposal_id=proposal["id"], overrule=REASON)
     assert (status, planned["overrule_reason"]) == (201, REASON)
+
+
+def test_gains_that_the_vehicle_would_not_be_given_are_refused_whoever_overrules(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    campaign = create_campaign_on(client, database, vehicle, definition=OPEN)
+    status, refused = ask(client, campaign, gains={"kp": 300, "ki": 13, "kd": 900}, overrule=REASON)
+    assert (status, refused["detail"]) == (422, "These gains may not be written to the vehicle.")
+    assert [(each["field"], each["reason"]) for each in refused["problems"]] == [
+        ("gains.kd", "must lie in 0 … 800, got 900")
+    ]
 
 
 def test_a_reason_that_nothing_needs_is_not_kept(client: TestClient, database: Database) -> None:

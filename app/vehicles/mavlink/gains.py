@@ -6,7 +6,7 @@ from app.core.policy import Gains
 from app.vehicles.base import CheckItem
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink import parameters
-from app.vehicles.mavlink.profiles.base import GainSet
+from app.vehicles.mavlink.profiles.base import GainSet, check_gains
 from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.signals import Setting
 
@@ -19,13 +19,13 @@ class GainStore:
         """Raises GainsError for safe gains that the autopilot cannot hold."""
         self._radio = radio
         self._gain_set: GainSet | None = None
-        self.safe: Final[Gains] = parameters.check_gains(safe, radio.profile.gain_sets[0])
+        self.safe: Final[Gains] = check_gains(safe, radio.profile.gain_sets[0])
         self.staged: dict[str, float] | None = None
         self.held: dict[str, float] = {}
 
     def stage(self, gains: Gains) -> dict[str, float]:
         """Raises GainsError for gains that may not be written (nothing is changed then), VehicleError for silence."""
-        wanted = parameters.check_gains(gains, self._found())
+        wanted = check_gains(gains, self._found())
         self.staged = None
         held = self._write(wanted)
         self.staged = held if held == wanted else None

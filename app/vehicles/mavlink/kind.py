@@ -9,6 +9,7 @@ from app.vehicles.base import ConnectedVehicle, Identity, Vehicle, VehicleOption
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.profiles.base import check_gains
 from app.vehicles.mocap import addresses as sources
 
 if TYPE_CHECKING:
@@ -92,6 +93,10 @@ def _experiments(options: Options) -> tuple[str, ...]:
     return (PROFILES[str(options["autopilot"])].experiment,)
 
 
+def _check_gains(options: Options, gains: Gains) -> object:
+    return check_gains(gains, PROFILES[str(options["autopilot"])].gain_sets[0])
+
+
 def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
     if scored not in SCORED:
         return (Problem("scored_source", f"must be {' or '.join(SCORED)}, got {scored}"),)
@@ -155,4 +160,5 @@ MAVLINK: Final = VehicleKind(
     conflicts=_conflicts,
     simulates=is_simulated,
     suits=_experiments,
+    check_gains=_check_gains,
 )

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from app.core.errors import GainsError, Problem
 from app.core.policy import Gains
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
@@ -16,23 +15,6 @@ from app.vehicles.mavlink.signals import Heard, Setting
 LIST_ATTEMPTS: Final = 3
 LIST_ENDS_S: Final = 2.0
 """The list is over when nothing of it has come for so long."""
-
-
-def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
-    """The gains, complete and in order. Raises GainsError for those that may not be written: no autopilot checks."""
-    known = {gain.gain: gain for gain in gain_set}
-    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in known]
-    for name, gain in known.items():
-        reason = gain.refusal(gains[name]) if name in gains else "is missing"
-        if reason is not None:
-            problems.append(Problem(f"gains.{name}", reason))
-    if problems:
-        raise GainsError(
-            "These gains may not be written to the vehicle.",
-            problems=tuple(problems),
-            hint=f"Send {', '.join(known)}, each within its range.",
-        )
-    return {name: int(gains[name]) if gain.whole else float(gains[name]) for name, gain in known.items()}
 
 
 def find_gain_set(radio: Radio) -> GainSet:

@@ -24,9 +24,9 @@ from app.vehicles.mavlink.measurements import (
     Reply,
     Version,
 )
-from app.vehicles.mavlink.parameters import check_gains, settings
+from app.vehicles.mavlink.parameters import settings
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile
+from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile, check_gains
 from app.vehicles.mavlink.signals import Action, Setting
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 

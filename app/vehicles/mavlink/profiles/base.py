@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Final, Protocol
 
-from app.core.policy import shortened
+from app.core.errors import GainsError, Problem
+from app.core.policy import Gains, shortened
 from app.vehicles.mavlink.dialects import (
     Dialect,
     FieldValue,
@@ -87,6 +88,23 @@ class GainParameter:
 
 
 GainSet = tuple[GainParameter, ...]
+
+
+def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
+    """The gains, complete and in order. Raises GainsError for those that may not be written: no autopilot checks."""
+    known = {gain.gain: gain for gain in gain_set}
+    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in known]
+    for name, gain in known.items():
+        reason = gain.refusal(gains[name]) if name in gains else "is missing"
+        if reason is not None:
+            problems.append(Problem(f"gains.{name}", reason))
+    if problems:
+        raise GainsError(
+            "These gains may not be written to the vehicle.",
+            problems=tuple(problems),
+            hint=f"Send {', '.join(known)}, each within its range.",
+        )
+    return {name: int(gains[name]) if gain.whole else float(gains[name]) for name, gain in known.items()}
 
 
 @dataclass(frozen=True, slots=True)
