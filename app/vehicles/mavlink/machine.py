@@ -3,6 +3,7 @@
 It knows no autopilot and no clock: events carry their time, commands are data that `trial.py` carries out.
 """
 
+import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
@@ -73,7 +74,8 @@ def advance(trial: Trial, event: Event) -> Step:
     if isinstance(event, Heard):
         trial, kept = _hear(trial, event)
     elif isinstance(event, Sighted):
-        trial = replace(trial, watch=watching.sight(trial.watch, event))
+        sighted = replace(event, altitude_m=event.altitude_m + trial.risen_m)
+        trial = replace(trial, watch=watching.sight(trial.watch, sighted))
     elif isinstance(event, Doubled):
         trial = replace(trial, watch=replace(trial.watch, doubled=event.why))
     trial = replace(trial, watch=watching.settle(trial.watch, event.now_s, trial.plan.ground_m))
@@ -86,6 +88,8 @@ def _hear(trial: Trial, event: Heard) -> Step:
     trial = replace(trial, watch=watch)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
         return trial, ()
+    if trial.state is State.ARM:
+        trial = replace(trial, stood_m=(*trial.stood_m, *(position.altitude_m for position in positions)))
     to_m = trial.plan.ground_m if trial.state not in _HOLDING else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(Keep(position, to_m, watch.battery_v, second_m) for position in positions)
@@ -117,9 +121,22 @@ def _arm(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or trial.watch.last is None:
         return trial, ()
-    watch = replace(trial.watch, block="")
-    trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=trial.watch.last.time_boot_s)
+    trial = replace(_on_ground(trial), commanded_s=now_s, commanded_boot_s=trial.watch.last.time_boot_s)
     return enter(trial, State.TAKEOFF, now_s), (Perform(Action.TAKE_OFF),)
+
+
+def _on_ground(trial: Trial) -> Trial:
+    """Heights count from where it stands at the command: the median of what it told since it is armed, without the
+    first half, for some estimators begin anew as they are armed, which is no leap of the vehicle's."""
+    told = trial.stood_m[len(trial.stood_m) // 2 :]
+    ground_m = statistics.median(told) if told else trial.plan.ground_m
+    return replace(
+        trial,
+        plan=trial.plan.on_ground_at(ground_m),
+        watch=watching.stand(trial.watch),
+        risen_m=ground_m - trial.plan.ground_m,
+        stood_m=(),
+    )
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:

@@ -20,25 +20,37 @@ GAINS_S: Final = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground and the zero of
-    the record's altitude are on the vehicle's datum, how long to record after the command, how soon the vehicle has to
-    lift off, how long a landing is left alone before it is asked for again, and its limits."""
+    """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground is on the
+    vehicle's datum, whether what it is told to climb to counts from there, how long to record after the command, how
+    soon the vehicle has to lift off, how long a landing is left alone before it is asked for again, and its limits."""
 
     safe_gains: tuple[Setting, ...]
     limits: Limits
     ground_m: float
-    datum_m: float = 0.0
+    climbs_from_ground: bool = False
     record_s: float = 33.0
     lift_off_s: float = 1.5
     land_again_s: float = 1.0
     stop_settings: tuple[str, ...] = ()
+
+    @property
+    def datum_m(self) -> float:
+        """Where the record's altitude counts from, on the vehicle's datum."""
+        return self.ground_m if self.climbs_from_ground else 0.0
+
+    def on_ground_at(self, ground_m: float) -> "Plan":
+        """The same from another height of the ground."""
+        moved = replace(self, ground_m=ground_m)
+        set_point_m = self.limits.set_point_m + moved.datum_m - self.datum_m
+        return replace(moved, limits=replace(self.limits, set_point_m=set_point_m))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
     `failure` is the first that happened; `stopped`: a person has asked for its motors to be stopped, `answered`: it
-    has answered an order to stop them. `doubt`: why it is quarantined in the end, however it lands."""
+    has answered an order to stop them. `stood_m`: its altitudes since it is armed, until the command; `risen_m`: by how
+    much higher the ground was then than before. `doubt`: why it is quarantined in the end, however it lands."""
 
     plan: Plan
     state: State
@@ -50,6 +62,8 @@ class Trial:
     armed_s: float | None = None
     commanded_s: float | None = None
     commanded_boot_s: float | None = None
+    stood_m: tuple[float, ...] = ()
+    risen_m: float = 0.0
     unsent: tuple[Setting, ...] = ()
     awaited: Setting | None = None
     gains_since_s: float | None = None

@@ -56,7 +56,8 @@ class Flight:
     """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
 
     `restore` writes the safe gains, reads them back, and says what is wrong with them, or nothing. `look` gives what a
-    second source of altitude has seen since the last call; `channels` are those of a sample, for whoever watches.
+    second source of altitude has seen since the last call; `channels` are those of a sample with that datum, for
+    whoever watches.
     """
 
     def __init__(
@@ -68,7 +69,7 @@ class Flight:
         restore: Callable[[], str],
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
-        channels: Callable[[Keep], dict[str, float]],
+        channels: Callable[[Keep, float], dict[str, float]],
         look: Callable[[], Sequence[Sighted]] = _blind,
     ) -> None:
         self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
@@ -85,6 +86,11 @@ class Flight:
     @property
     def state(self) -> State:
         return self._trial.state
+
+    @property
+    def datum_m(self) -> float:
+        """Where altitudes count from, on the vehicle's own datum."""
+        return self._trial.plan.datum_m
 
     def fly(self) -> Flown:
         """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
@@ -169,7 +175,7 @@ class Flight:
         time_s = kept.position.time_boot_s - start_s
         if time_s >= 0.0 and time_s - self._shown_s >= _SAMPLE_EVERY_S:
             self._shown_s = time_s
-            self._show(Sample(time_s, self._channels(kept)))
+            self._show(Sample(time_s, self._channels(kept, self.datum_m)))
 
     def _show(self, sample: Sample) -> None:
         try:

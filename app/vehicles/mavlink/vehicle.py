@@ -185,7 +185,7 @@ class MavlinkVehicle:
         )
         return self._gauges.read(
             step=(State.IDLE if step in _ON_THE_GROUND else step).value,
-            datum_m=self._datum_m,
+            datum_m=self._datum_m if self._flight is None else self._flight.datum_m,
             held=self._gains.held,
             trouble=" ".join(trouble for trouble in troubles if trouble),
         )
@@ -337,7 +337,6 @@ class MavlinkVehicle:
         self._enter(State.ARM)
         plan = self._plan(ground)
         self._gains.staged = self._order = None
-        self._datum_m = plan.datum_m
         watch = watching.begin(
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STAND_S
         )
@@ -350,13 +349,13 @@ class MavlinkVehicle:
             restore=self._put_back,
             on_sample=on_sample,
             should_stop=should_stop,
-            channels=lambda kept: records.channels_of(kept, plan.datum_m, self._scored),
+            channels=lambda kept, datum_m: records.channels_of(kept, datum_m, self._scored),
             look=list if self._lookout is None else self._lookout.look,
         )
         try:
             flown = self._flight.fly()
         finally:
-            self._flight = None
+            self._datum_m, self._flight = self._flight.datum_m, None
         self._state, self._why = flown.trial.state, flown.trial.why
         if self._state is State.QUARANTINE:
             self._land_on()
@@ -377,7 +376,7 @@ class MavlinkVehicle:
         return Plan(
             safe_gains=self._gains.safe_settings,
             ground_m=ground.altitude_m,
-            datum_m=datum_m,
+            climbs_from_ground=profile.climbs_from_ground,
             lift_off_s=profile.lift_off_s,
             land_again_s=profile.land_again_s,
             stop_settings=profile.stop_settings,

@@ -116,6 +116,12 @@ def begin(now_s: float, *, last: Position | None = None, battery_v: float | None
     )
 
 
+def stand(watch: Watch) -> Watch:
+    """The memory of a vehicle that is about to be told to take off: it is on the ground, whatever its altitude did."""
+    second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
+    return replace(watch, block="", leapt=False, lifted=False, second=second)
+
+
 def hear(
     watch: Watch, measurement: Measurement | None, now_s: float, limits: Limits
 ) -> tuple[Watch, tuple[Position, ...]]:

@@ -7,8 +7,19 @@ from itertools import pairwise
 import pytest
 
 from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.machine import Plan
 from app.vehicles.mavlink.measurements import Breach, Heartbeat, Measurement, Parameter, Position
-from app.vehicles.mavlink.signals import AbortWanted, Action, Doubled, Perform, Refused, RestoreGains, SendGain
+from app.vehicles.mavlink.signals import (
+    AbortWanted,
+    Action,
+    Done,
+    Doubled,
+    Perform,
+    Refused,
+    RestoreGains,
+    SendGain,
+    Sighted,
+)
 from app.vehicles.mavlink.states import MOVES, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, Walk
 
@@ -70,6 +81,50 @@ STAGES: dict[State, Callable[[], Walk]] = {
     State.DISARM: disarming,
     State.RESTORE: restoring,
 }
+
+
+def begin_anew(plan: Plan) -> Walk:
+    """To the take-off command of a vehicle whose altitude begins anew 0.2 s after it was armed: 0.5 m higher."""
+    walk = Walk(plan=plan)
+    walk.give(Done(Action.ARM, walk.now_s))
+    walk.armed = True
+    while walk.trial.armed_s is None:
+        walk.pass_s(STEP_S)
+    walk.pass_s(0.2)
+    walk.altitude_m += 0.5
+    while walk.state is State.ARM:
+        walk.pass_s(STEP_S)
+    return walk
+
+
+@pytest.mark.parametrize(("climbs_from_ground", "set_point_m"), [(False, 3.0), (True, 3.5)])
+def test_the_ground_is_where_it_stands_at_the_command(climbs_from_ground: bool, set_point_m: float) -> None:
+    walk = begin_anew(replace(PLAN, climbs_from_ground=climbs_from_ground))
+    assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + 0.5)
+    assert walk.trial.plan.limits.set_point_m == pytest.approx(set_point_m)
+    assert walk.trial.plan.datum_m == pytest.approx(GROUND_M + 0.5 if climbs_from_ground else 0.0)
+    walk.pass_s(1.0)
+    assert walk.trial.failure is None, "it is not taken for one in the air"
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(0.5)
+    assert walk.state is State.RECORD
+
+
+def test_a_vehicle_whose_altitude_began_anew_has_its_motors_stopped_where_it_stands() -> None:
+    walk = begin_anew(replace(PLAN, lift_off_s=0.5))
+    walk.pass_s(0.6)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
+    walk.pass_s(1.1)
+    assert Action.MOTORS_OFF in walk.actions
+
+
+def test_a_second_source_goes_along_with_an_altitude_that_began_anew() -> None:
+    walk = begin_anew(PLAN)
+    for _ in range(50):
+        walk.pass_s(STEP_S)
+        walk.give(Sighted(GROUND_M, is_new=True, now_s=walk.now_s))
+    assert walk.trial.failure is None
+    assert walk.kept[-1].second_m == pytest.approx(GROUND_M + 0.5)
 
 
 def fall_silent(walk: Walk) -> None:
