@@ -27,7 +27,7 @@ from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, move_vehicle, require_idle
 from app.fleet.states import ACT_MOVES, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
-from app.fleet.views import act_view, vehicle_view
+from app.fleet.views import act_view, is_linked, vehicle_view
 from app.moves import check_action, check_move
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
@@ -99,6 +99,8 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: As
 
 def _requested(session: Session, row: VehicleRow, kind: ActKind, asker: Asker, *, reason: str = "") -> VehicleActRow:
     check_action(ACTIONS, kind, row.state, row.name)
+    if kind == ActKind.DISCONNECT and not is_linked(row):
+        raise ConflictError(f"{row.name} is neither connected nor looked for.", hint="Connect it, if it is wanted.")
     if kind == ActKind.DISCONNECT:
         require_may(Act.STOP, row, asker)
     else:
@@ -144,7 +146,8 @@ def finish_act(
     result: JsonObject | None = None,
     problem: str = "",
 ) -> None:
-    """What came of it; `problem` when it failed. Doing it twice is harmless."""
+    """What came of it; `problem` when it failed. A vehicle that was met before is looked for after a connect that
+    failed: it may be off, or another has its port. Doing it twice is harmless."""
     act = repository.get_act(session, act_id)
     if act.state != ActState.RUNNING:
         return
@@ -152,7 +155,7 @@ def finish_act(
     if read_back is not None:
         act.read_back = dict(read_back)
         hold_gains(act.vehicle, read_back)
-    _end(act, problem=problem)
+    _end(act, problem=problem, still_wanted=act.vehicle.identity is not None)
 
 
 def withdraw_acts(session: Session) -> list[int]:
@@ -295,8 +298,8 @@ def _move(act: VehicleActRow, to: ActState) -> None:
     act.state = check_move(ACT_MOVES, act.state, to, f"Act {act.id}")
 
 
-def _end(act: VehicleActRow, *, problem: str) -> None:
+def _end(act: VehicleActRow, *, problem: str, still_wanted: bool = False) -> None:
     _move(act, ActState.FAILED if problem else ActState.DONE)
     act.problem, act.finished_at = problem, utc_now()
-    if problem and act.kind == ActKind.CONNECT and act.by != BY_WORKER:
+    if problem and act.kind == ActKind.CONNECT and act.by != BY_WORKER and not still_wanted:
         act.vehicle.wanted_connected = False

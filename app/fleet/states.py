@@ -38,7 +38,7 @@ ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "fly": frozenset({VehicleState.READY}),
     "stage": frozenset({VehicleState.READY}),
     "connect": frozenset({VehicleState.DISCONNECTED}),
-    "disconnect": _DOWN,
+    "disconnect": _DOWN | {VehicleState.DISCONNECTED},
     "check": _DOWN,
     "restore": _DOWN,
     "parameters": frozenset({VehicleState.READY}),
@@ -48,7 +48,7 @@ ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "release": frozenset({VehicleState.QUARANTINED}),
 }
 """What a person may do with a vehicle, and in which states. Only registered vehicles that the program keeps a link to
-take anything beside `fly` and `release`."""
+take anything beside `fly` and `release`. One that is not connected is disconnected where it is looked for."""
 
 
 class ActKind(StrEnum):

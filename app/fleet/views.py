@@ -10,7 +10,7 @@ from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.kinds import can_fly, experiments_of, needs_staging, settings_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
-from app.fleet.states import ACTIONS
+from app.fleet.states import ACTIONS, VehicleState
 from app.moves import allowed
 from app.schemas import OptionValue, Page
 
@@ -100,6 +100,11 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
     return Page(items=items, total=total, next_cursor=following)
 
 
+def is_linked(row: VehicleRow) -> bool:
+    """Whether there is a link to it, or one is looked for because it is wanted."""
+    return row.state != VehicleState.DISCONNECTED or row.wanted_connected
+
+
 def _actions(row: VehicleRow) -> list[str]:
     possible = allowed(ACTIONS, row.state)
     if not row.registered:
@@ -107,6 +112,8 @@ def _actions(row: VehicleRow) -> list[str]:
     impossible = set() if can_fly(row) else {"fly", "stage"}
     if needs_staging(row):
         impossible.add("fly")
+    if not is_linked(row):
+        impossible.add("disconnect")
     return [action for action in possible if action not in impossible]
 
 

@@ -245,6 +245,29 @@ def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else
         assert len(acts.request_reconnections(session)) == 2  # wanted still: a person asked for it
 
 
+def test_a_vehicle_met_before_is_looked_for_after_a_connect_that_failed_until_somebody_stops_it(
+    client: TestClient, database: Database
+) -> None:
+    known, new = create_connected(client, database, "A"), register(client, "B")
+    ask(client, known, "disconnect")
+    finish_act(database)
+    with database.write() as session:
+        acts.vehicle_gone(session, known["id"])
+    assert "disconnect" not in seen(client, known)["actions"]
+    for vehicle in (known, new):
+        ask(client, vehicle, "connect")
+        finish_act(database, problem="the port is in use by another vehicle")
+    with database.read() as session:
+        assert [each.name for each in acts.wanted_links(session)] == ["A"]
+    assert "disconnect" in seen(client, known)["actions"]
+    assert "disconnect" not in seen(client, new)["actions"]
+    ask(client, known, "disconnect")
+    finish_act(database)
+    with database.read() as session:
+        assert acts.wanted_links(session) == []
+    assert seen(client, known)["state"] == "disconnected"
+
+
 def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: TestClient, database: Database) -> None:
     begun, waiting = (create_connected(client, database, name) for name in ("A", "B"))
     ask(client, begun, "restore")

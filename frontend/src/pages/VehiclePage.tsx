@@ -99,7 +99,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
               loading={asking === "disconnect"}
               onClick={() => ask.mutate("disconnect")}
             >
-              Disconnect
+              {vehicle.state === "disconnected" ? "Stop looking for it" : "Disconnect"}
             </Button>
           )}
         </div>
