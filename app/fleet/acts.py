@@ -210,11 +210,13 @@ def vehicle_connected(
     held: Mapping[str, float] | None = None,
 ) -> None:
     """The link is open. The vehicle is ready, or quarantined when there is a `concern`, be it one from before; its
-    identity is pinned the first time, its version the first time that it tells one. `held`: its gains, where it said
-    them."""
+    identity is pinned the first time without a concern, its version the first time that it tells one: a vehicle that
+    is not pinned is given nothing, for nobody has decided yet about the gains that it was found with. `held`: its
+    gains, where it said them."""
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
-    _pin(row, identity)
+    if not concern:
+        _pin(row, identity)
     if held is not None:
         hold_gains(row, held)
     _move_to(row, VehicleState.QUARANTINED if row.concern else VehicleState.READY)

@@ -19,7 +19,6 @@ from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
 from tests.fleet.vehicles import (
     DEFAULT_GAINS,
-    IDENTITY,
     connect,
     control_header,
     create_campaign_on,
@@ -183,7 +182,7 @@ def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: T
     with database.write() as session:
         task = acts.claim_act(session, WORKER)
         assert task is not None
-        assert (task.kind, task.vehicle.identity) == (ActKind.RELEASE, IDENTITY)
+        assert (task.kind, task.vehicle.identity) == (ActKind.RELEASE, None), "nobody has decided about it yet"
         acts.finish_act(session, task.act_id, read_back=DEFAULT_GAINS)
         acts.vehicle_released(session, vehicle["id"], identity=accepted)
     free = seen(client, vehicle)
@@ -243,6 +242,21 @@ def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else
     with database.write() as session:
         assert acts.claim_act(session, WORKER) is None
         assert len(acts.request_reconnections(session)) == 2  # wanted still: a person asked for it
+
+
+def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a_person_has_decided(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = register(client)
+    for _ in range(2):
+        connect(client, database, vehicle, concern="It holds others; nothing was written.")
+        assert ask(client, vehicle, "check") == 202
+        assert finish_act(database).vehicle.identity is None, "whoever connects it compares, and writes nothing"
+        with database.write() as session:
+            acts.vehicle_gone(session, vehicle["id"])
+    connect(client, database, vehicle)
+    assert ask(client, vehicle, "check") == 202
+    assert finish_act(database).vehicle.identity is not None
 
 
 def test_a_vehicle_met_before_is_looked_for_after_a_connect_that_failed_until_somebody_stops_it(

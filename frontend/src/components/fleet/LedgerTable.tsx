@@ -72,7 +72,7 @@ function Line({ line }: { line: GivenGains }) {
         </small>
       </td>
       <td className="numbers">{gainsInBrackets(line.asked)}</td>
-      <td className={`numbers ${differs ? classes["bad"] : ""}`}>
+      <td className={`numbers ${differs ? classes["differs"] : ""}`}>
         {read_back === null ? NOTHING : gainsInBrackets(read_back)}
       </td>
       <td>{line.outcome}</td>
