@@ -14,11 +14,12 @@ from app.jobs import states as jobs
 from app.moves import allowed, check_action, check_move, check_version
 from app.trials import states as trials
 
-# What the domain allows, written apart from the program's tables: "from: to, to".
+# What the domain allows, written apart from the program's tables: "from: to, to". Back from flying to planned is
+# docs/decisions/0020.
 TRIAL = """
 planned: staged, cancelled, captured
 staged: flying, planned, cancelled
-flying: captured, aborted, lost
+flying: captured, aborted, lost, planned
 captured: valid, aborted, invalid
 valid: invalid
 aborted: invalid

@@ -7,8 +7,9 @@ from playwright.sync_api import Locator, Page, expect
 from tests.e2e.dashboard import Dashboard
 from tests.runtime.drones import Drone
 
-DRONE_SPEED = 20.0
-"""Of the drone's time. The ground's is that of life, so the drone is never late."""
+DRONE_SPEED = 8.0
+"""Of the drone's time: a flight leaves four seconds of life to see it and to end it. The ground's time is that of life,
+so the drone is never late."""
 HOLD_MS = 2000
 """What a hold takes, by the page's clock."""
 

@@ -175,8 +175,8 @@ def fly_the_first(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> Js
     assert vehicle["control"]["operator"] == "Ada"
     picture(dashboard, "staged")
     hold_until_it_flies(dashboard, trial["id"])
-    see_it_fly(dashboard, 250)
     expect(word(dashboard)).to_have_text("Recording")
+    see_it_fly(dashboard, 250)
     picture(dashboard, "flying", at_rest=False)
     land(dashboard)
     picture(dashboard, "landed")
