@@ -150,7 +150,8 @@ class Seat:
     def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
         connect = get_kind(self._call.kind).connect
         assert connect is not None, self._call.kind
-        return connect(self._call.options, safe_gains, self._call.identity)
+        owed = self._call.lock.with_suffix(".owed.json")
+        return connect(self._call.options, safe_gains, self._call.identity, owed)
 
     def _next(self) -> ToSeat:
         """The worker's next message that is no order, listening to the vehicle meanwhile."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from app.core.errors import InputError, Problem
@@ -33,8 +34,9 @@ class VehicleKind:
 
     `experiments` names those that it can fly; where that depends on its settings, `suits(options)` those that it can
     fly with these. `open(options, safe_gains)` gets complete, checked options and returns a vehicle that holds its safe
-    gains. `connect(options, safe_gains, identity)` opens a link that stays open between flights; None: the kind has
-    none, and is opened for each flight. It raises VehicleError when nobody answers, or another than `identity` (None:
+    gains. `connect(options, safe_gains, identity, owed)` opens a link that stays open between flights; None: the kind
+    has none, and is opened for each flight. `owed` is a file for what the vehicle has to be given back even if this
+    process dies. It raises VehicleError when nobody answers, or another than `identity` (None:
     whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
     `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
     says whether a vehicle of a real kind is a simulation all the same. `check_gains(options, gains)` raises GainsError
@@ -49,7 +51,7 @@ class VehicleKind:
     experiments: tuple[str, ...]
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains], Vehicle]
-    connect: Callable[[Options, Gains, Identity | None], ConnectedVehicle] | None = None
+    connect: Callable[[Options, Gains, Identity | None, Path], ConnectedVehicle] | None = None
     conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
     simulates: Callable[[Options, Hosts], bool] = _never
     suits: Callable[[Options], tuple[str, ...]] | None = None

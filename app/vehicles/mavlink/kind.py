@@ -1,5 +1,6 @@
 """The kind `mavlink`: vehicles under Paparazzi, ArduCopter or PX4 at the other end of a link."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from app.core.clock import ScaledClock
@@ -33,12 +34,18 @@ def _open(options: Options, safe_gains: Gains) -> Vehicle:
     return _vehicle(options, safe_gains, None, observes=False, decided=False)
 
 
-def _connect(options: Options, safe_gains: Gains, identity: Identity | None) -> ConnectedVehicle:
-    return _vehicle(options, safe_gains, identity, observes=True, decided=identity is not None)
+def _connect(options: Options, safe_gains: Gains, identity: Identity | None, owed: Path) -> ConnectedVehicle:
+    return _vehicle(options, safe_gains, identity, observes=True, decided=identity is not None, owed=owed)
 
 
 def _vehicle(
-    options: Options, safe_gains: Gains, identity: Identity | None, *, observes: bool, decided: bool
+    options: Options,
+    safe_gains: Gains,
+    identity: Identity | None,
+    *,
+    observes: bool,
+    decided: bool,
+    owed: Path | None = None,
 ) -> "MavlinkVehicle":
     """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows.
 
@@ -59,6 +66,7 @@ def _vehicle(
             identity=identity,
             observes=observes,
             decided=decided,
+            owed=owed,
             source=source,
         )
     except BaseException:

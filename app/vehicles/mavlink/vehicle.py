@@ -56,6 +56,7 @@ class MavlinkVehicle:
         identity: Identity | None = None,
         observes: bool = False,
         decided: bool = True,
+        owed: Path | None = None,
         source: Source | None = None,
         transport: Transport | None = None,
     ) -> None:
@@ -64,7 +65,8 @@ class MavlinkVehicle:
         with what it holds, which may be its owner's; where that differs, nothing is written.
 
         `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
-        closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it.
+        closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it. The file
+        `owed` keeps what a trial has set beside the gains, for whoever connects next if this process dies.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
         without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
@@ -85,7 +87,7 @@ class MavlinkVehicle:
         try:
             self._gains = GainStore(self._radio, safe_gains)
             self._decided = decided
-            self._parameters = TrialParameters(self._radio)
+            self._parameters = TrialParameters(self._radio, owed)
             self._connect()
             if not observes:
                 self._require_ready()

@@ -1,5 +1,7 @@
 """What the real ArduCopter and PX4 were seen to do, done by the simulated ones, and what the program makes of it."""
 
+from pathlib import Path
+
 import pytest
 
 from app.vehicles.base import FlightOrder, FlightRecord, Stop
@@ -85,6 +87,42 @@ def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
         vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)
         assert set(flown) == {3.0}
         assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+
+
+def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) -> None:
+    owed, kept = tmp_path / "owed.json", set[str]()
+    with ready("px4") as rig, connected(rig, owed=owed) as vehicle:
+
+        def look() -> Stop | None:
+            if rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0:
+                kept.add(owed.read_text())
+            return Stop("seen enough") if rig.drone.body.altitude_m > 0.5 else None
+
+        vehicle.stage(SAFE["px4"])
+        vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)
+        assert kept == {'{"MIS_TAKEOFF_ALT": 2.5}'}
+        assert not owed.exists()
+
+
+def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(tmp_path: Path) -> None:
+    owed = tmp_path / "owed.json"
+    owed.write_text('{"MIS_TAKEOFF_ALT": 2.5}')
+    with ready("px4") as rig:
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        with connected(rig, owed=owed):
+            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
+            assert not owed.exists()
+
+
+def test_what_is_owed_and_cannot_be_read_is_said_before_anything_is_sent(tmp_path: Path) -> None:
+    owed = tmp_path / "owed.json"
+    owed.write_text("[2.5")
+    with (
+        ready("px4") as rig,
+        pytest.raises(VehicleError, match=r"owed\.json, which cannot be used"),
+        connected(rig, owed=owed),
+    ):
+        pass
 
 
 def test_what_a_refused_run_had_set_is_put_back_too() -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -70,11 +71,11 @@ def test_mavsdks_vehicle_that_will_not_arm_is_left_on_the_ground_with_its_safe_g
 
 
 @pytest.mark.complete
-def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters() -> None:
+def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters(tmp_path: Path) -> None:
     port = free_port()
     assert MAVLINK.connect is not None
     with MavsdkVehicle(port):
-        ours = MAVLINK.connect(MAVLINK.check(options_at(port), field="options"), SAFE, None)
+        ours = MAVLINK.connect(MAVLINK.check(options_at(port), field="options"), SAFE, None, tmp_path / "owed.json")
         try:
             assert (ours.identity.system_id, ours.concern) == (1, "")
             assert {item.title: item.found for item in ours.check() if not item.passed} == {}
