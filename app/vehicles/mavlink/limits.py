@@ -10,7 +10,8 @@ GROUND_M: Final = 0.15
 """Nearer to the ground than this a vehicle may stand on it."""
 REPEAT_S: Final = 1.0
 """How often an order is repeated that a vehicle has not obeyed."""
-_LANDS_ANEW_S: Final = 5.0
+_LAND_REPEATED_S: Final = 5.0
+"""For so long Land is repeated as often as any other order."""
 DESCENDING_M_S: Final = -0.2
 """A vehicle that sinks faster than this is landing."""
 
@@ -62,6 +63,6 @@ class Limits:
 
 
 def land_every_s(asked_for_s: float, land_again_s: float) -> float:
-    """How often Land is repeated that was first asked `asked_for_s` ago. After some seconds only as often as the
+    """How often Land is repeated that was first asked for `asked_for_s` ago. After some seconds only as often as the
     autopilot bears: where every order begins the landing anew, it would never be over."""
-    return REPEAT_S if asked_for_s < _LANDS_ANEW_S else land_again_s
+    return REPEAT_S if asked_for_s < _LAND_REPEATED_S else land_again_s

@@ -3,6 +3,7 @@
 It knows no autopilot and no clock: events carry their time, commands are data that `trial.py` carries out.
 """
 
+import math
 import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -11,8 +12,8 @@ from typing import Final
 from app.vehicles.mavlink import agreement, findings
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import Heartbeat, tells_motors_off
+from app.vehicles.mavlink.limits import DESCENDING_M_S, GROUND_M, REPEAT_S, land_every_s
+from app.vehicles.mavlink.measurements import Heartbeat, Position, confirms_motors_off
 from app.vehicles.mavlink.moves import (
     Plan,
     Step,
@@ -57,6 +58,7 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
+_IN_PLACE_M: Final = 0.3
 _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
 
@@ -74,7 +76,7 @@ def advance(trial: Trial, event: Event) -> Step:
     if isinstance(event, Heard):
         trial, kept = _hear(trial, event)
     elif isinstance(event, Sighted):
-        sighted = replace(event, altitude_m=event.altitude_m + trial.risen_m)
+        sighted = replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
         trial = replace(trial, watch=watching.sight(trial.watch, sighted))
     elif isinstance(event, Doubled):
         trial = replace(trial, watch=replace(trial.watch, doubled=event.why))
@@ -89,7 +91,7 @@ def _hear(trial: Trial, event: Heard) -> Step:
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
         return trial, ()
     if trial.state is State.ARM:
-        trial = replace(trial, stood_m=(*trial.stood_m, *(position.altitude_m for position in positions)))
+        trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
     to_m = trial.plan.ground_m if trial.state not in _HOLDING else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(Keep(position, to_m, watch.battery_v, second_m) for position in positions)
@@ -107,6 +109,7 @@ def _react(trial: Trial, event: Event) -> Step:
     if isinstance(event, MotorsOffWanted):
         return stop_motors(trial, event.reason, event.now_s)
     if isinstance(event, AbortWanted) and trial.state in COMMANDED:
+        trial = _with_ground(trial) if trial.state is State.ARM else trial
         return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
     return _COURSES[trial.state](trial, event)
 
@@ -118,25 +121,38 @@ def _arm(trial: Trial, event: Event) -> Step:
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if finding := findings.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
-        return fail(trial, finding, now_s)
-    if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or trial.watch.last is None:
+        return fail(_with_ground(trial), finding, now_s)
+    last = trial.watch.last
+    if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    trial = replace(_on_ground(trial), commanded_s=now_s, commanded_boot_s=trial.watch.last.time_boot_s)
+    trial = _with_ground(replace(trial, watch=replace(trial.watch, block="")))
+    trial = replace(trial, commanded_s=now_s, commanded_boot_s=last.time_boot_s)
     return enter(trial, State.TAKEOFF, now_s), (Perform(Action.TAKE_OFF),)
 
 
-def _on_ground(trial: Trial) -> Trial:
-    """Heights count from where it stands at the command: the median of what it told since it is armed, without the
-    first half, for some estimators begin anew as they are armed, which is no leap of the vehicle's."""
-    told = trial.stood_m[len(trial.stood_m) // 2 :]
-    ground_m = statistics.median(told) if told else trial.plan.ground_m
+def _with_ground(trial: Trial) -> Trial:
+    """Heights count from where it stands now, if its altitude began anew as it was armed: that leapt, on an autopilot
+    that counts from the ground, and stands still since, in the same place, and it does not say that it flies. Whatever
+    else its altitude did is no new ground: it may have left the old one."""
+    watch, stood = trial.watch, trial.ground_samples[len(trial.ground_samples) // 2 :]
+    if not (trial.plan.climbs_from_ground and watch.leapt and stood) or watch.doubted or watch.landed is False:
+        return trial
+    altitudes_m = [position.altitude_m for position in stood]
+    if max(altitudes_m) - min(altitudes_m) > GROUND_M or not _is_in_place(watch, stood[-1]):
+        return trial
+    ground_m = statistics.median(altitudes_m)
     return replace(
         trial,
         plan=trial.plan.on_ground_at(ground_m),
-        watch=watching.stand(trial.watch),
-        risen_m=ground_m - trial.plan.ground_m,
-        stood_m=(),
+        watch=watching.reset_altitude(watch),
+        ground_shift_m=ground_m - trial.plan.ground_m,
+        ground_samples=(),
     )
+
+
+def _is_in_place(watch: Watch, position: Position) -> bool:
+    start = watch.origin or position
+    return math.hypot(position.north_m - start.north_m, position.east_m - start.east_m) <= _IN_PLACE_M
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
@@ -294,7 +310,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
 def _answered(trial: Trial, event: Event) -> Trial:
     """Note that it has answered the order to stop its motors: with what its heartbeat says, a second witness."""
     heard = event.measurement if isinstance(event, Heard) else None
-    answered = tells_motors_off(heard, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
+    answered = confirms_motors_off(heard, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
     return replace(trial, answered=trial.answered or answered)
 
 

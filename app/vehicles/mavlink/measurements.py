@@ -127,7 +127,7 @@ Measurement = (
 )
 
 
-def tells_motors_off(measurement: Measurement | None, stop_settings: Collection[str]) -> bool:
+def confirms_motors_off(measurement: Measurement | None, stop_settings: Collection[str]) -> bool:
     """Whether it answers the order to stop the motors: the command accepted, or a setting that stops them read back."""
     match measurement:
         case Reply(to=to, accepted=True):

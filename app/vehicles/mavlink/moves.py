@@ -9,7 +9,7 @@ from app.vehicles.base import MOTORS_OFF_ASKED
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Finding, Outcome, Reaction
 from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.measurements import Parameter
+from app.vehicles.mavlink.measurements import Parameter, Position
 from app.vehicles.mavlink.signals import Action, Command, Event, Heard, Perform, SendGain, Setting
 from app.vehicles.mavlink.states import MOVES, OVER, State
 from app.vehicles.mavlink.watch import Watch
@@ -49,8 +49,9 @@ class Plan:
 class Trial:
     """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
     `failure` is the first that happened; `stopped`: a person has asked for its motors to be stopped, `answered`: it
-    has answered an order to stop them. `stood_m`: its altitudes since it is armed, until the command; `risen_m`: by how
-    much higher the ground was then than before. `doubt`: why it is quarantined in the end, however it lands."""
+    has answered an order to stop them. `ground_samples`: its positions between arming and the command;
+    `ground_shift_m`: by how much its altitude on the ground grew meanwhile. `doubt`: why it is quarantined in the end,
+    however it lands."""
 
     plan: Plan
     state: State
@@ -62,8 +63,8 @@ class Trial:
     armed_s: float | None = None
     commanded_s: float | None = None
     commanded_boot_s: float | None = None
-    stood_m: tuple[float, ...] = ()
-    risen_m: float = 0.0
+    ground_samples: tuple[Position, ...] = ()
+    ground_shift_m: float = 0.0
     unsent: tuple[Setting, ...] = ()
     awaited: Setting | None = None
     gains_since_s: float | None = None

@@ -58,11 +58,11 @@ def open_radio(
     return Radio(link, profile, clock, aim, patience_s=PATIENCE_S * patience_of(options), overhear=overhear)
 
 
-def limits_of(options: Options, radio: Radio, *, datum_m: float) -> Limits:
-    """`datum_m` is where the altitude that the vehicle is told to climb to counts from, on its own datum."""
+def limits_of(options: Options, radio: Radio) -> Limits:
+    """Those of a vehicle that stands at its own zero."""
     profile = radio.profile
     return Limits(
-        set_point_m=datum_m + TAKEOFF_ALTITUDE_M,
+        set_point_m=TAKEOFF_ALTITUDE_M,
         heartbeat_s=profile.heartbeat_s,
         min_battery_v=float(options["min_battery_v"]),
         radius_m=float(options["radius_m"]),

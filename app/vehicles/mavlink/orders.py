@@ -4,7 +4,7 @@ from typing import Final
 
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import tells_motors_off
+from app.vehicles.mavlink.measurements import confirms_motors_off
 from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.signals import Action, Heard
 
@@ -27,7 +27,7 @@ class StandingOrder:
         """Take in what came, and send it again when it is due."""
         if self._action is Action.KILL:
             settings = self._radio.profile.stop_settings
-            self._answered = self._answered or any(tells_motors_off(each.measurement, settings) for each in heard)
+            self._answered = self._answered or any(confirms_motors_off(each.measurement, settings) for each in heard)
         now_s = self._radio.clock.now_s()
         is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
         self._is_over = self._is_over or is_late or self._is_obeyed()

@@ -374,16 +374,16 @@ class MavlinkVehicle:
 
     def _plan(self, ground: Ground) -> Plan:
         profile = self._radio.profile
-        datum_m = ground.altitude_m if profile.climbs_from_ground else 0.0
-        return Plan(
+        plan = Plan(
             safe_gains=self._gains.safe_settings,
-            ground_m=ground.altitude_m,
+            ground_m=0.0,
             climbs_from_ground=profile.climbs_from_ground,
             lift_off_s=profile.lift_off_s,
             land_again_s=profile.land_again_s,
             stop_settings=profile.stop_settings,
-            limits=limits_of(self._options, self._radio, datum_m=datum_m),
+            limits=limits_of(self._options, self._radio),
         )
+        return plan.on_ground_at(ground.altitude_m)
 
     def _give_back(self) -> None:
         """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified. One

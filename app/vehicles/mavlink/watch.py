@@ -116,10 +116,10 @@ def begin(now_s: float, *, last: Position | None = None, battery_v: float | None
     )
 
 
-def stand(watch: Watch) -> Watch:
-    """The memory of a vehicle that is about to be told to take off: it is on the ground, whatever its altitude did."""
+def reset_altitude(watch: Watch) -> Watch:
+    """The memory of a vehicle on the ground whose altitude begins anew: what it was before says nothing any more."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
-    return replace(watch, block="", leapt=False, lifted=False, second=second)
+    return replace(watch, leapt=False, lifted=False, side=-1, crossings=0, second=second)
 
 
 def hear(

@@ -83,26 +83,39 @@ STAGES: dict[State, Callable[[], Walk]] = {
 }
 
 
-def begin_anew(plan: Plan) -> Walk:
-    """To the take-off command of a vehicle whose altitude begins anew 0.2 s after it was armed: 0.5 m higher."""
+COPTER = replace(PLAN, climbs_from_ground=True)
+
+
+def armed(plan: Plan = COPTER, for_s: float = 0.2) -> Walk:
+    """For so long, before its take-off command."""
     walk = Walk(plan=plan)
     walk.give(Done(Action.ARM, walk.now_s))
     walk.armed = True
     while walk.trial.armed_s is None:
         walk.pass_s(STEP_S)
-    walk.pass_s(0.2)
-    walk.altitude_m += 0.5
+    return walk.pass_s(for_s)
+
+
+def commanded(walk: Walk) -> Walk:
     while walk.state is State.ARM:
         walk.pass_s(STEP_S)
     return walk
 
 
-@pytest.mark.parametrize(("climbs_from_ground", "set_point_m"), [(False, 3.0), (True, 3.5)])
-def test_the_ground_is_where_it_stands_at_the_command(climbs_from_ground: bool, set_point_m: float) -> None:
-    walk = begin_anew(replace(PLAN, climbs_from_ground=climbs_from_ground))
-    assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + 0.5)
-    assert walk.trial.plan.limits.set_point_m == pytest.approx(set_point_m)
-    assert walk.trial.plan.datum_m == pytest.approx(GROUND_M + 0.5 if climbs_from_ground else 0.0)
+def begun_anew(by_m: float = 0.5, plan: Plan = COPTER, after_s: float = 0.2) -> Walk:
+    """To the take-off command of a vehicle whose altitude begins anew so long after it was armed."""
+    walk = armed(plan, after_s)
+    walk.altitude_m += by_m
+    return commanded(walk)
+
+
+@pytest.mark.parametrize("by_m", [0.5, -1.0, 5.0])
+def test_the_ground_is_where_a_vehicle_stands_whose_altitude_began_anew_as_it_was_armed(by_m: float) -> None:
+    walk = begun_anew(by_m)
+    assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + by_m)
+    assert walk.trial.plan.datum_m == walk.trial.plan.ground_m
+    assert walk.trial.plan.limits.set_point_m == pytest.approx(PLAN.limits.set_point_m + by_m)
+    assert walk.trial.watch.crossings == 0
     walk.pass_s(1.0)
     assert walk.trial.failure is None, "it is not taken for one in the air"
     walk.climb_rate_m_s = 1.0
@@ -111,15 +124,64 @@ def test_the_ground_is_where_it_stands_at_the_command(climbs_from_ground: bool, 
 
 
 def test_a_vehicle_whose_altitude_began_anew_has_its_motors_stopped_where_it_stands() -> None:
-    walk = begin_anew(replace(PLAN, lift_off_s=0.5))
+    walk = begun_anew(plan=replace(COPTER, lift_off_s=0.5))
     walk.pass_s(0.6)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
     walk.pass_s(1.1)
     assert Action.MOTORS_OFF in walk.actions
 
 
+def test_an_abort_before_the_command_stops_motors_where_it_stands_too() -> None:
+    walk = armed()
+    walk.altitude_m += 0.5
+    walk.pass_s(0.4)
+    walk.give(AbortWanted(ABORT, walk.now_s))
+    assert walk.state is State.DISARM
+    walk.pass_s(1.1)
+    assert Action.MOTORS_OFF in walk.actions
+
+
+def rise(walk: Walk) -> None:
+    """Really, and stand still in the air."""
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(0.4)
+    walk.climb_rate_m_s = 0.0
+
+
+def leap_late(walk: Walk) -> None:
+    walk.pass_s(0.7)
+    walk.altitude_m -= 1.0
+
+
+def leap_and_say_that_it_flies(walk: Walk) -> None:
+    walk.landed = False
+    walk.altitude_m += 0.5
+
+
+def leap_aside(walk: Walk) -> None:
+    walk.altitude_m += 0.5
+    walk.north_m += 1.0
+
+
+@pytest.mark.parametrize("happens", [rise, leap_late, leap_and_say_that_it_flies, leap_aside])
+def test_what_else_its_altitude_does_before_the_command_is_no_new_ground(happens: Callable[[Walk], None]) -> None:
+    walk = armed()
+    happens(walk)
+    commanded(walk)
+    assert walk.trial.plan == COPTER
+    walk.pass_s(12.0)
+    assert Action.MOTORS_OFF not in walk.actions, "it may fly"
+
+
+def test_a_paparazzis_altitude_does_not_begin_anew_for_it_can_be_dropped() -> None:
+    walk = begun_anew(plan=PLAN)
+    assert walk.trial.plan == PLAN
+    walk.pass_s(12.0)
+    assert Action.MOTORS_OFF not in walk.actions
+
+
 def test_a_second_source_goes_along_with_an_altitude_that_began_anew() -> None:
-    walk = begin_anew(PLAN)
+    walk = begun_anew()
     for _ in range(50):
         walk.pass_s(STEP_S)
         walk.give(Sighted(GROUND_M, is_new=True, now_s=walk.now_s))

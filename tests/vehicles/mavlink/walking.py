@@ -44,6 +44,7 @@ class Walk:
     boot_s: float = 40.0
     altitude_m: float = GROUND_M
     climb_rate_m_s: float = 0.0
+    north_m: float = 0.0
     armed: bool = False
     mode: str = "4"
     voltage_v: float = 12.4
@@ -104,7 +105,7 @@ class Walk:
         return self
 
     def _speak(self) -> None:
-        here = Position(round(self.boot_s, 6), self.altitude_m, self.climb_rate_m_s)
+        here = Position(round(self.boot_s, 6), self.altitude_m, self.climb_rate_m_s, self.north_m)
         self.hear(None if self.blind else here)
         if self.landed is not None:
             self.hear(LandedState(self.landed))
