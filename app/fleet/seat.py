@@ -35,7 +35,7 @@ from app.trials.crew import (
     trouble,
 )
 from app.trials.flying import Monitor
-from app.vehicles.base import ConnectedVehicle, FlightRecord, Stop
+from app.vehicles.base import ConnectedVehicle, FlightRecord, Identity, Stop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, restore_safe_gains
 
@@ -139,7 +139,7 @@ class Seat:
     def _found(self) -> ConnectedVehicle:
         while True:
             try:
-                return self._connect(self._call.safe_gains)
+                return self._connect(self._call.safe_gains, self._call.identity)
             except VehicleError as error:
                 if not self._call.patient or isinstance(error, SafeGainsError):
                     raise
@@ -147,11 +147,10 @@ class Seat:
                 self._line.hear()
                 self._call.clock.wait_s(LOOK_EVERY_S)
 
-    def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
+    def _connect(self, safe_gains: Mapping[str, float], identity: Identity | None) -> ConnectedVehicle:
         connect = get_kind(self._call.kind).connect
         assert connect is not None, self._call.kind
-        owed = self._call.lock.with_suffix(".owed.json")
-        return connect(self._call.options, safe_gains, self._call.identity, owed)
+        return connect(self._call.options, safe_gains, identity, self._call.trial_parameters)
 
     def _next(self) -> ToSeat:
         """The worker's next message that is no order, listening to the vehicle meanwhile."""
@@ -241,10 +240,12 @@ class Seat:
         self._show()
 
     def _have(self, safe_gains: Mapping[str, float]) -> None:
-        """A vehicle whose safe gains were changed by a person is connected anew, which writes them."""
+        """A vehicle whose safe gains were changed by a person is connected anew, which writes them unless it was in
+        doubt and never pinned."""
         if dict(self._vehicle.safe_gains) != dict(safe_gains):
+            trusted = None if self._vehicle.concern else self._vehicle.identity
             self._vehicle.close()
-            self._vehicle = self._connect(safe_gains)
+            self._vehicle = self._connect(safe_gains, self._call.identity or trusted)
 
     # ---- flights
 

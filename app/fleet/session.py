@@ -30,7 +30,8 @@ ENDS_WITHIN_S: Final = 5.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Call:
     """Whom a session is for. `lock` is held as long as it has the vehicle; `identity` is the pinned one, None before
-    the first time. `patient`: look for a vehicle that does not answer until it does."""
+    the first time; `trial_parameters` is the file of what a trial changes beside the gains. `patient`: look for a
+    vehicle that does not answer until it does."""
 
     vehicle_id: int
     name: str
@@ -39,6 +40,7 @@ class Call:
     safe_gains: Mapping[str, float]
     identity: Identity | None
     lock: Path
+    trial_parameters: Path
     patient: bool = False
     clock: Clock = REAL_TIME
 

@@ -249,6 +249,7 @@ class SessionDeck:
             safe_gains=vehicle.safe_gains,
             identity=vehicle.identity,
             lock=self._data_dir / f"vehicle-{vehicle_id}.lock",
+            trial_parameters=self._data_dir / f"vehicle-{vehicle_id}.trial-parameters.json",
             patient=patient,
             clock=self._clock,
         )

@@ -131,9 +131,16 @@ def died(exit_code: int | None) -> VehicleError:
 
 
 def trouble(error: GainlineError) -> Trouble:
-    """What went wrong, as an error tells it."""
-    not_flown = isinstance(error, VehicleError) and error.not_flown
+    """What went wrong, as an error tells it, and those that it came upon."""
+    not_flown = any(isinstance(each, VehicleError) and each.not_flown for each in _chain(error))
     return Trouble(str(error), unsafe=isinstance(error, SafeGainsError), not_flown=not_flown)
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """The error, and those that were being handled when it was raised."""
+    while error is not None:
+        yield error
+        error = error.__context__
 
 
 def mistake(error: Exception) -> Trouble:

@@ -34,10 +34,11 @@ class VehicleKind:
 
     `experiments` names those that it can fly; where that depends on its settings, `suits(options)` those that it can
     fly with these. `open(options, safe_gains)` gets complete, checked options and returns a vehicle that holds its safe
-    gains. `connect(options, safe_gains, identity, owed)` opens a link that stays open between flights; None: the kind
-    has none, and is opened for each flight. `owed` is a file for what the vehicle has to be given back even if this
-    process dies. It raises VehicleError when nobody answers, or another than `identity` (None:
-    whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
+    gains. `connect(options, safe_gains, identity, trial_parameters)` opens a link that stays open between flights;
+    None: the kind has none, and is opened for each flight. It raises VehicleError when nobody answers, or another than
+    `identity` (None: whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
+    In the file `trial_parameters` it keeps what a trial changes beside the gains, which is put back even if this
+    process dies.
     `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
     says whether a vehicle of a real kind is a simulation all the same. `check_gains(options, gains)` raises GainsError
     for gains that such a vehicle is never given, whatever anybody overrules.
@@ -55,7 +56,7 @@ class VehicleKind:
     conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
     simulates: Callable[[Options, Hosts], bool] = _never
     suits: Callable[[Options], tuple[str, ...]] | None = None
-    check_gains: Callable[[Options, Gains], object] = _take_any
+    check_gains: Callable[[Options, Gains], None] = _take_any
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""

@@ -266,11 +266,13 @@ class Refusing:
     """Whoever has a vehicle that takes its gains and then will not arm."""
 
     alive = True
+    takes_its_safe_gains = True
 
     def fly(self, orders: Orders) -> Iterator[Said]:
         yield Staged(dict(orders.gains))
-        yield Restored(dict(orders.safe_gains))
-        yield Trouble("The vehicle would not arm.", unsafe=False, not_flown=True)
+        if self.takes_its_safe_gains:
+            yield Restored(dict(orders.safe_gains))
+        yield Trouble("The vehicle would not arm.", unsafe=not self.takes_its_safe_gains, not_flown=True)
 
     def take_off(self) -> None: ...
     def decline(self) -> None: ...
@@ -292,6 +294,30 @@ def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
     assert client.post(f"/api/trials/{trial_id}/fly", json={}).is_success
     field.fly_next()
     assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
+
+
+class RefusingAll(Refusing):
+    """And that does not take its safe gains any more either."""
+
+    takes_its_safe_gains = False
+
+
+@pytest.mark.parametrize(("crew", "then"), [(Refusing, "ready"), (RefusingAll, "quarantined")])
+def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gains(
+    client: TestClient,
+    database: Database,
+    field: Airfield,
+    trial_id: int,
+    monkeypatch: pytest.MonkeyPatch,
+    crew: type[Refusing],
+    then: str,
+) -> None:
+    make_vehicle_real(database)
+    monkeypatch.setattr(field.deck._hangar, "take", crew)
+    field.fly_next()
+    after = get(client, f"/api/trials/{trial_id}")
+    assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
+    assert vehicle_state(client) == then
 
 
 def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(

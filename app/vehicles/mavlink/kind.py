@@ -34,8 +34,11 @@ def _open(options: Options, safe_gains: Gains) -> Vehicle:
     return _vehicle(options, safe_gains, None, observes=False, decided=False)
 
 
-def _connect(options: Options, safe_gains: Gains, identity: Identity | None, owed: Path) -> ConnectedVehicle:
-    return _vehicle(options, safe_gains, identity, observes=True, decided=identity is not None, owed=owed)
+def _connect(
+    options: Options, safe_gains: Gains, identity: Identity | None, trial_parameters: Path
+) -> ConnectedVehicle:
+    decided = identity is not None
+    return _vehicle(options, safe_gains, identity, observes=True, decided=decided, trial_parameters=trial_parameters)
 
 
 def _vehicle(
@@ -45,7 +48,7 @@ def _vehicle(
     *,
     observes: bool,
     decided: bool,
-    owed: Path | None = None,
+    trial_parameters: Path | None = None,
 ) -> "MavlinkVehicle":
     """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows.
 
@@ -66,7 +69,7 @@ def _vehicle(
             identity=identity,
             observes=observes,
             decided=decided,
-            owed=owed,
+            trial_parameters=trial_parameters,
             source=source,
         )
     except BaseException:
@@ -101,8 +104,8 @@ def _experiments(options: Options) -> tuple[str, ...]:
     return (PROFILES[str(options["autopilot"])].experiment,)
 
 
-def _check_gains(options: Options, gains: Gains) -> object:
-    return check_gains(gains, PROFILES[str(options["autopilot"])].gain_sets[0])
+def _check_gains(options: Options, gains: Gains) -> None:
+    check_gains(gains, PROFILES[str(options["autopilot"])].gain_sets[0])
 
 
 def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:

@@ -1,6 +1,8 @@
 """Parameters beside the gains that a take-off needs otherwise than they are: set for a trial, and put back after it."""
 
 import json
+import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from app.vehicles.errors import VehicleError
@@ -9,14 +11,21 @@ from app.vehicles.mavlink.radio import Radio
 from app.vehicles.mavlink.signals import Setting
 
 
-class TrialParameters:
-    """What they were before is remembered until they are that again, as read back; in the file `owed`, where there is
-    one, also beyond this process."""
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """What a parameter was before a trial, and what it was set to."""
 
-    def __init__(self, radio: Radio, owed: Path | None = None) -> None:
-        """Raises VehicleError when the file cannot be read."""
-        self._radio, self._owed = radio, owed
-        self._before = {} if owed is None else _read(owed)
+    before: float
+    during: float
+
+
+class TrialParameters:
+    """What was changed is remembered until it is put back, as read back; in `file`, where there is one, also beyond
+    this process. Only what still is as the trial left it is put back: anything else somebody has decided since."""
+
+    def __init__(self, radio: Radio, file: Path | None = None) -> None:
+        self._radio, self._file = radio, file
+        self._changed: dict[str, Changed] | None = None
 
     def set(self) -> None:
         """Raises VehicleError when the vehicle does not tell what it has, or does not take what a take-off needs, or
@@ -26,18 +35,20 @@ class TrialParameters:
             if held is None:
                 raise _unset(setting)
             if held != setting.value:
-                self._before.setdefault(setting.parameter, held)
-                self._keep()
+                self._keep({setting.parameter: Changed(held, setting.value)} | self._remembered())
                 if not self._write(setting):
                     raise _unset(setting)
 
     def put_back(self) -> str:
         """Why they are not as they were, or nothing."""
-        for name, value in tuple(self._before.items()):
-            if not self._write(Setting(name, value)):
-                return f"{name} was {value:g}, and could not be put back."
-            del self._before[name]
-            self._keep()
+        try:
+            for name, changed in tuple(self._remembered().items()):
+                is_ours = read_parameter(self._radio, name) == changed.during
+                if is_ours and not self._write(Setting(name, changed.before)):
+                    return f"{name} was {changed.before:g}, and could not be put back."
+                self._keep({other: one for other, one in self._remembered().items() if other != name})
+        except VehicleError as error:
+            return str(error)
         return ""
 
     def _write(self, setting: Setting) -> bool:
@@ -45,34 +56,56 @@ class TrialParameters:
         write_parameter(self._radio, setting.parameter, setting.value)
         return read_parameter(self._radio, setting.parameter) == setting.value
 
-    def _keep(self) -> None:
-        if self._owed is None:
-            return
+    # ---- beyond this process
+
+    def _remembered(self) -> dict[str, Changed]:
+        """What this process has changed, or one before it on this very vehicle. Raises VehicleError when the file
+        cannot be read."""
+        if self._changed is None:
+            self._changed = {} if self._file is None else self._read(self._file)
+        return self._changed
+
+    def _read(self, file: Path) -> dict[str, Changed]:
         try:
-            if self._before:
-                fresh = self._owed.with_suffix(".new")
-                fresh.write_text(json.dumps(self._before), encoding="utf-8")
-                fresh.replace(self._owed)
-            else:
-                self._owed.unlink(missing_ok=True)
-        except OSError as error:
-            raise _not_kept(self._owed, error) from error
+            kept = json.loads(file.read_text(encoding="utf-8"))
+            if kept["vehicle"] != self._vehicle():
+                return {}
+            return {str(name): Changed(float(one[0]), float(one[1])) for name, one in kept["parameters"].items()}
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError, TypeError, LookupError, AttributeError) as error:
+            raise _unusable(file, error) from error
+
+    def _keep(self, changed: dict[str, Changed]) -> None:
+        """On disk first. Raises VehicleError when it cannot be."""
+        if self._file is not None:
+            try:
+                self._store(self._file, changed)
+            except OSError as error:
+                raise _unusable(self._file, error) from error
+        self._changed = changed
+
+    def _store(self, file: Path, changed: dict[str, Changed]) -> None:
+        if not changed:
+            file.unlink(missing_ok=True)
+            return
+        parameters = {name: [one.before, one.during] for name, one in changed.items()}
+        fresh = file.with_suffix(".new")
+        with fresh.open("w", encoding="utf-8") as writing:
+            json.dump({"vehicle": self._vehicle(), "parameters": parameters}, writing)
+            writing.flush()
+            os.fsync(writing.fileno())
+        fresh.replace(file)
+
+    def _vehicle(self) -> str:
+        return f"{self._radio.profile.name} {self._radio.aim.system}"
 
 
-def _read(owed: Path) -> dict[str, float]:
-    try:
-        return {str(name): float(value) for name, value in json.loads(owed.read_text(encoding="utf-8")).items()}
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, TypeError, AttributeError) as error:
-        raise _not_kept(owed, error) from error
-
-
-def _not_kept(owed: Path, error: Exception) -> VehicleError:
+def _unusable(file: Path, error: Exception) -> VehicleError:
     return VehicleError(
-        f"What the vehicle has to be given back is kept in {owed}, which cannot be used: {error}.",
-        hint="See that there is room on the disk. If the file is damaged, set the take-off altitude as it was by hand, "
-        "and remove the file.",
+        f"What a trial has set on the vehicle is kept in {file}, which cannot be used: {error}.",
+        hint="See that there is room on the disk. If the file is damaged, see by hand that the vehicle's take-off "
+        "parameters are as they should be, and remove it.",
     )
 
 

@@ -56,7 +56,7 @@ class MavlinkVehicle:
         identity: Identity | None = None,
         observes: bool = False,
         decided: bool = True,
-        owed: Path | None = None,
+        trial_parameters: Path | None = None,
         source: Source | None = None,
         transport: Transport | None = None,
     ) -> None:
@@ -66,7 +66,7 @@ class MavlinkVehicle:
 
         `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
         closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it. The file
-        `owed` keeps what a trial has set beside the gains, for whoever connects next if this process dies.
+        `trial_parameters` keeps what a trial changes beside the gains, for whoever connects next if this process dies.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
         without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
@@ -87,7 +87,7 @@ class MavlinkVehicle:
         try:
             self._gains = GainStore(self._radio, safe_gains)
             self._decided = decided
-            self._parameters = TrialParameters(self._radio, owed)
+            self._parameters = TrialParameters(self._radio, trial_parameters)
             self._connect()
             if not observes:
                 self._require_ready()
@@ -133,13 +133,9 @@ class MavlinkVehicle:
         more or could not be told to take off, which is then `not_flown`; what `on_sample` and `should_stop` raise lands
         the vehicle, and is raised again once it is down.
         """
-        self._require_trust()
-        if self._gains.staged is None:
-            raise VehicleError(
-                "No gains were staged for this flight, so it was not started.",
-                hint="Stage the gains, compare what is read back, then fly.",
-            )
         try:
+            self._require_trust()
+            self._require_staged()
             ground, stop = self._stand(STAND_S), should_stop()
             if stop is None:
                 self._parameters.set()
@@ -311,6 +307,13 @@ class MavlinkVehicle:
         return heard
 
     # ---- flying
+
+    def _require_staged(self) -> None:
+        if self._gains.staged is None:
+            raise VehicleError(
+                "No gains were staged for this flight, so it was not started.",
+                hint="Stage the gains, compare what is read back, then fly.",
+            )
 
     def _stand(self, watched_s: float) -> Ground:
         """Where it stands. Raises VehicleError when it is not ready to fly, SafeGainsError when it is armed."""

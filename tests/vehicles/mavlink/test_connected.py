@@ -23,7 +23,11 @@ PINNED = Identity(system_id=31, autopilot="paparazzi", version="")
 
 @contextmanager
 def connected(
-    rig: LockstepRig, identity: Identity | None = None, *, owed: Path | None = None, **options: bool | float | str
+    rig: LockstepRig,
+    identity: Identity | None = None,
+    *,
+    trial_parameters: Path | None = None,
+    **options: bool | float | str,
 ) -> Iterator[MavlinkVehicle]:
     vehicle = MavlinkVehicle(
         rig.options(**options),
@@ -33,7 +37,7 @@ def connected(
         transport=rig,
         identity=identity,
         observes=True,
-        owed=owed,
+        trial_parameters=trial_parameters,
     )
     try:
         yield vehicle

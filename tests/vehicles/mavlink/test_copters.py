@@ -89,40 +89,58 @@ def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
         assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
 
 
+KEPT = '{"vehicle": "px4 1", "parameters": {"MIS_TAKEOFF_ALT": [2.5, 3.0]}}'
+
+
 def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) -> None:
-    owed, kept = tmp_path / "owed.json", set[str]()
-    with ready("px4") as rig, connected(rig, owed=owed) as vehicle:
+    file, kept = tmp_path / "parameters.json", set[str]()
+    with ready("px4") as rig, connected(rig, trial_parameters=file) as vehicle:
 
         def look() -> Stop | None:
             if rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0:
-                kept.add(owed.read_text())
+                kept.add(file.read_text())
             return Stop("seen enough") if rig.drone.body.altitude_m > 0.5 else None
 
         vehicle.stage(SAFE["px4"])
         vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)
-        assert kept == {'{"MIS_TAKEOFF_ALT": 2.5}'}
-        assert not owed.exists()
+        assert kept == {KEPT}
+        assert not file.exists()
 
 
-def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(tmp_path: Path) -> None:
-    owed = tmp_path / "owed.json"
-    owed.write_text('{"MIS_TAKEOFF_ALT": 2.5}')
+@pytest.mark.parametrize(
+    ("held", "afterwards"),
+    [pytest.param(3.0, 2.5, id="as the trial left it"), pytest.param(5.0, 5.0, id="changed by somebody since")],
+)
+def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(
+    tmp_path: Path, held: float, afterwards: float
+) -> None:
+    file = tmp_path / "parameters.json"
+    file.write_text(KEPT)
+    with ready("px4") as rig:
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = held  # type: ignore[attr-defined]
+        with connected(rig, trial_parameters=file) as vehicle:
+            assert vehicle.concern == ""
+            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == afterwards
+            assert not file.exists()
+
+
+def test_what_was_set_on_another_vehicle_is_not_put_back_on_this_one(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.json"
+    file.write_text(KEPT.replace("px4 1", "px4 2"))
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
-        with connected(rig, owed=owed):
-            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
-            assert not owed.exists()
+        with connected(rig, trial_parameters=file):
+            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0
 
 
-def test_what_is_owed_and_cannot_be_read_is_said_before_anything_is_sent(tmp_path: Path) -> None:
-    owed = tmp_path / "owed.json"
-    owed.write_text("[2.5")
-    with (
-        ready("px4") as rig,
-        pytest.raises(VehicleError, match=r"owed\.json, which cannot be used"),
-        connected(rig, owed=owed),
-    ):
-        pass
+@pytest.mark.parametrize("damaged", ["[2.5", "[2.5]", "{}", '{"vehicle": "px4 1", "parameters": {"A": 1}}'])
+def test_a_vehicle_whose_kept_parameters_cannot_be_read_is_only_observed(tmp_path: Path, damaged: str) -> None:
+    file = tmp_path / "parameters.json"
+    file.write_text(damaged)
+    with ready("px4") as rig, connected(rig, trial_parameters=file) as vehicle:
+        assert "parameters.json, which cannot be used" in vehicle.concern
+        assert "MIS_TAKEOFF_ALT" not in rig.writes
+        assert file.read_text() == damaged
 
 
 def test_what_a_refused_run_had_set_is_put_back_too() -> None:

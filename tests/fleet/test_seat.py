@@ -1,0 +1,130 @@
+"""What the process of a session does with its vehicle, flown in lock-step in this one."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from multiprocessing import Pipe
+from pathlib import Path
+
+import pytest
+
+from app.fleet import seat as seat_module
+from app.fleet.seat import Line, Seat
+from app.fleet.session import Asked, Call, Connected, FromSeat
+from app.fleet.states import ActKind
+from app.trials.crew import Free, Orders, Restored, Staged, TakeOff, Trouble
+from app.vehicles.base import FlightOrder, Identity
+from app.vehicles.kinds import Options
+from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from tests.vehicles.flying import SAFE, TUNED
+from tests.vehicles.mavlink.rigs import LockstepRig
+
+
+class Overheard(Line):
+    """The process's end of the pipe, and everything that it said but how the vehicle is."""
+
+    def __init__(self) -> None:
+        self.workers_end, theirs = Pipe()
+        super().__init__(theirs)
+        self.said: list[FromSeat] = []
+        self.on_staged: Callable[[], None] = lambda: None
+
+    def say(self, message: FromSeat) -> None:
+        self.said.append(message)
+        if isinstance(message, Staged):
+            self.on_staged()
+
+    def show(self, message: FromSeat) -> None: ...
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
+    def connect(
+        options: Options, safe_gains: Mapping[str, float], identity: Identity | None, _: Path
+    ) -> MavlinkVehicle:
+        return MavlinkVehicle(
+            options,
+            safe_gains,
+            is_real=True,
+            clock=rig,
+            transport=rig,
+            identity=identity,
+            observes=True,
+            decided=identity is not None,
+        )
+
+    with LockstepRig() as rig:
+        kind = replace(MAVLINK, connect=connect)
+        monkeypatch.setattr(seat_module, "get_kind", lambda _: kind)
+        yield rig
+
+
+def seated(rig: LockstepRig, line: Line, folder: Path, safe_gains: Mapping[str, float] = SAFE) -> Seat:
+    call = Call(
+        vehicle_id=1,
+        name="Bench drone",
+        kind="mavlink",
+        options=rig.options(),
+        safe_gains=safe_gains,
+        identity=None,
+        lock=folder / "vehicle.lock",
+        trial_parameters=folder / "parameters.json",
+        clock=rig,
+    )
+    return Seat(line, call)
+
+
+def orders(rig: LockstepRig, folder: Path) -> Orders:
+    return Orders(
+        campaign_id=1,
+        trial_id=1,
+        experiment="takeoff",
+        vehicle_kind="mavlink",
+        vehicle_options=rig.options(),
+        safe_gains=SAFE,
+        gains=TUNED,
+        flight=FlightOrder(seed=1),
+        lock=folder / "vehicle.lock",
+    )
+
+
+@pytest.mark.parametrize("takes_its_safe_gains", [True, False])
+def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains_can_be_verified(
+    rig: LockstepRig, tmp_path: Path, takes_its_safe_gains: bool
+) -> None:
+    line = Overheard()
+    seat = seated(rig, line, tmp_path)
+
+    def refuse() -> None:
+        rig.drone.autopilot.refuses_arming = True
+        rig.drone.autopilot.ignores_parameters = not takes_its_safe_gains
+
+    line.on_staged = refuse
+    line.workers_end.send(TakeOff())
+    seat._fly(orders(rig, tmp_path))
+    [trouble] = [said for said in line.said if isinstance(said, Trouble)]
+    assert (trouble.not_flown, trouble.unsafe) == (True, not takes_its_safe_gains)
+    assert [type(said) for said in line.said if isinstance(said, Restored | Free)] == (
+        [Restored, Free] if takes_its_safe_gains else [Free]
+    )
+
+
+def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: LockstepRig, tmp_path: Path) -> None:
+    line = Overheard()
+    seat = seated(rig, line, tmp_path)
+    assert line.said == [Connected(identity=seat._vehicle.identity, concern="", held=dict(SAFE))]
+    answered = seat._act(Asked(kind=ActKind.RESTORE, safe_gains=TUNED))
+    assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
+
+
+def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_safe_gains_become(
+    rig: LockstepRig, tmp_path: Path
+) -> None:
+    """Its owner's gains, met for the first time, and a slip of the hand in the safe gains named for it."""
+    seat = seated(rig, Overheard(), tmp_path, safe_gains=TUNED)
+    assert "nothing was written" in seat._vehicle.concern
+    other = {**TUNED, "kp": TUNED["kp"] + 1}
+    answered = seat._act(Asked(kind=ActKind.CHECK, safe_gains=other))
+    assert "nothing was written" in answered.concern
+    answered = seat._act(Asked(kind=ActKind.CHECK, safe_gains=SAFE))
+    assert (answered.concern, answered.held) == ("", dict(SAFE))
