@@ -19,7 +19,7 @@ from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.live.tail import changes_after
 
 RETRY_MS: Final = 1000
-MOST_SINCE_S: Final = 60.0
+MAX_SINCE_S: Final = 60.0
 
 router = APIRouter(prefix="/api", tags=["events"])
 
@@ -30,7 +30,7 @@ async def events(
     database: CurrentDatabase,
     last_event_id: Annotated[str | None, Header()] = None,
     since_s: Annotated[
-        float, Query(ge=0.0, le=MOST_SINCE_S, description="seconds before now whose changes come first")
+        float, Query(ge=0.0, le=MAX_SINCE_S, description="seconds before now whose changes come first")
     ] = 0.0,
 ) -> AsyncIterator[ServerSentEvent]:
     """Follow everything that happens.
@@ -67,6 +67,8 @@ def _start(database: Database, last_event_id: str | None, since_s: float) -> tup
     """The event after which the stream begins, and whether the client's own history is known up to there."""
     with database.read() as session:
         latest = latest_event_id(session)
+        if not last_event_id and since_s == 0.0:
+            return latest, True
         if not last_event_id:
             return latest_event_before(session, utc_now() - timedelta(seconds=since_s)), True
         if last_event_id.isdecimal() and holds_everything_after(session, int(last_event_id)):

@@ -27,7 +27,7 @@ from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, move_vehicle, require_idle
 from app.fleet.states import ACT_MOVES, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
-from app.fleet.views import act_view, is_linked, vehicle_view
+from app.fleet.views import act_view, is_linked_or_wanted, vehicle_view
 from app.moves import check_action, check_move
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
@@ -99,10 +99,10 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: As
 
 def _requested(session: Session, row: VehicleRow, kind: ActKind, asker: Asker, *, reason: str = "") -> VehicleActRow:
     check_action(ACTIONS, kind, row.state, row.name)
-    if kind == ActKind.DISCONNECT and not is_linked(row):
-        raise ConflictError(f"{row.name} is neither connected nor looked for.", hint="Connect it, if it is wanted.")
     if kind == ActKind.DISCONNECT:
         require_may(Act.STOP, row, asker)
+        if not is_linked_or_wanted(row):
+            raise ConflictError(f"{row.name} is neither connected nor looked for.", hint="Connect it, if it is wanted.")
     else:
         require_may_command(row, asker)
     by = "" if kind in _LOOKS_ONLY else require_no_other(row, asker)
@@ -146,8 +146,8 @@ def finish_act(
     result: JsonObject | None = None,
     problem: str = "",
 ) -> None:
-    """What came of it; `problem` when it failed. A vehicle that was met before is looked for after a connect that
-    failed: it may be off, or another has its port. Doing it twice is harmless."""
+    """What came of it; `problem` when it failed. One whose identity is pinned is looked for after a connect
+    that failed: it may be off, or another has its port. Doing it twice is harmless."""
     act = repository.get_act(session, act_id)
     if act.state != ActState.RUNNING:
         return
@@ -192,8 +192,11 @@ def _wanted(session: Session) -> list[VehicleRow]:
 def vehicle_found(
     session: Session, vehicle_id: int, identity: Identity, *, concern: str, held: Mapping[str, float]
 ) -> None:
-    """A vehicle that was wanted connected is there again; without a concern it was given its safe gains."""
+    """A vehicle that was wanted connected is there again; without a concern it was given its safe gains. One that was
+    disconnected in the same moment stays so."""
     row = repository.get_one(session, vehicle_id)
+    if not row.wanted_connected:
+        return
     act = record_act(
         session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=dict(row.safe_gains)
     )

@@ -100,8 +100,7 @@ def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | 
     return Page(items=items, total=total, next_cursor=following)
 
 
-def is_linked(row: VehicleRow) -> bool:
-    """Whether there is a link to it, or one is looked for because it is wanted."""
+def is_linked_or_wanted(row: VehicleRow) -> bool:
     return row.state != VehicleState.DISCONNECTED or row.wanted_connected
 
 
@@ -112,7 +111,7 @@ def _actions(row: VehicleRow) -> list[str]:
     impossible = set() if can_fly(row) else {"fly", "stage"}
     if needs_staging(row):
         impossible.add("fly")
-    if not is_linked(row):
+    if not is_linked_or_wanted(row):
         impossible.add("disconnect")
     return [action for action in possible if action not in impossible]
 

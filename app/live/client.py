@@ -119,7 +119,7 @@ class LiveClient:
         answered = self._waiting[question.request] = asyncio.get_running_loop().create_future()
         self._writer.write(encode(question))
         try:
-            async with asyncio.timeout(ANSWER_TIMEOUT_S):
+            async with asyncio.timeout(ANSWER_TIMEOUT_S):  # wait_for can swallow a cancellation in Python 3.11
                 answer = await answered
         except TimeoutError as error:
             raise _link_down(f"the worker did not answer within {ANSWER_TIMEOUT_S:g} s") from error

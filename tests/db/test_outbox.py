@@ -1,11 +1,14 @@
 """Change events: one for each change, with its transaction, in order, the old ones pruned."""
 
+from datetime import timedelta
+
 import pytest
 from fastapi.testclient import TestClient
 
 from app.db import outbox
 from app.db.models import EventRow, JobRow
 from app.db.session import Database
+from app.db.types import utc_now
 from app.jobs import service as jobs
 from app.jobs.states import JobState
 from tests.builders import create_campaign, create_flown_trial, create_ready_campaign
@@ -47,6 +50,21 @@ def test_a_deleted_campaign_is_told(client: TestClient, database: Database) -> N
     before = len(topics(database))
     client.delete(f"/api/campaigns/{campaign}?version=1")
     assert topics(database)[before:] == [("campaign", campaign, campaign)]
+
+
+def test_the_newest_event_before_a_moment_is_found_and_none_before_the_first(
+    client: TestClient, database: Database
+) -> None:
+    create_campaign(client)
+    an_hour_ago = utc_now() - timedelta(hours=1)
+    with database.write() as session:
+        session.query(EventRow).update({EventRow.at: an_hour_ago})
+    with database.read() as session:
+        earlier = outbox.latest_event_id(session)
+    create_campaign(client, name="Another")
+    with database.read() as session:
+        assert outbox.latest_event_before(session, utc_now() - timedelta(minutes=30)) == earlier
+        assert outbox.latest_event_before(session, an_hour_ago) == 0
 
 
 def test_old_events_are_pruned_and_a_client_from_before_is_recognised(

@@ -259,7 +259,7 @@ def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a
     assert finish_act(database).vehicle.identity is not None
 
 
-def test_a_vehicle_met_before_is_looked_for_after_a_connect_that_failed_until_somebody_stops_it(
+def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebody_stops_it(
     client: TestClient, database: Database
 ) -> None:
     known, new = create_connected(client, database, "A"), register(client, "B")
@@ -277,6 +277,9 @@ def test_a_vehicle_met_before_is_looked_for_after_a_connect_that_failed_until_so
     assert "disconnect" not in seen(client, new)["actions"]
     ask(client, known, "disconnect")
     finish_act(database)
+    with database.write() as session:  # found in the very moment in which it was not wanted any more
+        identity = Identity(system_id=9, autopilot="paparazzi", version="")
+        acts.vehicle_found(session, known["id"], identity, concern="", held=known["safe_gains"])
     with database.read() as session:
         assert acts.wanted_links(session) == []
     assert seen(client, known)["state"] == "disconnected"

@@ -159,10 +159,12 @@ class Serving:
 
 
 @contextmanager
-def stream(url: str, last_event_id: str | None = None) -> Iterator["Stream"]:
+def stream(url: str, last_event_id: str | None = None, *, since_s: float = 0.0) -> Iterator["Stream"]:
     """An open event stream."""
     headers = {} if last_event_id is None else {"Last-Event-ID": last_event_id}
-    with httpx2.stream("GET", f"{url}/api/events", headers=headers, timeout=PATIENCE_S) as response:
+    with httpx2.stream(
+        "GET", f"{url}/api/events", params={"since_s": since_s}, headers=headers, timeout=PATIENCE_S
+    ) as response:
         response.raise_for_status()
         yield Stream(response)
 

@@ -65,6 +65,20 @@ def test_two_streams_see_the_same_and_a_later_one_resumes_where_another_left(ser
     assert again == told[0][3:]
 
 
+def test_a_stream_that_is_opened_after_a_change_tells_it_to_whoever_says_since_when_it_counts(serving: Serving) -> None:
+    campaign_id = serving.campaign()
+    with stream(serving.url, since_s=60.0) as events:
+        told = [next(event for event in events if event[0] == name) for name in ("hello", "change")]
+        for name, _, data in events:
+            if name == "change" and data["campaign_id"] == campaign_id:
+                break
+    before, first = int(told[0][1] or 0), int(told[1][1] or 0)
+    assert first == before + 1
+    with stream(serving.url) as events:
+        name, now, _ = next(iter(events))
+    assert (name, int(now or 0) > before) == ("hello", True), "without it, a stream begins now"
+
+
 def test_telemetry_comes_while_it_flies_with_the_error_so_far(serving: Serving) -> None:
     campaign_id = serving.campaign()
     with stream(serving.url) as events:

@@ -1,8 +1,8 @@
 /** The tab's one event stream: changes make cached answers doubtful, telemetry feeds the live curves. */
 
 import type { QueryClient } from "@tanstack/react-query";
-import { followDoubts } from "../lib/doubt";
 import { type Change, changeFrom, doubtfulOnce } from "../lib/events";
+import { createInvalidator } from "../lib/invalidation";
 import { telemetryFrom } from "../lib/live";
 import { secondsBetween, statusFrom } from "../lib/vehicle";
 import { momentNow, setConnection, setNotLive, takePhase, takeStatus, takeTelemetry } from "../live/store";
@@ -13,12 +13,14 @@ const HIDDEN_MS = 20_000;
 /** The server says something every three seconds; a line that is silent for longer is dead, though it looks open. */
 const SILENT_S = 8;
 const WATCH_MS = 1000;
-const LONGEST_SINCE_S = 60;
+const MAX_SINCE_S = 60;
 
-/** Seconds since the page began to load, to tell a new stream from when on changes count: its first answers may be
- * older than the stream. */
+const MARGIN_S = 3;
+
+/** Seconds since the page began to load, and a little more: its first answers may be older than its first stream, which
+ * therefore begins with the changes since then. */
 function sinceLoaded(): number {
-  return Math.min(Math.ceil(performance.now() / 1000) + 1, LONGEST_SINCE_S);
+  return Math.min(Math.ceil(performance.now() / 1000) + MARGIN_S, MAX_SINCE_S);
 }
 
 /**
@@ -28,7 +30,7 @@ function sinceLoaded(): number {
  * opened anew.
  */
 export function followEvents(queries: QueryClient, somethingFlies: () => boolean): () => void {
-  const doubts = followDoubts(queries);
+  const invalidator = createInvalidator(queries);
   let source: EventSource | null = null;
   let again: ReturnType<typeof setTimeout> | undefined;
   let hiding: ReturnType<typeof setTimeout> | undefined;
@@ -44,7 +46,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     const changes = gathered;
     gathered = [];
     gathering = undefined;
-    for (const queryKey of doubtfulOnce(changes)) doubts.raise({ queryKey });
+    for (const queryKey of doubtfulOnce(changes)) invalidator.invalidate({ queryKey });
   }
 
   function take(change: Change | null): void {
@@ -56,13 +58,13 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
   function hello(data: string): void {
     const { worker } = JSON.parse(data) as { worker?: boolean };
     setConnection({ state: "live", worker: worker ?? true });
-    if (!fresh) doubts.raise();
+    if (!fresh) invalidator.invalidate();
     fresh = false;
   }
 
   function open(): void {
     if (source !== null) return;
-    const stream = new EventSource(`/api/events?since_s=${sinceLoaded()}`);
+    const stream = new EventSource(fresh ? `/api/events?since_s=${sinceLoaded()}` : "/api/events");
     source = stream;
     opened = momentNow();
     const on = (name: string, listener: (data: string) => void): void =>
@@ -71,7 +73,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
         listener(event.data);
       });
     on("hello", hello);
-    on("reset", () => doubts.raise());
+    on("reset", () => invalidator.invalidate());
     on("change", (data) => take(changeFrom(data)));
     on("worker", (data) => setConnection({ worker: (JSON.parse(data) as { worker: boolean }).worker }));
     on("telemetry", (data) => {
@@ -143,7 +145,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     clearInterval(watching);
     clearTimeout(hiding);
     clearTimeout(gathering);
-    doubts.stop();
+    invalidator.stop();
     close();
   };
 }

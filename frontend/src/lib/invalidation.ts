@@ -1,8 +1,8 @@
 import type { InvalidateQueryFilters, QueryClient } from "@tanstack/react-query";
 
-export interface Doubts {
+export interface Invalidator {
   /** Have what matches read again; everything, without filters. */
-  raise(filters?: InvalidateQueryFilters): void;
+  invalidate(filters?: InvalidateQueryFilters): void;
   stop(): void;
 }
 
@@ -11,7 +11,7 @@ export interface Doubts {
  * not asked for anew by the query client, though it may have been read before the change: it is read once more when it
  * is there.
  */
-export function followDoubts(queries: QueryClient): Doubts {
+export function createInvalidator(queries: QueryClient): Invalidator {
   const cache = queries.getQueryCache();
   const awaited = new Set<string>();
   const unsubscribe = cache.subscribe((event) => {
@@ -20,7 +20,7 @@ export function followDoubts(queries: QueryClient): Doubts {
     if (awaited.delete(queryHash)) void queries.invalidateQueries({ queryKey, exact: true });
   });
   return {
-    raise(filters = {}) {
+    invalidate(filters = {}) {
       for (const { state, queryHash } of cache.findAll({ ...filters, fetchStatus: "fetching" })) {
         if (state.data === undefined) awaited.add(queryHash);
       }

@@ -1,17 +1,17 @@
 import { QueryClient, QueryObserver } from "@tanstack/react-query";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { type Doubts, followDoubts } from "./doubt";
+import { createInvalidator, type Invalidator } from "./invalidation";
 
 let queries: QueryClient;
-let doubts: Doubts;
+let invalidator: Invalidator;
 
 beforeEach(() => {
   queries = new QueryClient({ defaultOptions: { queries: { staleTime: Infinity, retry: false } } });
-  doubts = followDoubts(queries);
+  invalidator = createInvalidator(queries);
 });
 
 afterEach(() => {
-  doubts.stop();
+  invalidator.stop();
   queries.clear();
 });
 
@@ -45,7 +45,7 @@ test("a change while the first answer is under way has it read once more", async
   const { ask, change, answer } = server();
   const { value, unsubscribe } = watched(ask);
   change();
-  doubts.raise({ queryKey: ["campaign", 4] });
+  invalidator.invalidate({ queryKey: ["campaign", 4] });
   await answer();
   await vi.waitFor(() => expect(value()).toBe(1));
   await answer();
@@ -56,7 +56,7 @@ test("a change while the first answer is under way has it read once more", async
 test("a change to something else has nothing read once more", async () => {
   const { ask, answer, asked } = server();
   const { value, unsubscribe } = watched(ask);
-  doubts.raise({ queryKey: ["campaign", 5] });
+  invalidator.invalidate({ queryKey: ["campaign", 5] });
   await answer();
   await vi.waitFor(() => expect(value()).toBe(1));
   expect(queries.isFetching()).toBe(0);
@@ -70,7 +70,7 @@ test("a change after the first answer has it read again", async () => {
   await answer();
   await vi.waitFor(() => expect(value()).toBe(1));
   change();
-  doubts.raise();
+  invalidator.invalidate();
   await answer();
   await vi.waitFor(() => expect(value()).toBe(2));
   unsubscribe();
