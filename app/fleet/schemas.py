@@ -61,7 +61,7 @@ class VehicleEdit(Request):
 
 
 class Identity(BaseModel):
-    """Who answers at the other end of the link; pinned at the first connection."""
+    """Who answers at the other end of the link; pinned at the first connection that leaves nothing to decide."""
 
     system_id: int
     autopilot: str

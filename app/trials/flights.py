@@ -1,7 +1,8 @@
 """A flight's way through the database, for the worker that carries it out.
 
     claim_flight → record_staged → record_lift_off → record_landing
-                       │                  └→ record_loss
+                       │                  ├→ record_loss
+                       │                  └→ record_failure   (never told to take off: it would not arm)
                        ├→ record_failure      (not flown: the vehicle refused, or took other gains)
                        └→ record_withdrawal   (not flown: somebody ended it before lift-off)
 
@@ -143,7 +144,8 @@ def _may_take_off(flight: FlightRow) -> bool:
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:
-    """The vehicle is about to be told to take off; from here on only a landing or a loss can follow.
+    """The vehicle is about to be told to take off; from here on a landing or a loss follows, or word that it
+    was never told.
 
     Raises ConflictError when the trial was cancelled or unstaged, when the gains read back are not the trial's, or when
     a staged flight lacks its operator's word.

@@ -104,7 +104,8 @@ class Vehicle(Protocol):
         """Take off with the staged gains and record until the manoeuvre is over.
 
         `on_sample` gets telemetry at 50 Hz of vehicle time while it happens; `should_stop` is asked at least as often
-        and says so once the flight is to end early. Raises VehicleError when the flight could not be carried out.
+        and says so once the flight is to end early. Raises VehicleError when the flight could not be carried out;
+        it is `not_flown` when the vehicle was never told to take off.
         """
         ...
 

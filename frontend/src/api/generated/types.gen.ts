@@ -1747,7 +1747,7 @@ export type Health = {
 /**
  * Identity
  *
- * Who answers at the other end of the link; pinned at the first connection.
+ * Who answers at the other end of the link; pinned at the first connection that leaves nothing to decide.
  */
 export type Identity = {
     /**

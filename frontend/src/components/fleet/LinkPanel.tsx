@@ -38,7 +38,10 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
           </dl>
         ) : (
           <p className={classes["quiet"]}>
-            Not connected. Connecting opens the link, writes the safe gains and reads them back; nothing moves.
+            Not connected.{" "}
+            {identity === null
+              ? "Connecting compares the gains that the vehicle holds with the safe ones, and changes nothing."
+              : "Connecting writes the safe gains and reads them back; nothing moves."}
           </p>
         )}
         {said?.said && <p className={classes["quiet"]}>It says: {said.said}</p>}
@@ -46,7 +49,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         <p className={classes["quiet"]}>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
           {identity !== null &&
-            `; pinned at the first connection: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
+            `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
         </p>
       </div>
     </Panel>
