@@ -146,12 +146,14 @@ def finish_act(
     result: JsonObject | None = None,
     problem: str = "",
 ) -> None:
-    """What came of it; `problem` when it failed. One whose identity is pinned is looked for after a connect
-    that failed: it may be off, or another has its port. Doing it twice is harmless."""
+    """What came of it; `problem` when it failed. By a connect, a vehicle that is not pinned was given nothing; one that
+    is pinned is looked for when it failed: it may be off, or another has its port. Doing it twice is harmless."""
     act = repository.get_act(session, act_id)
     if act.state != ActState.RUNNING:
         return
     act.result = result
+    if act.kind == ActKind.CONNECT and act.vehicle.identity is None:
+        act.asked = None
     if read_back is not None:
         act.read_back = dict(read_back)
         hold_gains(act.vehicle, read_back)
@@ -197,11 +199,10 @@ def vehicle_found(
     row = repository.get_one(session, vehicle_id)
     if not row.wanted_connected:
         return
-    act = record_act(
-        session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=dict(row.safe_gains)
-    )
-    act.read_back = dict(held)
     vehicle_connected(session, vehicle_id, identity, concern=concern, held=held)
+    given = None if row.identity is None else dict(row.safe_gains)
+    act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=given)
+    act.read_back = dict(held)
 
 
 def vehicle_connected(

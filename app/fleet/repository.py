@@ -109,6 +109,7 @@ def ledger(
             VehicleActRow.vehicle_id == vehicle_id,
             VehicleActRow.kind.in_(GIVES_GAINS),
             VehicleActRow.claimed_at.is_not(null()),
+            VehicleActRow.asked.is_not(null()),
         ),
     ).subquery()
     total = session.scalar(select(func.count()).select_from(lines)) or 0

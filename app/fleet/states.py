@@ -67,7 +67,8 @@ class ActKind(StrEnum):
 
 
 GIVES_GAINS: Final = frozenset({ActKind.CONNECT, ActKind.RESTORE, ActKind.RELEASE})
-"""Acts that write the safe gains to the vehicle, and so stand in its ledger."""
+"""Acts that write the safe gains to the vehicle, and so stand in its ledger; not the first connection, which only
+compares."""
 
 
 class ActState(StrEnum):

@@ -250,6 +250,7 @@ def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a
     vehicle = register(client)
     for _ in range(2):
         connect(client, database, vehicle, concern="It holds others; nothing was written.")
+        assert client.get(f"/api/vehicles/{vehicle['id']}/ledger").json()["items"] == []
         assert ask(client, vehicle, "check") == 202
         assert finish_act(database).vehicle.identity is None, "whoever connects it compares, and writes nothing"
         with database.write() as session:

@@ -19,7 +19,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
     <Panel title="Gains it was given" className={classes["wide"]}>
       <Trouble error={ledger.error} />
       {ledger.isPending && <Skeleton height={120} aria-busy="true" />}
-      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>None yet: it was never connected.</p>}
+      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>None yet.</p>}
       {lines.length > 0 && (
         // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
         <section className={`${classes["scroll"]} sideways`} aria-label="Gains it was given" tabIndex={0}>
