@@ -36,8 +36,13 @@ PATHS = json.loads((Path(__file__).parents[2] / "frontend" / "openapi.json").rea
 FURNISHED = 4
 """Ids up to this one exist, or are among the first that do not."""
 EXAMPLES = 40
-FEW = {"/api/campaigns/{campaign_id}/report.pdf": 3, "/api/campaigns/{campaign_id}/report.html": 8}
-"""Examples of what takes a second or a browser for each, and has but one number that can vary."""
+FEW = {
+    "/api/campaigns/{campaign_id}/report.pdf": 3,
+    "/api/campaigns/{campaign_id}/report.html": 8,
+    "/api/trials/{trial_id}/trajectory": 12,
+    "/api/controller-checks": 12,
+}
+"""Examples of what takes a second, a process or a browser for each."""
 ANSWERED_WITHIN_S = 120.0
 NAMED = {"Host": "127.0.0.1"}
 ENDLESS = "/api/events"
