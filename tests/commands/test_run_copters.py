@@ -115,6 +115,18 @@ def see_sets_flown(profile: str, count: int, out: Path, said: str) -> None:
     assert "The vehicle holds its safe gains again, read back:" in said
 
 
+def test_gains_that_a_vehicle_is_never_given_are_refused_whoever_overrules(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = LockstepRig("px4")
+    rig.switch_on_failsafes()
+    rig.take_the_place_of_every_vehicle(monkeypatch)
+    written = len(rig.writes)
+    gains = "MPC_Z_P=9,MPC_Z_VEL_P_ACC=4,MPC_Z_VEL_I_ACC=2,MPC_Z_VEL_D_ACC=0"
+    result = CliRunner().invoke(app, ["run", "px4-takeoff", "--gains", gains, "--overrule", "to see it"])
+    assert result.exit_code == 1
+    assert "gains.MPC_Z_P: must lie in 0.1 … 1.5, got 9" in " ".join(result.stderr.split())
+    assert len(rig.writes) == written
+
+
 def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> None:
     with drone("px4", "--no-failsafes") as address:
         named = ("--vehicle", f"mavlink:{address}")

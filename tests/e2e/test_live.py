@@ -85,10 +85,13 @@ def test_two_tabs_show_the_same_truth_over_one_stream_each(open_dashboard: Opene
 
 
 def test_what_changed_before_the_stream_was_there_is_shown(dashboard: Dashboard, shared_server: Server) -> None:
-    page, late = dashboard.page, list[Route]()
+    page, late, may_go = dashboard.page, list[Route](), list[bool]()
 
     def hold(route: Route) -> None:
-        late.append(route)
+        if may_go:
+            route.continue_()
+        else:
+            late.append(route)
 
     campaign_id = new_campaign(dashboard, "Before the stream")
     page.route("**/api/events*", hold)
@@ -96,7 +99,9 @@ def test_what_changed_before_the_stream_was_there_is_shown(dashboard: Dashboard,
     expect(heading(dashboard, "Before the stream")).to_be_visible()
     rename(dashboard, campaign_id, "Renamed meanwhile")
     dashboard.until(lambda: bool(late))
-    late.pop().continue_()
+    may_go.append(True)
+    for route in late:
+        route.continue_()
     expect(heading(dashboard, "Renamed meanwhile")).to_be_visible()
 
 

@@ -1,5 +1,7 @@
 """What the real ArduCopter and PX4 were seen to do, done by the simulated ones, and what the program makes of it."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,9 @@ from app.vehicles.base import FlightOrder, FlightRecord, Stop
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.simdrone import faults
+from app.vehicles.simdrone.autopilots.base import Letter
+from app.vehicles.simdrone.faults import Afflicted, Fault
 from tests.vehicles.flying import never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 from tests.vehicles.mavlink.test_connected import connected
@@ -71,6 +76,41 @@ def test_a_first_connection_that_finds_the_safe_gains_needs_no_word() -> None:
         )
         assert vehicle.concern == ""
         vehicle.close()
+
+
+class AltitudeAnew(Fault):
+    """An estimator that puts its origin half a metre lower as it is armed."""
+
+    name = "altitude-anew"
+    drone: Afflicted
+
+    def begin(self, drone: Afflicted) -> None:
+        self.drone = drone
+
+    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+        return [self._raised(letter) for letter in letters]
+
+    def _raised(self, letter: Letter) -> Letter:
+        z = letter.fields.get("z")
+        if letter.kind != "LOCAL_POSITION_NED" or not self.drone.autopilot.armed:
+            return letter
+        assert isinstance(z, float)
+        return replace(letter, fields={**letter.fields, "z": z - 0.5})
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_heights_count_from_the_ground_though_the_altitude_begins_anew_at_arming(
+    autopilot: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(faults, "FAULTS", {AltitudeAnew.name: AltitudeAnew})
+    with LockstepRig(autopilot, faults=["altitude-anew@connect"]) as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            record = fly(vehicle, autopilot)
+            assert (record.ending, vehicle.concern) == ("completed", "")
+    time_s, altitude_m = record.trajectory.time_s, record.trajectory["altitude_m"]
+    assert altitude_m[time_s >= 0.0][0] == pytest.approx(0.0, abs=0.05)
+    assert altitude_m[(time_s > 20.0) & (time_s < 30.0)] == pytest.approx(3.0, abs=0.1)
 
 
 def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
