@@ -101,6 +101,10 @@ class Dashboard:
         assert found is not None, self.page.url
         return int(found.group(1))
 
+    def open_details(self) -> None:
+        """Those that are there by now."""
+        self.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+
     def button(self, name: str) -> Locator:
         return self.page.get_by_role("button", name=name, exact=True)
 

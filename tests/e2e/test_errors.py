@@ -354,10 +354,10 @@ def test_an_error_says_what_happened_and_what_to_do(
 def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
     """One of the refusals of that title stands on the page, with what to do and where."""
     expect(dashboard.page.get_by_role("alert").first).to_be_visible(timeout=RETRIED_MS)
-    dashboard.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
 
     def shown() -> list[Json]:
         """Of several reads that failed, the page tells one."""
+        dashboard.open_details()
         text = dashboard.page.locator("body").inner_text()
         return [one for one in told if one["title"] == title and one["detail"] in text]
 

@@ -46,17 +46,17 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
             options,
             safe_gains,
             is_real=True,
-            clock=rig,
-            transport=rig,
+            clock=one,
+            transport=one,
             identity=identity,
             observes=True,
             decided=identity is not None,
         )
 
-    with LockstepRig() as rig:
+    with LockstepRig() as one:
         kind = replace(MAVLINK, connect=connect)
         monkeypatch.setattr(seat_module, "get_kind", lambda _: kind)
-        yield rig
+        yield one
 
 
 def seated(rig: LockstepRig, line: Line, folder: Path, safe_gains: Mapping[str, float] = SAFE) -> Seat:

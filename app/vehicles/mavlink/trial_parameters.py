@@ -43,8 +43,8 @@ class TrialParameters:
         """Why they are not as they were, or nothing."""
         try:
             for name, changed in tuple(self._remembered().items()):
-                is_ours = read_parameter(self._radio, name) == changed.during
-                if is_ours and not self._write(Setting(name, changed.before)):
+                held = read_parameter(self._radio, name)
+                if held is None or (held == changed.during and not self._write(Setting(name, changed.before))):
                     return f"{name} was {changed.before:g}, and could not be put back."
                 self._keep({other: one for other, one in self._remembered().items() if other != name})
         except VehicleError as error:

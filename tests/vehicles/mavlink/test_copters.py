@@ -1,5 +1,6 @@
 """What the real ArduCopter and PX4 were seen to do, done by the simulated ones, and what the program makes of it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -161,6 +162,20 @@ def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(
         with connected(rig, trial_parameters=file) as vehicle:
             assert vehicle.concern == ""
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == afterwards
+            assert not file.exists()
+
+
+def test_what_the_vehicle_does_not_tell_is_kept_until_it_does(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.json"
+    file.write_text(KEPT)
+    with ready("px4") as rig:
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = math.nan  # type: ignore[attr-defined]  # it tells none
+        with connected(rig, trial_parameters=file) as vehicle:
+            assert "MIS_TAKEOFF_ALT was 2.5, and could not be put back" in vehicle.concern
+            assert file.read_text() == KEPT
+            rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+            vehicle.release()
+            assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
             assert not file.exists()
 
 
