@@ -35,7 +35,7 @@ from app.trials.crew import (
     trouble,
 )
 from app.trials.flying import Monitor
-from app.vehicles.base import ConnectedVehicle, FlightRecord, Identity, Stop
+from app.vehicles.base import ConnectedVehicle, FlightRecord, Stop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, restore_safe_gains
 
@@ -112,6 +112,7 @@ class Seat:
         """Raises VehicleError when the vehicle does not answer."""
         self._line, self._call = line, call
         self._speed = float(call.options.get("clock_speed", 1.0))
+        self._identity = call.identity
         self._vehicle = self._found()
         self._show_due_s = 0.0
         self._trial_id: int | None = None
@@ -139,7 +140,7 @@ class Seat:
     def _found(self) -> ConnectedVehicle:
         while True:
             try:
-                return self._connect(self._call.safe_gains, self._call.identity)
+                return self._connect(self._call.safe_gains)
             except VehicleError as error:
                 if not self._call.patient or isinstance(error, SafeGainsError):
                     raise
@@ -147,10 +148,17 @@ class Seat:
                 self._line.hear()
                 self._call.clock.wait_s(LOOK_EVERY_S)
 
-    def _connect(self, safe_gains: Mapping[str, float], identity: Identity | None) -> ConnectedVehicle:
+    def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
         connect = get_kind(self._call.kind).connect
         assert connect is not None, self._call.kind
-        return connect(self._call.options, safe_gains, identity, self._call.trial_parameters)
+        vehicle = connect(self._call.options, safe_gains, self._identity, self._call.trial_parameters)
+        self._pin(vehicle)
+        return vehicle
+
+    def _pin(self, vehicle: ConnectedVehicle) -> None:
+        """As the worker does it: who answers is known from the first moment without a concern."""
+        if not vehicle.concern:
+            self._identity = vehicle.identity
 
     def _next(self) -> ToSeat:
         """The worker's next message that is no order, listening to the vehicle meanwhile."""
@@ -227,6 +235,7 @@ class Seat:
                 self._vehicle.release()
             case _:
                 raise VehicleError(f"A session cannot carry out “{kind}”.", hint="Report this with the worker's log.")
+        self._pin(self._vehicle)
         return Answered(
             concern=self._vehicle.concern,
             held=self._held(),
@@ -240,12 +249,10 @@ class Seat:
         self._show()
 
     def _have(self, safe_gains: Mapping[str, float]) -> None:
-        """A vehicle whose safe gains were changed by a person is connected anew, which writes them unless it was in
-        doubt and never pinned."""
+        """A vehicle whose safe gains a person has changed is connected anew, which writes them once it is pinned."""
         if dict(self._vehicle.safe_gains) != dict(safe_gains):
-            trusted = None if self._vehicle.concern else self._vehicle.identity
             self._vehicle.close()
-            self._vehicle = self._connect(safe_gains, self._call.identity or trusted)
+            self._vehicle = self._connect(safe_gains)
 
     # ---- flights
 

@@ -131,9 +131,10 @@ def died(exit_code: int | None) -> VehicleError:
 
 
 def trouble(error: GainlineError) -> Trouble:
-    """What went wrong, as an error tells it, and those that it came upon."""
-    not_flown = any(isinstance(each, VehicleError) and each.not_flown for each in _chain(error))
-    return Trouble(str(error), unsafe=isinstance(error, SafeGainsError), not_flown=not_flown)
+    """What went wrong, as the error tells it; first why it was not flown, where the error followed upon that."""
+    refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
+    what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
+    return Trouble(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

@@ -103,6 +103,8 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
     line.workers_end.send(TakeOff())
     seat._fly(orders(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, Trouble)]
+    assert "would not arm" in trouble.what
+    assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
     assert (trouble.not_flown, trouble.unsafe) == (True, not takes_its_safe_gains)
     assert [type(said) for said in line.said if isinstance(said, Restored | Free)] == (
         [Restored, Free] if takes_its_safe_gains else [Free]
@@ -115,6 +117,9 @@ def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: 
     assert line.said == [Connected(identity=seat._vehicle.identity, concern="", held=dict(SAFE))]
     answered = seat._act(Asked(kind=ActKind.RESTORE, safe_gains=TUNED))
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
+    seat._vehicle._observe("Somebody else armed it.")  # type: ignore[attr-defined]
+    answered = seat._act(Asked(kind=ActKind.RESTORE, safe_gains=SAFE))
+    assert (answered.problem, answered.concern, answered.held) == ("", "", dict(SAFE))
 
 
 def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_safe_gains_become(

@@ -21,7 +21,8 @@ class Changed:
 
 class TrialParameters:
     """What was changed is remembered until it is put back, as read back; in `file`, where there is one, also beyond
-    this process. Only what still is as the trial left it is put back: anything else somebody has decided since."""
+    this process. A value is put back only if it is still the one that the trial set: any other, somebody has set since.
+    """
 
     def __init__(self, radio: Radio, file: Path | None = None) -> None:
         self._radio, self._file = radio, file
@@ -59,8 +60,8 @@ class TrialParameters:
     # ---- beyond this process
 
     def _remembered(self) -> dict[str, Changed]:
-        """What this process has changed, or one before it on this very vehicle. Raises VehicleError when the file
-        cannot be read."""
+        """What this process has changed, or one before it on a vehicle of this make and system id. Raises VehicleError
+        when the file cannot be read."""
         if self._changed is None:
             self._changed = {} if self._file is None else self._read(self._file)
         return self._changed
@@ -73,7 +74,7 @@ class TrialParameters:
             return {str(name): Changed(float(one[0]), float(one[1])) for name, one in kept["parameters"].items()}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, TypeError, LookupError, AttributeError) as error:
+        except (OSError, ArithmeticError, ValueError, TypeError, LookupError, AttributeError) as error:
             raise _unusable(file, error) from error
 
     def _keep(self, changed: dict[str, Changed]) -> None:

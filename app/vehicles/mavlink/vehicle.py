@@ -272,13 +272,14 @@ class MavlinkVehicle:
         nobody decided to write over."""
         preflight.require_disarmed(self._radio)
         preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
-        if not self._decided and (found := self._gains.read()) != self._gains.safe:
+        if self._decided:
+            self.restore()
+        elif (found := self._gains.read()) != self._gains.safe:
             raise SafeGainsError(
                 f"It holds {written(found)}, and {written(self._gains.safe)} are named as its safe gains; nothing was "
                 "written.",
                 hint="If what it holds is safe, name that as its safe gains. Else release it, which writes the others.",
             )
-        self.restore()
 
     def _require_ready(self) -> None:
         """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""

@@ -20,7 +20,7 @@ const MARGIN_S = 3;
 /** Seconds since the page began to load, and a little more: its first answers may be older than its first stream, which
  * therefore begins with the changes since then. */
 function sinceLoaded(): number {
-  return Math.min(Math.ceil(performance.now() / 1000) + MARGIN_S, MAX_SINCE_S);
+  return Math.ceil(performance.now() / 1000) + MARGIN_S;
 }
 
 /**
@@ -64,7 +64,9 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
 
   function open(): void {
     if (source !== null) return;
-    const stream = new EventSource(fresh ? `/api/events?since_s=${sinceLoaded()}` : "/api/events");
+    const since = sinceLoaded();
+    fresh &&= since <= MAX_SINCE_S;
+    const stream = new EventSource(fresh ? `/api/events?since_s=${since}` : "/api/events");
     source = stream;
     opened = momentNow();
     const on = (name: string, listener: (data: string) => void): void =>
@@ -93,6 +95,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
       takePhase(campaign_id, trial_id, phase);
     });
     stream.onerror = () => {
+      fresh = false;
       setNotLive("away", heardAt());
       if (stream.readyState !== EventSource.CLOSED) return;
       close();

@@ -134,7 +134,9 @@ class LockstepRig(Lockstep, _Heard):
 
 
 class UdpRig(_Heard):
-    """The same behind a socket."""
+    """The same behind a socket; `speed` is its time's."""
+
+    speed: Final = _SPEED
 
     def __init__(self, autopilot: str = "paparazzi", faults: Sequence[str] = (), *, mocap: str = "") -> None:
         super().__init__(autopilot)

@@ -2,20 +2,22 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from app.vehicles.base import FlightOrder, FlightRecord, Stop
+from app.vehicles.base import FlightOrder, FlightRecord, Identity, Stop
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import Message
+from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone import faults
 from app.vehicles.simdrone.autopilots.base import Letter
 from app.vehicles.simdrone.faults import Afflicted, Fault
 from tests.vehicles.flying import never, unwatched
-from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
+from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_connected import connected
 
 ORDER = FlightOrder(seed=1)
@@ -196,6 +198,17 @@ def test_a_vehicle_whose_kept_parameters_cannot_be_read_is_only_observed(tmp_pat
         assert "parameters.json, which cannot be used" in vehicle.concern
         assert "MIS_TAKEOFF_ALT" not in rig.writes
         assert file.read_text() == damaged
+
+
+def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.json"
+    file.write_text("[2.5")
+    assert MAVLINK.connect is not None
+    with UdpRig("px4") as rig:
+        options = rig.options(clock_speed=rig.speed)
+        vehicle = MAVLINK.connect(options, SAFE["px4"], Identity(system_id=1, autopilot="px4", version=""), file)
+        with closing(vehicle):
+            assert "parameters.json, which cannot be used" in vehicle.concern
 
 
 def test_what_a_refused_run_had_set_is_put_back_too() -> None:
