@@ -48,8 +48,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         {said?.trouble && <p className={classes["bad"]}>{said.trouble}</p>}
         <p className={classes["quiet"]}>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
-          {identity !== null &&
-            `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
+          {identity !== null && `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
         </p>
       </div>
     </Panel>
