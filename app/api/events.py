@@ -67,10 +67,9 @@ def _start(database: Database, last_event_id: str | None, since_s: float) -> tup
     """The event after which the stream begins, and whether the client's own history is known up to there."""
     with database.read() as session:
         latest = latest_event_id(session)
-        if not last_event_id and since_s == 0.0:
-            return latest, True
         if not last_event_id:
-            return latest_event_before(session, utc_now() - timedelta(seconds=since_s)), True
+            since = utc_now() - timedelta(seconds=since_s)
+            return latest if since_s == 0.0 else latest_event_before(session, since), True
         if last_event_id.isdecimal() and holds_everything_after(session, int(last_event_id)):
             return int(last_event_id), True
         return latest, False

@@ -67,8 +67,8 @@ class ActKind(StrEnum):
 
 
 GIVES_GAINS: Final = frozenset({ActKind.CONNECT, ActKind.RESTORE, ActKind.RELEASE})
-"""Acts that write the safe gains to the vehicle, and so stand in its ledger; the first connection,
-which only compares, where it found just them."""
+"""Acts that write the safe gains to the vehicle, and so stand in its ledger. A first connection only compares: it
+stands there where the vehicle was found with them."""
 
 
 class ActState(StrEnum):

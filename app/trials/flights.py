@@ -144,8 +144,8 @@ def _may_take_off(flight: FlightRow) -> bool:
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:
-    """The vehicle is about to be told to take off; from here on a landing or a loss follows, or word that it
-    was never told.
+    """The vehicle is about to be told to take off; from here on a landing or a loss follows, or word that it was never
+    told.
 
     Raises ConflictError when the trial was cancelled or unstaged, when the gains read back are not the trial's, or when
     a staged flight lacks its operator's word.

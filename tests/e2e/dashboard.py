@@ -77,6 +77,11 @@ def printed(value: float, uncertainty: float, unit: str = "m") -> str:
     return f"{value:.{digits}f} ± {uncertainty:.{digits}f} {unit}"
 
 
+def open_details(page: Page) -> None:
+    """Those that are there by now."""
+    page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+
+
 class Dashboard:
     """One tab."""
 
@@ -100,10 +105,6 @@ class Dashboard:
         found = re.search(r"/campaigns/(\d+)", self.page.url)
         assert found is not None, self.page.url
         return int(found.group(1))
-
-    def open_details(self) -> None:
-        """Those that are there by now."""
-        self.page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
 
     def button(self, name: str) -> Locator:
         return self.page.get_by_role("button", name=name, exact=True)

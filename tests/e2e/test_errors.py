@@ -33,7 +33,7 @@ from app.errors import (
 )
 from app.live.client import LinkDownError
 from tests.e2e.conftest import Opener, Server, served
-from tests.e2e.dashboard import Dashboard, Json
+from tests.e2e.dashboard import Dashboard, Json, open_details
 from tests.e2e.states import States
 from tests.logs.recorded import recorded
 
@@ -357,7 +357,7 @@ def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
 
     def shown() -> list[Json]:
         """Of several reads that failed, the page tells one."""
-        dashboard.open_details()
+        open_details(dashboard.page)
         text = dashboard.page.locator("body").inner_text()
         return [one for one in told if one["title"] == title and one["detail"] in text]
 

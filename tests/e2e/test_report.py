@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.e2e.conftest import Opener, Server, served
-from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Viewport
+from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Viewport, open_details
 from tests.e2e.states import States
 from tests.e2e.test_pages import SCREENSHOTS, violations
 from tests.trials.test_photos import png
@@ -89,7 +89,7 @@ def test_the_file_draws_its_charts_with_no_network_and_can_be_read_by_everybody(
     photo = page.get_by_role("img", name="Photo 1 of flight 2")
     assert 100 < photo.evaluate("one => one.complete && one.naturalWidth && one.clientWidth") < viewport["width"]
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    open_details(page)
     assert violations(page) == []
     assert reader.noted == []
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport
+from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport, open_details
 from tests.e2e.states import States
 from tests.runtime.processes import Serving
 
@@ -183,7 +183,7 @@ def test_every_number_that_one_may_ask_about_is_explained_by_keyboard(dashboard:
     questions = dashboard.page.locator("main button[aria-haspopup=dialog]:visible")
 
     def offered() -> set[str]:
-        dashboard.open_details()
+        open_details(dashboard.page)
         return set(questions.evaluate_all("all => all.map(one => one.ariaLabel)"))
 
     dashboard.until(lambda: offered() >= ASKED)

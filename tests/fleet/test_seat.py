@@ -40,7 +40,7 @@ class Overheard(Line):
 @pytest.fixture
 def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
     def connect(
-        options: Options, safe_gains: Mapping[str, float], identity: Identity | None, _: Path
+        options: Options, safe_gains: Mapping[str, float], identity: Identity | None, trial_parameters: Path
     ) -> MavlinkVehicle:
         return MavlinkVehicle(
             options,
@@ -51,6 +51,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
             identity=identity,
             observes=True,
             decided=identity is not None,
+            trial_parameters=trial_parameters,
         )
 
     with LockstepRig() as one:

@@ -88,8 +88,7 @@ def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bo
     if watch.breached:
         why = f"The vehicle's own fence was crossed: {watch.breached}."
     elif watch.last is not None and watch.origin is not None:
-        last, origin = watch.last, watch.origin
-        away_m = ((last.north_m - origin.north_m) ** 2 + (last.east_m - origin.east_m) ** 2) ** 0.5
+        last, away_m = watch.last, watch.last.away_m(watch.origin)
         if (height_m := last.altitude_m - ground_m) > limits.ceiling_m:
             why = f"It flew at {height_m:.2f} m above the ground, over {limits.ceiling_m:g} m."
         elif abs(last.climb_rate_m_s) > limits.climb_rate_m_s:

@@ -3,7 +3,6 @@
 It knows no autopilot and no clock: events carry their time, commands are data that `trial.py` carries out.
 """
 
-import math
 import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -13,7 +12,7 @@ from app.vehicles.mavlink import agreement, findings
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.limits import DESCENDING_M_S, GROUND_M, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import Heartbeat, Position, confirms_motors_off
+from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
 from app.vehicles.mavlink.moves import (
     Plan,
     Step,
@@ -138,7 +137,8 @@ def _with_ground(trial: Trial) -> Trial:
     if not (trial.plan.climbs_from_ground and watch.leapt and stood) or watch.doubted or watch.landed is False:
         return trial
     altitudes_m = [position.altitude_m for position in stood]
-    if max(altitudes_m) - min(altitudes_m) > GROUND_M or not _is_in_place(watch, stood[-1]):
+    is_in_place = stood[-1].away_m(watch.origin or stood[-1]) <= _IN_PLACE_M
+    if max(altitudes_m) - min(altitudes_m) > GROUND_M or not is_in_place:
         return trial
     ground_m = statistics.median(altitudes_m)
     return replace(
@@ -148,11 +148,6 @@ def _with_ground(trial: Trial) -> Trial:
         ground_shift_m=ground_m - trial.plan.ground_m,
         ground_samples=(),
     )
-
-
-def _is_in_place(watch: Watch, position: Position) -> bool:
-    start = watch.origin or position
-    return math.hypot(position.north_m - start.north_m, position.east_m - start.east_m) <= _IN_PLACE_M
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:

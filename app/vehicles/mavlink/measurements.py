@@ -1,5 +1,6 @@
 """What a vehicle's messages mean, whichever autopilot sent them: SI, altitude and climb positive up."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Final
@@ -17,6 +18,10 @@ class Position:
     climb_rate_m_s: float
     north_m: float = 0.0
     east_m: float = 0.0
+
+    def away_m(self, start: "Position") -> float:
+        """How far it is from there, horizontally."""
+        return math.hypot(self.north_m - start.north_m, self.east_m - start.east_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,6 @@ const HIDDEN_MS = 20_000;
 const SILENT_S = 8;
 const WATCH_MS = 1000;
 const MAX_SINCE_S = 60;
-
 const MARGIN_S = 3;
 
 /** Seconds since the page began to load, and a little more: its first answers may be older than its first stream, which
