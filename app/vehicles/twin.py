@@ -81,7 +81,7 @@ class TwinFlight:
     def advance(self, steps: int, command: Integers) -> Rows:
         """As the protocol says. The battery's voltage is the one that explains the thrust, which goes with its
         square."""
-        rows = np.empty((steps, len(CHANNELS)))
+        rows = np.zeros((steps, len(CHANNELS)))
         time_s = (self._done + np.arange(steps)) * STEP_S
         rows[:, BATTERY] = _BATTERY_V * np.sqrt(np.maximum(1.0 - self._sag_1_s * time_s, 0.0))
         fly_simple_model(

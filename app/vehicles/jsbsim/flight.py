@@ -91,7 +91,7 @@ class JsbsimFlight:
 
     def advance(self, steps: int, command: Integers) -> Rows:
         """As the protocol says. The altitude recorded is the one sensed, noise included."""
-        rows = np.empty((steps, len(CHANNELS)))
+        rows = np.zeros((steps, len(CHANNELS)))
         rows[:, BATTERY] = _FULL_BATTERY_V
         altitude_ft = self._property("position/h-agl-ft").get_double_value
         sink_ft_s = self._property("velocities/v-down-fps").get_double_value

@@ -7,7 +7,9 @@ from itertools import pairwise
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from app.core.control.vertical_loop import RATE_HZ
 from app.core.errors import InputError
@@ -112,6 +114,20 @@ def test_each_flight_has_a_seed_of_its_own_and_the_first_one_decides_them_all() 
     assert first != second
     assert heights_of_two_flights(3) == [first, second]
     assert heights_of_two_flights(4)[0] == second
+
+
+@pytest.mark.parametrize("vehicle", ["twin", "jsbsim"])
+def test_a_body_flies_whatever_the_memory_held_that_its_rows_are_written_to(
+    monkeypatch: pytest.MonkeyPatch, vehicle: str
+) -> None:
+    body = new_body(vehicle, {}, seed=3)
+
+    def found(shape: int | tuple[int, ...], dtype: type = np.float64) -> NDArray[Any]:
+        return np.full(shape, np.nan if dtype is np.float64 else -1, dtype)
+
+    monkeypatch.setattr(np, "empty", found)
+    body.advance(3 * RATE_HZ, throttle_command(0.9))
+    assert body.altitude_m > 1.0
 
 
 def test_two_drones_do_not_share_a_port() -> None:
