@@ -43,5 +43,6 @@ export default defineConfig({
     sourcemap: false,
     rolldownOptions: { output: { postBanner: compiledWhole } },
   },
-  test: { environment: "jsdom", include: ["src/**/*.test.{ts,tsx}"], restoreMocks: true },
+  // A document for each file, as ever, but not a process for each: making those took ten times as long as the tests.
+  test: { environment: "jsdom", include: ["src/**/*.test.{ts,tsx}"], pool: "vmThreads", restoreMocks: true },
 });

@@ -48,6 +48,7 @@ def told(database: Database, campaign_id: int) -> str:
     return json.dumps(parts)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("strategy", ["gradient", "calibrated"])
 def test_after_a_restart_the_same_history_gives_the_same_proposal_to_the_last_bit(
     client: TestClient, database: Database, settings: Settings, strategy: str

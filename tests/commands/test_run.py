@@ -41,11 +41,13 @@ def test_the_gradient_tunes_the_jsbsim_drone_by_the_fourth_flight(tmp_path: Path
     assert "did not improve by more than 5\u00a0%" in campaign["stopped_because"]
 
 
+@pytest.mark.complete
 def test_the_raw_gradient_beats_the_papers_best_simulated_flight_within_seven(tmp_path: Path) -> None:
     campaign = flown(tmp_path, "run", "ardrone-takeoff", "--strategy", "gradient", "--set", "scaled=false")
     assert min(errors(campaign)[:7]) <= 0.1521
 
 
+@pytest.mark.complete
 def test_the_simplex_start_is_near_the_best_from_the_first_flight(tmp_path: Path) -> None:
     assert (
         min(errors(flown(tmp_path, "run", "ardrone-takeoff", "--strategy", "gradient", "--start", "simplex"))) <= 0.0940
@@ -157,6 +159,7 @@ def rows_flown_on(vehicle: str, out: Path) -> list[dict[str, Any]]:
     return [row for row in rows if row["group"].startswith(vehicle)]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("table", REFERENCE)
 def test_a_table_of_the_paper_is_flown_again_within_the_reference(tmp_path: Path, table: str) -> None:
     vehicle, tolerance, reference = REFERENCE[table]
@@ -169,6 +172,7 @@ def test_a_table_of_the_paper_is_flown_again_within_the_reference(tmp_path: Path
     assert outside == [row["gains"]["ki"] > 1073 for row in rows]
 
 
+@pytest.mark.complete
 def test_table_1_keeps_the_papers_order_and_its_best(tmp_path: Path) -> None:
     out = tmp_path / "rows.json"
     assert gainline("reproduce", "table1", "--json", out).exit_code == 0

@@ -28,6 +28,7 @@ def test_compiled_and_interpreted_rollouts_are_equal_bit_for_bit() -> None:
     assert output(NUMBA_DISABLE_JIT="0") == output(NUMBA_DISABLE_JIT="1")
 
 
+@pytest.mark.complete
 def test_a_cache_folder_of_the_operators_choice_is_used(tmp_path: Path) -> None:
     output(NUMBA_DISABLE_JIT="0", NUMBA_CACHE_DIR=str(tmp_path))
     (folder,) = tmp_path.iterdir()
@@ -35,6 +36,7 @@ def test_a_cache_folder_of_the_operators_choice_is_used(tmp_path: Path) -> None:
     assert list(folder.rglob("*.nbi"))
 
 
+@pytest.mark.complete
 def test_where_nothing_can_be_kept_kernels_are_compiled_for_each_process(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")

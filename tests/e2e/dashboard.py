@@ -208,8 +208,8 @@ class Dashboard:
 
     def until(self, holds: Callable[[], bool], *, within_s: float = 60.0) -> None:
         """Wait until that holds, letting the page live meanwhile."""
-        for _ in range(int(within_s / 0.05)):
+        for _ in range(int(within_s / 0.1)):
             if holds():
                 return
-            self.page.wait_for_timeout(50)
+            self.page.wait_for_timeout(100)
         raise AssertionError(f"it did not hold within {within_s:g} s")

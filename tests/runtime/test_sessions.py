@@ -18,6 +18,7 @@ def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         yield one
 
 
+@pytest.mark.complete
 def test_a_registered_vehicle_flies_and_holds_its_safe_gains_afterwards(serving: Serving) -> None:
     with connected(serving, "Flier") as (vehicle, _):
         ready = vehicle.in_state("ready")

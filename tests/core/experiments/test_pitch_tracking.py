@@ -36,6 +36,7 @@ def test_the_truth_scores_known_gains_as_the_definition_says(
 
 
 @compiled_only
+@pytest.mark.complete
 def test_twenty_starts_anywhere_in_the_bounds_end_in_the_same_optimum_of_the_truth() -> None:
     random = np.random.default_rng(5)
     found = []
