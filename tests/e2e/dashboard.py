@@ -206,10 +206,10 @@ class Dashboard:
 
     # ---- waiting
 
-    def until(self, holds: Callable[[], bool], *, within_s: float = 60.0) -> None:
-        """Wait until that holds, letting the page live meanwhile."""
+    def until(self, holds: Callable[[], T], *, within_s: float = 60.0) -> T:
+        """Wait until that gives something true, which is returned, letting the page live meanwhile."""
         for _ in range(int(within_s / 0.1)):
-            if holds():
-                return
+            if found := holds():
+                return found
             self.page.wait_for_timeout(100)
         raise AssertionError(f"it did not hold within {within_s:g} s")

@@ -34,6 +34,8 @@ NAME: Final = "Takeoff to 3 m, Number 1"
 IMPROVEMENT_PERCENT: Final = 20
 FLIGHTS_AT_MOST: Final = 9
 DECIDED: Final = "Ada and Ben, from the flights of this campaign"
+CHARTS: Final = re.compile("^[34]$")
+"""Takeoffs, errors and gains; the landscape as well if it has been computed by then."""
 RECOMMENDED: Final = re.compile("^(Repeat the best|Fly the baseline|Stage)$")
 
 
@@ -290,7 +292,7 @@ def open_the_report(dashboard: Dashboard, campaign_id: int) -> None:
     with dashboard.page.context.expect_page() as coming:
         dashboard.page.get_by_role("link", name="Report", exact=True).click()
     report = coming.value
-    expect(report.locator("html")).to_have_attribute("data-drawn", "3")
+    expect(report.locator("html")).to_have_attribute("data-drawn", CHARTS)
     campaign, statistics = (dashboard.get(f"/campaigns/{campaign_id}{part}") for part in ("", "/statistics"))
     best = campaign["best"]
     expect(report.get_by_role("heading", level=1)).to_have_text(NAME)
