@@ -206,7 +206,7 @@ class Dashboard:
 
     # ---- waiting
 
-    def until(self, holds: Callable[[], T], *, within_s: float = 60.0) -> T:
+    def until(self, holds: Callable[[], T | None], *, within_s: float = 60.0) -> T:
         """Wait until that gives something true, which is returned, letting the page live meanwhile."""
         for _ in range(int(within_s / 0.1)):
             if found := holds():
