@@ -12,6 +12,7 @@ import { FirstCampaign } from "../components/FirstCampaign";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import { STATE_FILTERS, type StateFilter, statesFor } from "../lib/campaigns";
+import { addPage } from "../lib/paging";
 import classes from "./CampaignsPage.module.css";
 
 const SORTS: { value: Sort; label: string }[] = [
@@ -103,11 +104,7 @@ export function CampaignsPage() {
       </ul>
       {campaigns.hasNextPage && (
         <div className={classes["more"]}>
-          <Button
-            variant="default"
-            loading={campaigns.isFetchingNextPage}
-            onClick={() => void campaigns.fetchNextPage()}
-          >
+          <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
             Show more ({found.length} of {total})
           </Button>
         </div>

@@ -11,6 +11,7 @@ import { Time } from "../components/Time";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
 import { checkWords, KINDS } from "../lib/checks";
+import { addPage } from "../lib/paging";
 import { recordOf } from "../lib/records";
 import classes from "./WorkPages.module.css";
 
@@ -100,7 +101,7 @@ function EarlierChecks({ shown }: { shown: number }) {
       </ul>
       {checks.hasNextPage && (
         <div className={classes["more"]}>
-          <Button variant="default" loading={checks.isFetchingNextPage} onClick={() => void checks.fetchNextPage()}>
+          <Button variant="default" loading={checks.isFetchingNextPage} onClick={() => void addPage(checks)}>
             Show more ({found.length} of {total})
           </Button>
         </div>

@@ -4,6 +4,7 @@ import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../api/work
 import { JobCard } from "../components/JobCard";
 import { Trouble } from "../components/Trouble";
 import { useTitle } from "../components/useTitle";
+import { addPage } from "../lib/paging";
 import classes from "./WorkPages.module.css";
 
 type Group = "failed" | "open" | "over";
@@ -93,7 +94,7 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
           <Button
             variant="default"
             loading={query.isFetchingNextPage}
-            onClick={() => (isBrief ? onAll() : void query.fetchNextPage())}
+            onClick={() => (isBrief ? onAll() : void addPage(query))}
           >
             {isBrief ? `Show all ${total} that failed` : `Show more (${items.length} of ${total})`}
           </Button>

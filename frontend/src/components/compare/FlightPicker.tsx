@@ -6,6 +6,7 @@ import { useCampaign, useCampaigns, useTrials } from "../../api/queries";
 import { MOST_FLIGHTS } from "../../lib/compare";
 import { count, withUnit } from "../../lib/format";
 import { gainsInBrackets } from "../../lib/gains";
+import { addPage } from "../../lib/paging";
 import { trialWords, wasFlown } from "../../lib/states";
 import { Panel } from "../Panel";
 import { Trouble } from "../Trouble";
@@ -50,12 +51,7 @@ export function FlightPicker({ chosen, onToggle, from }: Props) {
         </p>
       )}
       {campaigns.hasNextPage && (
-        <Button
-          variant="default"
-          mt={8}
-          loading={campaigns.isFetchingNextPage}
-          onClick={() => void campaigns.fetchNextPage()}
-        >
+        <Button variant="default" mt={8} loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
           Show more campaigns
         </Button>
       )}

@@ -1,6 +1,7 @@
 import { Button, Skeleton } from "@mantine/core";
 import { useActs } from "../../api/fleet";
 import { ACTS } from "../../lib/fleet";
+import { addPage } from "../../lib/paging";
 import { Panel } from "../Panel";
 import { Time } from "../Time";
 import { Trouble } from "../Trouble";
@@ -49,7 +50,7 @@ export function ActList({ vehicleId }: { vehicleId: number }) {
           variant="default"
           className={classes["more"] ?? ""}
           loading={acts.isFetchingNextPage}
-          onClick={() => void acts.fetchNextPage()}
+          onClick={() => void addPage(acts)}
         >
           Show more ({items.length} of {acts.data?.pages[0]?.total})
         </Button>

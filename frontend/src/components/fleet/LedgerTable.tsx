@@ -6,6 +6,7 @@ import { PURPOSES } from "../../lib/fleet";
 import { sameHeld } from "../../lib/flyScreen";
 import { NOTHING } from "../../lib/format";
 import { gainsInBrackets } from "../../lib/gains";
+import { addPage } from "../../lib/paging";
 import { Panel } from "../Panel";
 import { Time } from "../Time";
 import { Trouble } from "../Trouble";
@@ -45,7 +46,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
           variant="default"
           className={classes["more"] ?? ""}
           loading={ledger.isFetchingNextPage}
-          onClick={() => void ledger.fetchNextPage()}
+          onClick={() => void addPage(ledger)}
         >
           Show more ({lines.length} of {ledger.data?.pages[0]?.total})
         </Button>
