@@ -146,13 +146,14 @@ def finish_act(
     result: JsonObject | None = None,
     problem: str = "",
 ) -> None:
-    """What came of it; `problem` when it failed. By a connect, a vehicle that is not pinned was given nothing; one that
-    is pinned is looked for when it failed: it may be off, or another has its port. Doing it twice is harmless."""
+    """What came of it; `problem` when it failed. By a connect, a vehicle that is not pinned, or was not read back, was
+    given nothing; one that is pinned is looked for when it failed: it may be off, or another has its port. Doing it
+    twice is harmless."""
     act = repository.get_act(session, act_id)
     if act.state != ActState.RUNNING:
         return
     act.result = result
-    if act.kind == ActKind.CONNECT and act.vehicle.identity is None:
+    if act.kind == ActKind.CONNECT and not _was_given(act.vehicle, read_back):
         act.asked = None
     if read_back is not None:
         act.read_back = dict(read_back)
@@ -193,16 +194,18 @@ def _wanted(session: Session) -> list[VehicleRow]:
 
 def vehicle_found(
     session: Session, vehicle_id: int, identity: Identity, *, concern: str, held: Mapping[str, float]
-) -> None:
-    """A vehicle that was wanted connected is there again; without a concern it was given its safe gains. One that was
-    disconnected in the same moment stays so."""
+) -> bool:
+    """A vehicle that was wanted connected is there again; False for one that is not wanted any more, and stays
+    disconnected."""
     row = repository.get_one(session, vehicle_id)
     if not row.wanted_connected:
-        return
-    vehicle_connected(session, vehicle_id, identity, concern=concern, held=held)
-    given = None if row.identity is None else dict(row.safe_gains)
+        return False
+    read_back = dict(held) or None
+    vehicle_connected(session, vehicle_id, identity, concern=concern, held=read_back)
+    given = dict(row.safe_gains) if _was_given(row, read_back) else None
     act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=given)
-    act.read_back = dict(held)
+    act.read_back = read_back
+    return True
 
 
 def vehicle_connected(
@@ -288,6 +291,11 @@ def _linked(row: VehicleRow) -> LinkedVehicle:
         safe_gains=dict(row.safe_gains),
         identity=None if row.identity is None else Identity(**row.identity),
     )
+
+
+def _was_given(row: VehicleRow, read_back: Gains | None) -> bool:
+    """Whether connecting gave it its safe gains: one that is armed, absent or not pinned is only looked at."""
+    return row.identity is not None and read_back is not None
 
 
 def _pin(row: VehicleRow, identity: Identity) -> None:

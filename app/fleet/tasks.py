@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import structlog
 from sqlalchemy.orm import Session as Transaction
@@ -30,6 +30,8 @@ from app.fleet.states import GIVES_GAINS, ActKind
 from app.live.messages import LinkTo, Order, VehicleStatus
 from app.trials.flying import Airspace, Publish
 from app.vehicles.errors import SafeGainsError, VehicleError
+
+T = TypeVar("T")
 
 RETRY_S: Final = 1.0
 GIVES_WAY_S: Final = 0.1
@@ -152,16 +154,22 @@ class SessionDeck:
         self._store_patiently(partial(_connected, task=task, said=said))
 
     def _disconnect(self, task: ActTask) -> None:
-        berth = self._berth(task.vehicle.vehicle_id)
+        self._close(task.vehicle.vehicle_id)
+        self._store_patiently(partial(_disconnected, task=task))
+
+    def _close(self, vehicle_id: int, *, only: Session | None = None) -> None:
+        """The vehicle's session, whichever it is or `only` that one."""
+        berth = self._berth(vehicle_id)
         self._take(berth)
         try:
+            if only is not None and berth.session is not only:
+                return
             session, berth.session = berth.session, None
             if session is not None:
                 session.close()
         finally:
             berth.busy.release()
-        self._show(task.vehicle.vehicle_id, "gone")
-        self._store_patiently(partial(_disconnected, task=task))
+        self._show(vehicle_id, "gone")
 
     def _take(self, berth: Berth) -> None:
         """The berth for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
@@ -226,14 +234,17 @@ class SessionDeck:
         """With `busy` held. Raises nothing that matters: who is wanted is looked for again."""
         try:
             said = self._opened(berth, vehicle, patient=True)
+            found = berth.session
         except GainlineError as error:
             _log.info("not connected", vehicle_id=vehicle.vehicle_id, why=str(error))
             return
         finally:
             berth.busy.release()
-        self._store_patiently(
+        kept = self._store_patiently(
             lambda t: acts.vehicle_found(t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held)
         )
+        if kept is False:
+            self._close(vehicle.vehicle_id, only=found)
 
     def _opened(self, berth: Berth, vehicle: LinkedVehicle, *, patient: bool = False) -> Connected:
         """With `busy` held. Raises VehicleError when there is no link in the end."""
@@ -296,21 +307,19 @@ class SessionDeck:
         with suppress(RuntimeError):  # the worker has ended
             self._books.submit(self._store_patiently, work)
 
-    def _store_patiently(self, work: Callable[[Transaction], None]) -> None:
-        """Try until the database takes it, or the worker closes."""
+    def _store_patiently(self, work: Callable[[Transaction], T]) -> T | None:
+        """What `work` gives, tried until the database takes it; None when it does not fit, or the worker closes."""
         while True:
             try:
                 with self._database.write() as transaction:
-                    work(transaction)
+                    return work(transaction)
             except StorageError as error:
                 _log.error("what became of a vehicle is not stored yet", why=str(error))
                 if self._closing.wait(self._clock.wall_s(RETRY_S)):
-                    return
+                    return None
             except GainlineError as error:
                 _log.error("what became of a vehicle does not fit the books", why=str(error))
-                return
-            else:
-                return
+                return None
 
 
 def _connected(transaction: Transaction, task: ActTask, said: Connected) -> None:

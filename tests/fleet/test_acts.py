@@ -10,6 +10,7 @@ from app.db.models import VehicleActRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
+from app.fleet.session import Call, Connected, Session
 from app.fleet.states import ActKind, VehicleState
 from app.fleet.tasks import SessionDeck
 from app.main import create_app
@@ -19,6 +20,7 @@ from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
 from tests.fleet.vehicles import (
     DEFAULT_GAINS,
+    IDENTITY,
     connect,
     control_header,
     create_campaign_on,
@@ -280,10 +282,64 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     finish_act(database)
     with database.write() as session:  # found in the very moment in which it was not wanted any more
         identity = Identity(system_id=9, autopilot="paparazzi", version="")
-        acts.vehicle_found(session, known["id"], identity, concern="", held=known["safe_gains"])
+        assert not acts.vehicle_found(session, known["id"], identity, concern="", held=known["safe_gains"])
     with database.read() as session:
         assert acts.wanted_links(session) == []
     assert seen(client, known)["state"] == "disconnected"
+
+
+def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent_when_it_was_connected(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    with database.write() as session:
+        acts.vehicle_gone(session, vehicle["id"])
+    ask(client, vehicle, "connect")
+    finish_act(database, problem="nobody answers")
+    with database.write() as session:
+        identity = Identity(system_id=1, autopilot="paparazzi", version="")
+        assert acts.vehicle_found(session, vehicle["id"], identity, concern="It is armed.", held={})
+    given = client.get(f"/api/vehicles/{vehicle['id']}/ledger").json()["items"]
+    assert [(line["purpose"], line["asked"], line["read_back"]) for line in given] == [
+        ("connect", DEFAULT_GAINS, DEFAULT_GAINS)
+    ]
+
+
+def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_closed(
+    settings: Settings, client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disconnect that the worker took too late to begin it."""
+    vehicle = create_connected(client, database)
+    events: list[str] = []
+
+    class Found(Session):
+        def __init__(self, call: Call, *_: object, **__: object) -> None:
+            self.call = call  # type: ignore[misc]
+
+        def connected(self) -> Connected:
+            ask(client, vehicle, "disconnect")
+            with database.write() as session:
+                acts.withdraw_acts(session)
+            events.append("found")
+            return Connected(identity=IDENTITY, concern="", held=dict(DEFAULT_GAINS))
+
+        def hang_up(self) -> None:
+            pass
+
+        def close(self) -> None:
+            events.append("closed")
+
+    monkeypatch.setattr("app.fleet.tasks.Session", Found)
+    with database.write() as session:
+        acts.vehicle_gone(session, vehicle["id"])
+    deck = SessionDeck(
+        database, settings.data_dir, Airspace(), lambda _shown: None, worker=WORKER, closing=threading.Event()
+    )
+    deck.tend()
+    deck._seekers.shutdown()
+    assert events == ["found", "closed"]
+    assert not deck.order(vehicle["id"], "land", "a person asks", by_s=0.0)
+    assert seen(client, vehicle)["state"] == "disconnected"
 
 
 def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: TestClient, database: Database) -> None:
