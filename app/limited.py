@@ -41,7 +41,7 @@ _places = threading.BoundedSemaphore(AT_ONCE)
 
 
 def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """Call a pure, picklable function in a new process and wait.
+    """Call a pure, picklable function in a new process, which imports its module, and wait.
 
     Raises what it raises, InputError naming the file when it passes a limit, and UnavailableError while others are
     read.

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from io import BytesIO
 from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
-from app.controller_checks.checking import LogCheck, TraceCheck
+from app.controller_checks.checking import LogCheck, TraceCheck, check_recording
 from app.core.control.replay import INPUTS, OUTPUTS
 from app.core.control.vertical_loop import RATE_HZ
 from app.core.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay
@@ -94,12 +94,10 @@ class Result:
         return asdict(self)
 
 
-_RESULT: Final = TypeAdapter(Result)
-
-
-def result_from_json(document: object) -> Result:
-    """What `as_json` made, back again. Raises ValueError for anything else."""
-    return _RESULT.validate_python(document)
+def examine_content(content: bytes, *, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
+    """What comes of a recording that is in memory, for a process of its own. Raises InputError as `check_recording`."""
+    beside = None if companion is None else BytesIO(companion)
+    return result_of(check_recording(BytesIO(content), name=name, companion=beside, given=given))
 
 
 def result_of(checked: LogCheck | TraceCheck) -> Result:

@@ -1,15 +1,14 @@
 """What people do with controller checks: have a recording checked, read what came of it, remove it."""
 
-from collections.abc import Mapping
-from io import BytesIO
 from pathlib import PurePath
 from typing import Final
 
+from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from app.controller_checks import repository, schemas
-from app.controller_checks.checking import check_recording, check_trace, parse_gains
-from app.controller_checks.results import FIGURES, Result, result_from_json, result_of
+from app.controller_checks.checking import check_trace, parse_gains
+from app.controller_checks.results import FIGURES, Result, examine_content, result_of
 from app.core.control_characters import without_control_characters
 from app.db.models import ControllerCheckRow
 from app.db.paging import decode_cursor, encode_cursor
@@ -24,18 +23,14 @@ from app.studies.controller import RECORDED_TAKEOFF
 
 _NAME_LENGTH: Final = 120
 _UNNAMED: Final = "recording"
+_RESULT: Final = TypeAdapter(Result)
 
 
 def examine(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
     """Hold a recording that somebody has sent against the replica, in a process with limits; nothing is stored yet.
     Raises InputError naming what is wrong with it."""
     given = None if gains is None else parse_gains(gains)
-    return run_limited(FILE, _examine, content, named(name), companion, given)
-
-
-def _examine(content: bytes, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
-    beside = None if companion is None else BytesIO(companion)
-    return result_of(check_recording(BytesIO(content), name=name, companion=beside, given=given))
+    return run_limited(FILE, examine_content, content, name=named(name), companion=companion, given=given)
 
 
 def examine_example() -> Result:
@@ -97,7 +92,7 @@ def named(name: str) -> str:
 
 def _result(row: ControllerCheckRow) -> Result:
     try:
-        return result_from_json(row.result)
+        return _RESULT.validate_python(row.result)
     except ValueError as error:
         raise StorageError(
             f"Controller check {row.id} was made by another version of the program.", hint="Check the recording again."

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import PurePath
 from typing import BinaryIO, Final
 
@@ -79,3 +80,9 @@ def read_takeoff(
     """The takeoff of that number in a log, or its only one. Raises TrajectoryError, listing them when it is not clear
     which one is meant."""
     return choose(read_takeoffs(stream, name=name, companion=companion), number)
+
+
+def read_content(content: bytes, *, name: str, number: int | None, companion: bytes | None) -> Takeoff:
+    """The same of files that are in memory, for a process of its own."""
+    beside = None if companion is None else BytesIO(companion)
+    return read_takeoff(BytesIO(content), name=name, number=number, companion=beside)

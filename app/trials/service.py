@@ -2,7 +2,6 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -167,12 +166,9 @@ def read_record(
 
 def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
     """The same of a file that somebody has sent: in a process with limits. Raises InputError when it passes them."""
-    return run_limited(FILE, _read_content, content, name, takeoff, companion)
+    from app.logs.readers import read_content  # noqa: PLC0415 - every reader there is
 
-
-def _read_content(content: bytes, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
-    beside = None if companion is None else BytesIO(companion)
-    return read_record(BytesIO(content), name=name, takeoff=takeoff, companion=beside)
+    return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
 def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed: bool = False) -> Trial:

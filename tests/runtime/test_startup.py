@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from app.controller_checks.results import examine_content
+from app.logs.readers import read_content
+
 NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")
 DATABASE = ("pydantic", "sqlalchemy")
 
@@ -71,3 +74,9 @@ def test_the_worker_starts_without_what_only_its_processes_need() -> None:
 
 def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
     assert not imported("import app.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
+
+
+def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:
+    """Each file has one of its own: what it loads, whoever sends the file waits for."""
+    for function in (read_content, examine_content):
+        assert not imported(f"import {function.__module__}").intersection(("fastapi", "plotly", *DATABASE))
