@@ -13,7 +13,7 @@ from typing import Final
 from app.errors import NotAllowedError
 
 
-class Place(Enum):
+class RequestOrigin(Enum):
     """Where a request comes from."""
 
     HERE = "here"
@@ -32,7 +32,7 @@ class Key(IntEnum):
     """Of a browser on this computer, which a person has unlocked."""
 
 
-class Act(Enum):
+class Permission(Enum):
     """What can be asked, as far as it matters who asks."""
 
     CHANGE = auto()
@@ -59,13 +59,13 @@ class Rule:
     exposed: bool
 
 
-RULES: Final[Mapping[Act, Rule]] = {
-    Act.CHANGE: Rule(here=Key.NONE, elsewhere=Key.REMOTE, exposed=True),
-    Act.LINK: Rule(here=Key.NONE, elsewhere=None, exposed=False),
-    Act.REAL: Rule(here=Key.SCRIPT, elsewhere=None, exposed=False),
-    Act.TAKE_OFF: Rule(here=Key.BROWSER, elsewhere=None, exposed=False),
-    Act.STOP: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
-    Act.REVIEW: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
+PERMISSION_RULES: Final[Mapping[Permission, Rule]] = {
+    Permission.CHANGE: Rule(here=Key.NONE, elsewhere=Key.REMOTE, exposed=True),
+    Permission.LINK: Rule(here=Key.NONE, elsewhere=None, exposed=False),
+    Permission.REAL: Rule(here=Key.SCRIPT, elsewhere=None, exposed=False),
+    Permission.TAKE_OFF: Rule(here=Key.BROWSER, elsewhere=None, exposed=False),
+    Permission.STOP: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
+    Permission.REVIEW: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
 }
 """Reading needs no rule: everybody who reaches the server may look."""
 
@@ -74,7 +74,7 @@ RULES: Final[Mapping[Act, Rule]] = {
 class Caller:
     """Who asks. `exposed`: the server listens beyond loopback; `because`: how it is known that they are elsewhere."""
 
-    place: Place = Place.HERE
+    place: RequestOrigin = RequestOrigin.HERE
     key: Key = Key.NONE
     exposed: bool = False
     because: str = ""
@@ -83,46 +83,48 @@ class Caller:
 COMMAND_LINE: Final = Caller(key=Key.BROWSER)
 """Whoever runs a command on the data folder itself."""
 
-UNLOCK: Final = (
+UNLOCK_HINT: Final = (
     "Open the link that the terminal printed at the start, or run `gainline unlock` on the computer that Gainline runs "
     "on and open the link that it prints."
 )
 
 
-def is_allowed(act: Act, caller: Caller) -> bool:
-    rule = RULES[act]
+def is_allowed(act: Permission, caller: Caller) -> bool:
+    rule = PERMISSION_RULES[act]
     if caller.exposed and not rule.exposed:
         return False
-    needed = rule.here if caller.place is Place.HERE else rule.elsewhere
+    needed = rule.here if caller.place is RequestOrigin.HERE else rule.elsewhere
     return needed is not None and caller.key >= needed
 
 
-def require(act: Act, caller: Caller, vehicle: str = "") -> None:
+def require(act: Permission, caller: Caller, vehicle: str = "") -> None:
     """Raises NotAllowedError saying what is missing. `vehicle` is the name of the one that it is about."""
     if is_allowed(act, caller):
         return
-    rule = RULES[act]
+    rule = PERMISSION_RULES[act]
     if caller.exposed and not rule.exposed:
         raise _exposed(act, vehicle)
-    if caller.place is Place.ELSEWHERE:
+    if caller.place is RequestOrigin.ELSEWHERE:
         raise _elsewhere(act, caller, vehicle) if rule.elsewhere is None else _no_key_elsewhere(caller)
     raise _locked(act, vehicle)
 
 
-def _what(act: Act, vehicle: str) -> str:
-    return f"{vehicle} is flown over a link" if act is Act.LINK else f"{vehicle} is a real vehicle"
+def _describe_permission(act: Permission, vehicle: str) -> str:
+    return f"{vehicle} is flown over a link" if act is Permission.LINK else f"{vehicle} is a real vehicle"
 
 
-def _exposed(act: Act, vehicle: str) -> NotAllowedError:
+def _exposed(act: Permission, vehicle: str) -> NotAllowedError:
     return NotAllowedError(
-        f"{_what(act, vehicle)}, and this server can be reached over the network, where it has no accounts yet.",
+        f"{_describe_permission(act, vehicle)}, and this server can be reached over the network, where it has no "
+        "accounts yet.",
         hint="Start the server with --host 127.0.0.1 on the computer that is linked to the vehicle.",
     )
 
 
-def _elsewhere(act: Act, caller: Caller, vehicle: str) -> NotAllowedError:
+def _elsewhere(act: Permission, caller: Caller, vehicle: str) -> NotAllowedError:
     return NotAllowedError(
-        f"{_what(act, vehicle)}: it is commanded from this computer alone, and the request came {caller.because}.",
+        f"{_describe_permission(act, vehicle)}: it is commanded from this computer alone, and the request came "
+        f"{caller.because}.",
         hint="Use a browser on the computer that Gainline runs on, at the address that the terminal printed, without a "
         "proxy or tunnel between them.",
     )
@@ -131,18 +133,18 @@ def _elsewhere(act: Act, caller: Caller, vehicle: str) -> NotAllowedError:
 def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
     return NotAllowedError(
         f"The request came {caller.because}: from there one may look, and needs this server's token for all else.",
-        hint=f"{UNLOCK} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`.",
+        hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`.",
     )
 
 
-def _locked(act: Act, vehicle: str) -> NotAllowedError:
-    if act is Act.TAKE_OFF:
+def _locked(act: Permission, vehicle: str) -> NotAllowedError:
+    if act is Permission.TAKE_OFF:
         return NotAllowedError(
             f"{vehicle} is a real vehicle: it takes off only on its operator's own act in an unlocked browser.",
-            hint=f"{UNLOCK} A script can propose gains and stage the flight.",
+            hint=f"{UNLOCK_HINT} A script can propose gains and stage the flight.",
         )
     return NotAllowedError(
         f"{vehicle} is a real vehicle, and whoever asks has not shown that they may command it.",
-        hint=f"{UNLOCK} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`. Abort "
-        "and land need neither.",
+        hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`. "
+        "Abort and land need neither.",
     )

@@ -78,7 +78,7 @@ class Reproducible(StrEnum):
     ALL = "all"
 
 
-def plainly(command: Callable[P, None]) -> Callable[P, None]:
+def report_errors(command: Callable[P, None]) -> Callable[P, None]:
     """The command, with the program's own errors said in words and exit code 1."""
 
     @wraps(command)
@@ -95,7 +95,7 @@ def plainly(command: Callable[P, None]) -> Callable[P, None]:
 
 
 @app.command()
-@plainly
+@report_errors
 def serve(
     host: Annotated[
         str | None,
@@ -119,7 +119,7 @@ def serve(
 
 
 @app.command()
-@plainly
+@report_errors
 def unlock(
     script: Annotated[
         bool, typer.Option("--script", help="Print what a script sends instead, as `Authorization: Bearer TOKEN`.")
@@ -133,7 +133,7 @@ def unlock(
 
 
 @app.command()
-@plainly
+@report_errors
 def worker(data_dir: DataDir = None) -> None:
     """Fly and compute for a server that was started with --no-worker."""
     from app.worker import run_worker
@@ -142,7 +142,7 @@ def worker(data_dir: DataDir = None) -> None:
 
 
 @app.command()
-@plainly
+@report_errors
 def run(
     campaign: CampaignSource,
     vehicle: Annotated[
@@ -178,7 +178,7 @@ def run(
 
 
 @app.command()
-@plainly
+@report_errors
 def reproduce(
     what: Annotated[Reproducible, typer.Argument(help="Which experiment or table of the paper.")],
     full: Annotated[
@@ -197,7 +197,7 @@ def reproduce(
 
 
 @app.command("sim-drone")
-@plainly
+@report_errors
 def sim_drone(
     autopilot: Annotated[str, typer.Option(help="Whose manners it has: paparazzi, ardupilot or px4.")] = "paparazzi",
     link: Annotated[
@@ -263,7 +263,7 @@ def sim_drone(
 
 
 @app.command(name="import")
-@plainly
+@report_errors
 def import_log(
     file: Annotated[
         Path,
@@ -295,7 +295,7 @@ def import_log(
 
 
 @app.command()
-@plainly
+@report_errors
 def report(
     campaign: GivenCampaign,
     out: Annotated[
@@ -315,7 +315,7 @@ def report(
 
 
 @app.command()
-@plainly
+@report_errors
 def bundle(
     campaign: GivenCampaign,
     out: Annotated[
@@ -331,7 +331,7 @@ def bundle(
 
 
 @app.command()
-@plainly
+@report_errors
 def unbundle(
     file: Annotated[Path, typer.Argument(metavar="FILE", show_default=False, help="What `gainline bundle` wrote.")],
     data_dir: DataDir = None,
@@ -343,7 +343,7 @@ def unbundle(
 
 
 @controller.command()
-@plainly
+@report_errors
 def replay(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recorded runs, .csv or .csv.gz.")],
     json_out: JsonOut = None,
@@ -356,7 +356,7 @@ def replay(
 
 
 @controller.command()
-@plainly
+@report_errors
 def check(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE…", help="Paparazzi's .data files with VERT_LOOP; .log beside them.")

@@ -15,18 +15,18 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class Done(Generic[T]):
+class TaskResult(Generic[T]):
     result: T
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class TaskError:
     """By the task; the error's note says where."""
 
     error: Exception
 
 
-def compute(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
+def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
     """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(niceness)
@@ -37,12 +37,12 @@ def compute(pipe: Connection, prepare: Callable[[], object], niceness: int) -> N
             pipe.send(_outcome(pipe.recv()))
 
 
-def _outcome(task: Callable[[], T]) -> Done[T] | Refused:
+def _outcome(task: Callable[[], T]) -> TaskResult[T] | TaskError:
     try:
-        return Done(task())
+        return TaskResult(task())
     except Exception as error:  # noqa: BLE001 - the edge of the process
         error.add_note(format_exc())
-        return Refused(error)
+        return TaskError(error)
 
 
 def _end_with_parent() -> None:

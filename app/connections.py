@@ -18,14 +18,14 @@ BODY_SILENCE_S: Final = 20.0
 BODY_WITHIN_S: Final = 1800.0
 STREAM_AFTER_S: Final = 10.0
 """An answer that takes longer is an event stream, or is read slowly."""
-FOR_OTHERS: Final = 256
+RESERVED_DESCRIPTORS: Final = 256
 """Descriptors that are left to the database, files and processes."""
-FOR_STOPPING: Final = 64
+RESERVED_FOR_ABORTS: Final = 64
 """Connections beyond the limit that serve nothing but what ends a flight."""
-FOR_ARRIVING: Final = 32
+RESERVED_FOR_ARRIVING: Final = 32
 """Connections beyond those that are on their way in, or were dropped and are on their way out."""
-MOST: Final = 1024
-MOST_OF_A_DEVICE: Final = 64
+MAX_CONNECTIONS: Final = 1024
+MAX_CONNECTIONS_PER_DEVICE: Final = 64
 """This computer itself has no limit of its own: the operator is one of its users."""
 
 
@@ -66,7 +66,7 @@ class Connections:
 
     def has_room(self, arriving: int) -> bool:
         """Whether another one can be taken while so many are on their way in; in a moment it can be."""
-        return self.held + arriving < self.most + FOR_STOPPING + FOR_ARRIVING
+        return self.held + arriving < self.most + RESERVED_FOR_ABORTS + RESERVED_FOR_ARRIVING
 
     def add(self, connection: Connection) -> bool:
         """Take it in, if need be in another's place. False when it must be closed: everybody is being answered."""
@@ -74,12 +74,12 @@ class Connections:
         connection.since_s = connection.heard_s = now_s
         own = [each for each in self.open if each.client == connection.client] if connection.client else []
         is_full = len(self.open) >= self.most
-        if len(own) >= MOST_OF_A_DEVICE or is_full:
-            goes = self._first_to_go(own if len(own) >= MOST_OF_A_DEVICE else self.open, now_s)
+        if len(own) >= MAX_CONNECTIONS_PER_DEVICE or is_full:
+            goes = self._first_to_go(own if len(own) >= MAX_CONNECTIONS_PER_DEVICE else self.open, now_s)
             if goes is not None:
                 self.remove(goes)
                 goes.drop()
-            elif own or len(self.open) >= self.most + FOR_STOPPING:
+            elif own or len(self.open) >= self.most + RESERVED_FOR_ABORTS:
                 return False
             else:
                 connection.for_stopping = True
@@ -112,7 +112,10 @@ class Connections:
 
 def room_for_connections(descriptors: int) -> int:
     """How many connections there may be beside `FOR_STOPPING`, where the process may have so many open files."""
-    return min(MOST, max(descriptors - FOR_OTHERS, descriptors // 2) - FOR_STOPPING - FOR_ARRIVING)
+    return min(
+        MAX_CONNECTIONS,
+        max(descriptors - RESERVED_DESCRIPTORS, descriptors // 2) - RESERVED_FOR_ABORTS - RESERVED_FOR_ARRIVING,
+    )
 
 
 def _standing(connection: Connection, now_s: float) -> Phase:

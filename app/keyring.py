@@ -20,12 +20,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final, Self
 
-from app.access import Key, Place
+from app.access import Key, RequestOrigin
 from app.errors import StorageError
 
 LINK_VALID_S: Final = 15 * 60
 _SECRET_BYTES: Final = 32
-_GIVEN_BY_PLACE: Final = {Place.HERE: Key.BROWSER, Place.ELSEWHERE: Key.REMOTE}
+_GIVEN_BY_PLACE: Final = {RequestOrigin.HERE: Key.BROWSER, RequestOrigin.ELSEWHERE: Key.REMOTE}
 
 
 class Keyring:
@@ -58,7 +58,7 @@ class Keyring:
         """What a browser's cookie or a script's header holds to show this key."""
         return self._derived(f"key {key.name}")
 
-    def given_to(self, place: Place) -> Key:
+    def given_to(self, place: RequestOrigin) -> Key:
         """The key that a browser there gets for a link."""
         return _GIVEN_BY_PLACE[place]
 

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final, ParamSpec, TypeVar
 
-from app.computing import Done, Refused
+from app.computing import TaskError, TaskResult
 from app.errors import InputError, Problem, UnavailableError
 from app.processes import process_context
 
@@ -67,13 +67,13 @@ def _run(limits: Limits, task: Callable[[], T]) -> T:
         try:
             if not ours.poll(limits.wall_s):
                 raise _too_much(limits)
-            outcome: Done[T] | Refused = ours.recv()
+            outcome: TaskResult[T] | TaskError = ours.recv()
         except EOFError as error:  # the processor's time was up, or the system had no memory left
             raise _too_much(limits) from error
         finally:
             process.kill()
             process.join()
-    if isinstance(outcome, Refused):
+    if isinstance(outcome, TaskError):
         if isinstance(outcome.error, MemoryError):
             raise _too_much(limits) from outcome.error
         raise outcome.error
@@ -89,9 +89,9 @@ def _perform(pipe: Connection, limits: Limits, task: Callable[[], T]) -> None:
         most = _address_space() + limits.memory_bytes
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     try:
-        outcome: Done[T] | Refused = Done(task())
+        outcome: TaskResult[T] | TaskError = TaskResult(task())
     except Exception as error:  # noqa: BLE001 - the edge of the process
-        outcome = Refused(error)
+        outcome = TaskError(error)
     with suppress(OSError):  # nobody waits any more
         pipe.send(outcome)
 

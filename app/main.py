@@ -94,8 +94,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(router)
     errors.install(app)
     describe(app)
-    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.own_error)
-    app.add_middleware(AccessMiddleware, host=settings.host, refuse_foreign=errors.foreign, refuse=errors.own_error)
+    app.add_middleware(BodyLimitMiddleware, upload_bytes=settings.max_upload_bytes, refuse=errors.problem_response)
+    app.add_middleware(
+        AccessMiddleware,
+        host=settings.host,
+        refuse_foreign=errors.foreign_request_response,
+        refuse=errors.problem_response,
+    )
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=COMPRESSION)
     app.add_middleware(HeadersMiddleware)
     if (settings.ui_dir / "index.html").is_file():

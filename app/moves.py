@@ -9,7 +9,7 @@ from app.errors import ConflictError, Problem
 S = TypeVar("S", bound=StrEnum)
 
 
-def check_move(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:
+def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:
     """The new state. Raises ConflictError when the table does not lead there from `state`."""
     if to not in moves[state]:
         raise ConflictError(f"{what} is {state} and cannot become {to}.", hint=_look_again(sorted(moves[state])))

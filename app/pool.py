@@ -12,7 +12,7 @@ from typing import Final, ParamSpec, Self, TypeVar
 
 import structlog
 
-from app.computing import Done, Refused, compute
+from app.computing import TaskError, TaskResult, run_tasks
 from app.core.errors import GainlineError
 from app.processes import process_context
 
@@ -28,7 +28,7 @@ class CrashedError(GainlineError):
     """The computing process died each time it was tried."""
 
 
-class Pool:
+class ComputePool:
     """Spawned processes between enter and exit, each started when it is first needed. Thread-safe.
 
     They end at once, in the middle of a task, when the pool is closed or this process dies. Tasks are pure, so nothing
@@ -39,8 +39,8 @@ class Pool:
     def __init__(self, processes: int, *, prepare: Callable[[], object], niceness: int = 0) -> None:
         """`prepare()` runs in every new process before its first task, to load and compile what tasks need; `niceness`,
         from 0 to 19, is how far they give way to other processes of the machine."""
-        self._computers = [_Computer(prepare, niceness) for _ in range(processes)]
-        self._free: queue.LifoQueue[_Computer] = queue.LifoQueue()
+        self._computers = [_ComputeProcess(prepare, niceness) for _ in range(processes)]
+        self._free: queue.LifoQueue[_ComputeProcess] = queue.LifoQueue()
         for computer in self._computers:
             self._free.put(computer)
 
@@ -64,7 +64,7 @@ class Pool:
             computer = self._free.get()
             try:
                 return computer.perform(task)
-            except _DiedError:
+            except _ProcessDiedError:
                 _log.warning("computing process died", task=function.__qualname__)
             finally:
                 self._free.put(computer)
@@ -74,11 +74,11 @@ class Pool:
         )
 
 
-class _DiedError(Exception):
+class _ProcessDiedError(Exception):
     """The process is gone without a result."""
 
 
-class _Computer:
+class _ComputeProcess:
     """A process, started when it is needed, and the pipe to it. It performs for one thread at a time; any may close
     it."""
 
@@ -94,11 +94,11 @@ class _Computer:
         pipe = self._pipe()
         try:
             pipe.send(task)
-            outcome: Done[T] | Refused = pipe.recv()
+            outcome: TaskResult[T] | TaskError = pipe.recv()
         except (EOFError, OSError) as error:
             self._bury()
-            raise _DiedError from error
-        if isinstance(outcome, Refused):
+            raise _ProcessDiedError from error
+        if isinstance(outcome, TaskError):
             raise outcome.error
         return outcome.result
 
@@ -119,7 +119,7 @@ class _Computer:
         context = process_context()
         ours, theirs = context.Pipe()
         process = context.Process(
-            target=compute, args=(theirs, self._prepare, self._niceness), name="computing", daemon=True
+            target=run_tasks, args=(theirs, self._prepare, self._niceness), name="computing", daemon=True
         )
         process.start()
         theirs.close()

@@ -2,6 +2,6 @@
 
 import app.fleet.seat
 import app.trials.cockpit  # noqa: F401
-from app.campaigns.computation import prepare
+from app.campaigns.computation import warm_up
 
-prepare()
+warm_up()

@@ -22,7 +22,7 @@ from app.settings import Settings
 from app.supervisor import Supervisor
 from app.worker_process import run_worker_process
 
-SWITCH_EVERY_S: Final = 0.001
+THREAD_SWITCH_INTERVAL_S: Final = 0.001
 """How long a thread that draws may keep the one that answers waiting for the interpreter."""
 
 
@@ -43,12 +43,12 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         announce(narrowed)
     with ExitStack() as stack:
         for number in (signal.SIGINT, signal.SIGTERM):
-            stack.callback(signal.signal, number, signal.signal(number, _leave))
+            stack.callback(signal.signal, number, signal.signal(number, _exit))
         try:
             sign = stack.enter_context(exclusive(settings.data_dir / "server.lock"))
         except LockedError as error:
             raise _already_served(settings, error) from error
-        sys.setswitchinterval(SWITCH_EVERY_S)
+        sys.setswitchinterval(THREAD_SWITCH_INTERVAL_S)
         listener = stack.enter_context(listen(settings.host, settings.port))
         sign(web_address(settings.host, listener.getsockname()[1]))
         configure_logs(settings.data_dir, "web", settings.log_level)
@@ -74,7 +74,7 @@ def listen(host: str, port: int) -> socket.socket:
         raise _no_address(host, port, error) from error
 
 
-def _leave(_signal: int, _frame: FrameType | None) -> None:
+def _exit(_signal: int, _frame: FrameType | None) -> None:
     """Unwind everything. Uvicorn takes signals over while it runs, and raises them again when it has shut down."""
     raise SystemExit(0)
 

@@ -18,9 +18,9 @@ FIRST_PAUSE_S: Final = 0.2
 LONGEST_PAUSE_S: Final = 10.0
 HEALTHY_AFTER_S: Final = 20.0
 """A child that lived this long starts again after the shortest pause."""
-PATIENCE_S: Final = 60.0
+STOP_TIMEOUT_S: Final = 60.0
 """How long a child that was asked to stop may take to land what flies and to record it: landing alone may take 40 s."""
-TELLS_WITHIN_S: Final = 0.5
+STACK_DUMP_TIMEOUT_S: Final = 0.5
 
 _log = structlog.get_logger(__name__)
 T = TypeVar("T")
@@ -54,11 +54,11 @@ class Supervisor(Generic[T]):
         if process.is_alive():
             process.terminate()
         try:
-            process.join(PATIENCE_S)
+            process.join(STOP_TIMEOUT_S)
         finally:
             if process.is_alive():
                 _log.error("child did not stop and is killed", child=self._name, pid=process.pid)
-                _have_it_tell(process)
+                _dump_stacks(process)
                 process.kill()
                 process.join()
 
@@ -92,8 +92,8 @@ class Supervisor(Generic[T]):
                 started_s = self._clock.now_s()
 
 
-def _have_it_tell(process: BaseProcess) -> None:
+def _dump_stacks(process: BaseProcess) -> None:
     """Where its threads hang, on standard error (`app.observability`)."""
     if process.pid is not None:
         os.kill(process.pid, signal.SIGUSR1)
-        time.sleep(TELLS_WITHIN_S)
+        time.sleep(STACK_DUMP_TIMEOUT_S)

@@ -22,29 +22,29 @@ from typing import Final
 import structlog
 
 from app import __version__
-from app.campaigns.computation import prepare
+from app.campaigns.computation import warm_up
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
-from app.campaigns.tasks import Proposer, Surveyor
+from app.campaigns.tasks import LandscapeJob, ProposalJob
 from app.core.clock import REAL_TIME, Clock
 from app.data_dir import make_private, prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.errors import AlreadyRunningError, StorageError
-from app.fleet.tasks import SessionDeck
-from app.jobs.tasks import Desk, recover
+from app.fleet.tasks import VehicleConnectionManager
+from app.jobs.tasks import JobRunner, recover
 from app.live.address import live_address
-from app.live.messages import Shown, WorkerHello
+from app.live.messages import PublishedMessage, WorkerHello
 from app.live.server import LiveServer
 from app.live.watch import DatabaseWatch
 from app.locks import LockedError, exclusive
 from app.observability import configure_logs
-from app.pool import Pool
+from app.pool import ComputePool
 from app.settings import Settings, is_loopback
 from app.studies.service import REPRODUCTION_JOB
-from app.studies.tasks import Reproducer
-from app.trials.flying import Airspace
-from app.trials.tasks import FlightDeck
+from app.studies.tasks import ReproductionJob
+from app.trials.flying import AbortRegistry
+from app.trials.tasks import FlightRunner
 
 FLIGHTS_AT_ONCE: Final = 8
 ACTS_AT_ONCE: Final = 8
@@ -61,7 +61,7 @@ RETRY_S: Final = 1.0
 _log = structlog.get_logger(__name__)
 
 
-class Ending:
+class ShutdownRequest:
     """Whether the worker is to end; once it is, no new work is claimed, and what flies is finished."""
 
     def __init__(self) -> None:
@@ -79,8 +79,8 @@ def run_worker(settings: Settings) -> None:
     Raises AlreadyRunningError when another worker has this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
-    airspace, ending = Airspace(), Ending()
-    _end_on(signal.SIGINT, signal.SIGTERM, ending=ending, airspace=airspace)
+    airspace, ending = AbortRegistry(), ShutdownRequest()
+    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, airspace=airspace)
     try:
         _run(settings, ending, airspace, keep_waiting=lambda: False)
     except LockedError as error:
@@ -95,14 +95,16 @@ def run_worker(settings: Settings) -> None:
 def run_supervised_worker(settings: Settings) -> None:
     """The worker beside a web process: it stands by while an older worker ends, and does not outlive its parent by
     more than the flights under way."""
-    airspace, ending = Airspace(), Ending()
-    _end_on(signal.SIGTERM, ending=ending, airspace=airspace)
-    threading.Thread(target=_end_with_parent, args=(ending,), daemon=True).start()
+    airspace, ending = AbortRegistry(), ShutdownRequest()
+    _install_signal_handlers(signal.SIGTERM, ending=ending, airspace=airspace)
+    threading.Thread(target=_shut_down_with_parent, args=(ending,), daemon=True).start()
     with suppress(LockedError):  # asked to end while it stood by
         _run(settings, ending, airspace, keep_waiting=lambda: not ending.event.is_set())
 
 
-def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting: Callable[[], bool]) -> None:
+def _run(
+    settings: Settings, ending: ShutdownRequest, airspace: AbortRegistry, *, keep_waiting: Callable[[], bool]
+) -> None:
     prepare_data_dir(settings.data_dir)
     narrowed = make_private(settings.data_dir)
     configure_logs(settings.data_dir, "worker", settings.log_level)
@@ -114,7 +116,7 @@ def _run(settings: Settings, ending: Ending, airspace: Airspace, *, keep_waiting
         Worker(settings, ending, airspace).work()
 
 
-def _end_on(*signals: signal.Signals, ending: Ending, airspace: Airspace) -> None:
+def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, airspace: AbortRegistry) -> None:
     """The handler takes no lock: the thread that it interrupts may hold any. Whoever does is a thread of its own."""
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()
 
@@ -132,7 +134,7 @@ def _end_on(*signals: signal.Signals, ending: Ending, airspace: Airspace) -> Non
         signal.signal(number, note)
 
 
-def _end_with_parent(ending: Ending) -> None:
+def _shut_down_with_parent(ending: ShutdownRequest) -> None:
     if (parent := parent_process()) is not None:
         parent.join()
         ending.ask("the web process is gone")
@@ -141,7 +143,9 @@ def _end_with_parent(ending: Ending) -> None:
 class Worker:
     """Everything that runs while the worker holds its lock."""
 
-    def __init__(self, settings: Settings, ending: Ending, airspace: Airspace, clock: Clock = REAL_TIME) -> None:
+    def __init__(
+        self, settings: Settings, ending: ShutdownRequest, airspace: AbortRegistry, clock: Clock = REAL_TIME
+    ) -> None:
         self._settings = settings
         self._clock = clock
         self._ending = ending
@@ -162,8 +166,10 @@ class Worker:
             stack.callback(sessions.close)
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
-            pool = stack.enter_context(Pool(SPARE_PROCESSORS, prepare=prepare))
-            surveying = stack.enter_context(Pool(LANDSCAPES_AT_ONCE, prepare=prepare, niceness=LANDSCAPE_NICENESS))
+            pool = stack.enter_context(ComputePool(SPARE_PROCESSORS, prepare=warm_up))
+            surveying = stack.enter_context(
+                ComputePool(LANDSCAPES_AT_ONCE, prepare=warm_up, niceness=LANDSCAPE_NICENESS)
+            )
             desks = self._desks(database, pool, surveying)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self._ending.ask, "the worker failed; its log says why")
@@ -173,12 +179,12 @@ class Worker:
             self._loop(database, lambda: self._claim(deck, flying, sessions, acting, desks, computing))
             _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trials())
 
-    def _decks(self, database: Database) -> tuple[SessionDeck, FlightDeck, LiveServer]:
-        def publish(message: Shown) -> None:
+    def _decks(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
+        def publish(message: PublishedMessage) -> None:
             live.publish(message)
 
         data_dir, closing = self._settings.data_dir, self._ending.event
-        sessions = SessionDeck(
+        sessions = VehicleConnectionManager(
             database,
             data_dir,
             self._airspace,
@@ -189,7 +195,7 @@ class Worker:
             clock=self._clock,
         )
         live = LiveServer(live_address(data_dir), abort=self._airspace.abort, order=sessions.order, hello=self._hello)
-        deck = FlightDeck(
+        deck = FlightRunner(
             database,
             data_dir,
             self._airspace,
@@ -201,16 +207,18 @@ class Worker:
         )
         return sessions, deck, live
 
-    def _desks(self, database: Database, pool: Pool, surveying: Pool) -> tuple[Desk, ...]:
-        proposer = Proposer(database, pool, worker=self._name)
-        reproducer = Reproducer(database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event)
+    def _desks(self, database: Database, pool: ComputePool, surveying: ComputePool) -> tuple[JobRunner, ...]:
+        proposer = ProposalJob(database, pool, worker=self._name)
+        reproducer = ReproductionJob(
+            database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event
+        )
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
-            (LANDSCAPE_JOB, Surveyor(database, surveying, worker=self._name), LANDSCAPES_AT_ONCE),
+            (LANDSCAPE_JOB, LandscapeJob(database, surveying, worker=self._name), LANDSCAPES_AT_ONCE),
         )
         return tuple(
-            Desk(
+            JobRunner(
                 database,
                 kind,
                 perform,
@@ -234,11 +242,11 @@ class Worker:
 
     def _claim(
         self,
-        deck: FlightDeck,
+        deck: FlightRunner,
         flying: Executor,
-        sessions: SessionDeck,
+        sessions: VehicleConnectionManager,
         acting: Executor,
-        desks: Sequence[Desk],
+        desks: Sequence[JobRunner],
         computing: Executor,
     ) -> None:
         while len(self._airspace.trials()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:

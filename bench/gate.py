@@ -33,7 +33,7 @@ from app.core.hazards.flights import (
 from app.core.hazards.kernels import HIGHEST_M, TOUCH_DOWN_M_S
 from app.core.plants.vertical import Counts
 from app.core.policy import Vector
-from app.core.spread import Spread, before_flight
+from app.core.spread import ParameterDistribution, prior_distribution
 
 LIMIT_S: Final = 0.15
 SEED: Final = 20260101
@@ -58,17 +58,17 @@ class Tally:
     slowest_s: float
 
 
-def after_a_flight() -> Spread:
+def after_a_flight() -> ParameterDistribution:
     """Roughly what one flight of the paper's drone leaves open."""
     mean = TAKEOFF.nominal_model
     mean[:3] = (0.61, 0.3, 0.05)
     sd = np.array([0.3 * parameter.known_within / 2.0 for parameter in TAKEOFF.model_parameters])
-    return Spread(
+    return ParameterDistribution(
         mean=tuple(mean.tolist()), covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()), origin="one flight"
     )
 
 
-def harm(gains: Vector, spread: Spread, takeoffs: int, seed: int) -> str:
+def harm(gains: Vector, spread: ParameterDistribution, takeoffs: int, seed: int) -> str:
     """What the first harmful takeoff does, or nothing."""
     models = spread.draws(TAKEOFF, takeoffs, seed)
     for first in range(0, takeoffs, BATCH):
@@ -131,14 +131,14 @@ def _aborted(gains: Counts, models: Matrix, seed: int) -> str:
     return "an abort goes astray" if harmful.any() else ""
 
 
-def judge(gains: Vector, spread: Spread) -> tuple[tuple[Check, ...], float]:
+def judge(gains: Vector, spread: ParameterDistribution) -> tuple[tuple[Check, ...], float]:
     """The gate's checks of hazards, and the processor time they took, s."""
     start = time.process_time()
     checks = TAKEOFF.hazards(gains, spread, Envelope(ceiling_m=CEILING_M, safe_gains=SAFE))
     return checks, time.process_time() - start
 
 
-def compare(spread: Spread, sets: int, takeoffs: int) -> Tally:
+def compare(spread: ParameterDistribution, sets: int, takeoffs: int) -> Tally:
     random = np.random.default_rng(SEED)
     lower, upper = TAKEOFF.space.lower.astype(np.int64), TAKEOFF.space.upper.astype(np.int64)
     drawn = random.integers(lower, upper, endpoint=True, size=(sets, 3))
@@ -163,7 +163,7 @@ def main() -> int:
     asked.add_argument("--takeoffs", type=int, default=200)
     size = asked.parse_args()
     failed = False
-    for spread in (before_flight(TAKEOFF), after_a_flight()):
+    for spread in (prior_distribution(TAKEOFF), after_a_flight()):
         tally = compare(spread, size.sets, size.takeoffs)
         print(
             f"known from {spread.origin}: {size.sets} sets, {size.takeoffs} takeoffs each: {tally.refused} refused, "

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Final
 
 from app.core.experiments import get_experiment
-from app.vehicles.base import FlightOrder, Vehicle
+from app.vehicles.base import FlightOptions, Vehicle
 from app.vehicles.jsbsim.flight import new_aircraft
 from app.vehicles.open import open_vehicle
 from app.vehicles.simulated import STEPS
@@ -34,7 +34,7 @@ def bare() -> float:
 def takeoff(vehicle: Vehicle) -> float:
     vehicle.stage(GAINS)
     start = time.perf_counter()
-    vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_stop=lambda: None)
+    vehicle.fly(FlightOptions(seed=1), on_sample=lambda _: None, should_stop=lambda: None)
     return time.perf_counter() - start
 
 

@@ -15,19 +15,19 @@ from pathlib import Path
 from typing import Final
 
 from app.campaigns import service as campaigns
-from app.campaigns.computation import prepare
+from app.campaigns.computation import warm_up
 from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.schemas import Definition, NewCampaign, StopRule
-from app.campaigns.tasks import Proposer
+from app.campaigns.tasks import ProposalJob
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
-from app.jobs.tasks import Desk
-from app.pool import Pool
+from app.jobs.tasks import JobRunner
+from app.pool import ComputePool
 from app.trials import flights
 from app.trials import service as trials
 from app.trials.schemas import FlightOrder, NewTrial
-from app.vehicles.base import FlightOrder as Order
+from app.vehicles.base import FlightOptions as Order
 from app.vehicles.open import open_vehicle
 
 LIMIT_S: Final = 1.0
@@ -43,7 +43,7 @@ CASES: Final[dict[str, dict[str, object]]] = {
 }
 
 
-def propose(desk: Desk) -> float:
+def propose(desk: JobRunner) -> float:
     """Carry out the waiting job; from its claim to the stored row, s."""
     start = time.perf_counter()
     job = desk.claim()
@@ -71,7 +71,7 @@ def fly(database: Database, campaign_id: int) -> bool:
     return True
 
 
-def one_campaign(database: Database, desk: Desk, fields: dict[str, object]) -> list[float]:
+def one_campaign(database: Database, desk: JobRunner, fields: dict[str, object]) -> list[float]:
     """The time of each proposal of a campaign, s."""
     definition = Definition.model_validate({"stop": StopRule(kind="budget", max_flights=FLIGHTS), **fields})
     with database.write() as session:
@@ -90,9 +90,9 @@ def main() -> int:
         migrate(file)
         database = Database(file)
         cold = time.perf_counter()
-        with Pool(1, prepare=prepare) as pool:
-            desk = Desk(
-                database, PROPOSAL_JOB, Proposer(database, pool, worker=WORKER), room=1, worker=WORKER, lease_s=30.0
+        with ComputePool(1, prepare=warm_up) as pool:
+            desk = JobRunner(
+                database, PROPOSAL_JOB, ProposalJob(database, pool, worker=WORKER), room=1, worker=WORKER, lease_s=30.0
             )
             first = one_campaign(database, desk, {"stop": StopRule(kind="budget", max_flights=1)})
             print(

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Final
 
 from app.core.clock import ScaledClock
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.kind import MAVLINK
@@ -34,7 +34,7 @@ from app.vehicles.mavlink.moves import Plan
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
-from app.vehicles.mavlink.trial import Flown
+from app.vehicles.mavlink.trial import TrialResult
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import new_body
@@ -124,7 +124,7 @@ class LongRecord(MavlinkVehicle):
     def _plan(self, ground: Ground) -> Plan:
         return replace(super()._plan(ground), record_s=self.record_s)
 
-    def _record(self, flown: Flown, ground: Ground) -> FlightRecord:
+    def _record(self, flown: TrialResult, ground: Ground) -> FlightRecord:
         self.kept_ms = tuple(round(kept.position.time_boot_s * 1000.0) for kept in flown.samples)
         return super()._record(flown, ground)
 
@@ -169,7 +169,7 @@ def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[
     try:
         vehicle.record_s = meter.until_s
         vehicle.stage(GAINS[autopilot])
-        record = vehicle.fly(FlightOrder(seed=1), on_sample=meter.see, should_stop=lambda: None)
+        record = vehicle.fly(FlightOptions(seed=1), on_sample=meter.see, should_stop=lambda: None)
     finally:
         vehicle.close()
     if len(vehicle.kept_ms) != len(record.trajectory.time_s):

@@ -3,7 +3,7 @@
 import time
 
 
-class ClockByHand:
+class ManualClock:
     """Stands where the test has put it; whoever waits looks again soon."""
 
     def __init__(self) -> None:

@@ -7,17 +7,17 @@ import pytest
 from app.connections import (
     BODY_SILENCE_S,
     BODY_WITHIN_S,
-    FOR_ARRIVING,
-    FOR_STOPPING,
     HEAD_WITHIN_S,
-    MOST_OF_A_DEVICE,
+    MAX_CONNECTIONS_PER_DEVICE,
+    RESERVED_FOR_ABORTS,
+    RESERVED_FOR_ARRIVING,
     STREAM_AFTER_S,
     Connection,
     Connections,
     Phase,
     room_for_connections,
 )
-from tests.clocks import ClockByHand
+from tests.clocks import ManualClock
 
 TABLET = "192.0.2.9"
 
@@ -26,7 +26,7 @@ class Table:
     """Connections with a clock of the test's, and which of them were dropped."""
 
     def __init__(self, most: int) -> None:
-        self.clock = ClockByHand()
+        self.clock = ManualClock()
         self.all = Connections(most, self.clock)
         self.dropped: list[Connection] = []
         self.held = False
@@ -77,18 +77,18 @@ def test_an_event_stream_makes_room_where_everything_else_is_being_answered() ->
 def test_the_last_places_are_for_stopping_and_beyond_them_nobody_is_taken() -> None:
     table = Table(1)
     assert not table.open(phase=Phase.BUSY).for_stopping
-    last = [table.open(phase=Phase.BUSY) for _ in range(FOR_STOPPING)]
+    last = [table.open(phase=Phase.BUSY) for _ in range(RESERVED_FOR_ABORTS)]
     assert all(each.for_stopping for each in last)
     assert table.dropped == []
     table.open()
     assert not table.taken
-    assert len(table.all.open) == 1 + FOR_STOPPING
+    assert len(table.all.open) == 1 + RESERVED_FOR_ABORTS
 
 
 def test_another_device_has_a_limit_of_its_own_and_this_computer_none() -> None:
-    table = Table(10 * MOST_OF_A_DEVICE)
-    here = [table.open() for _ in range(2 * MOST_OF_A_DEVICE)]
-    there = [table.open(TABLET) for _ in range(MOST_OF_A_DEVICE + 1)]
+    table = Table(10 * MAX_CONNECTIONS_PER_DEVICE)
+    here = [table.open() for _ in range(2 * MAX_CONNECTIONS_PER_DEVICE)]
+    there = [table.open(TABLET) for _ in range(MAX_CONNECTIONS_PER_DEVICE + 1)]
     assert table.dropped == there[:1]
     assert all(each in table.all.open for each in here)
     for each in there[1:]:
@@ -142,4 +142,4 @@ def test_a_body_that_we_do_not_read_on_is_not_held_against_its_client() -> None:
 @pytest.mark.parametrize(("descriptors", "most"), [(1024, 672), (256, 32), (4096, 1024), (2**20, 1024)])
 def test_descriptors_are_left_for_all_else(descriptors: int, most: int) -> None:
     assert room_for_connections(descriptors) == most
-    assert descriptors - most - FOR_STOPPING - FOR_ARRIVING >= min(256, descriptors // 2)
+    assert descriptors - most - RESERVED_FOR_ABORTS - RESERVED_FOR_ARRIVING >= min(256, descriptors // 2)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.access import Key, Place
+from app.access import Key, RequestOrigin
 from app.errors import StorageError
 from app.keyring import LINK_VALID_S, Keyring
 
@@ -49,7 +49,10 @@ def test_a_value_shows_its_key_and_nothing_near_it_does(tmp_path: Path, key: Key
 
 def test_what_a_link_is_worth_depends_on_where_it_is_opened(tmp_path: Path) -> None:
     keyring = Keyring.open(tmp_path)
-    assert (keyring.given_to(Place.HERE), keyring.given_to(Place.ELSEWHERE)) == (Key.BROWSER, Key.REMOTE)
+    assert (keyring.given_to(RequestOrigin.HERE), keyring.given_to(RequestOrigin.ELSEWHERE)) == (
+        Key.BROWSER,
+        Key.REMOTE,
+    )
 
 
 def test_a_link_works_once_whoever_opens_it(tmp_path: Path) -> None:

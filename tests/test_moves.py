@@ -11,7 +11,7 @@ from app.campaigns import states as campaigns
 from app.errors import ConflictError
 from app.fleet import states as fleet
 from app.jobs import states as jobs
-from app.moves import allowed, check_action, check_move, check_version
+from app.moves import allowed, check_action, check_transition, check_version
 from app.trials import states as trials
 
 # What the domain allows, written apart from the program's tables: "from: to, to". Back from flying to planned is
@@ -68,11 +68,11 @@ failed:
 Moves = Mapping[Any, frozenset[Any]]
 MACHINES: dict[str, tuple[Moves, str]] = {
     "trial": (trials.MOVES, TRIAL),
-    "campaign": (campaigns.MOVES, CAMPAIGN),
+    "campaign": (campaigns.TRANSITIONS, CAMPAIGN),
     "job": (jobs.MOVES, JOB),
-    "flight": (trials.FLIGHT_MOVES, FLIGHT),
+    "flight": (trials.FLIGHT_TRANSITIONS, FLIGHT),
     "vehicle": (fleet.MOVES, VEHICLE),
-    "act": (fleet.ACT_MOVES, ACT),
+    "act": (fleet.ACT_TRANSITIONS, ACT),
 }
 
 
@@ -88,10 +88,10 @@ PAIRS = [(name, start, to) for name, (moves, _) in MACHINES.items() for start, t
 def test_only_the_moves_of_the_domain_exist(machine: str, start: StrEnum, to: StrEnum) -> None:
     moves, text = MACHINES[machine]
     if (start.value, to.value) in listed(text):
-        assert check_move(moves, start, to, "It") == to
+        assert check_transition(moves, start, to, "It") == to
     else:
         with pytest.raises(ConflictError, match=f"It is {start} and cannot become {to}"):
-            check_move(moves, start, to, "It")
+            check_transition(moves, start, to, "It")
 
 
 @pytest.mark.parametrize("machine", MACHINES)

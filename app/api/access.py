@@ -16,7 +16,7 @@ from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.access import Act, Caller, Key, Place, require
+from app.access import Caller, Key, Permission, RequestOrigin, require
 from app.errors import GainlineError, NotAllowedError
 from app.keyring import Keyring
 from app.settings import is_loopback
@@ -79,7 +79,7 @@ class AccessMiddleware:
             )
         if changes or path.endswith(_COSTLY):
             try:
-                require(Act.CHANGE, read_caller(scope, host=self._host))
+                require(Permission.CHANGE, read_caller(scope, host=self._host))
             except NotAllowedError as error:
                 return self._refuse(error)
         return None
@@ -93,17 +93,17 @@ def caller_of(request: Request) -> Caller:
 def read_caller(scope: Scope, *, host: str) -> Caller:
     """Who sent what is in the scope, to a server that listens on this host."""
     headers = Headers(scope=scope)
-    because = _came(scope.get("client"), headers)
+    because = _describe_origin(scope.get("client"), headers)
     keyring: Keyring = scope["app"].state.keyring
     return Caller(
-        place=Place.ELSEWHERE if because else Place.HERE,
+        place=RequestOrigin.ELSEWHERE if because else RequestOrigin.HERE,
         key=max(map(keyring.key_of, _shown(headers, keyring.cookie)), default=Key.NONE),
         exposed=not is_loopback(host),
         because=because,
     )
 
 
-def _came(client: tuple[str, int] | None, headers: Headers) -> str:
+def _describe_origin(client: tuple[str, int] | None, headers: Headers) -> str:
     """How a request came that is not from this computer; empty for one that is."""
     for header in headers:
         if header in _FORWARDED or header.startswith(_FORWARDED_BEGINS):

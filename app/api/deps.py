@@ -12,7 +12,7 @@ from app.api.access import caller_of
 from app.db.idempotency import carry_out_once
 from app.db.session import Database
 from app.errors import MediaTypeError
-from app.fleet.control import Asker
+from app.fleet.control import RequestContext
 from app.live.link import Live as LiveLink
 from app.settings import Settings
 
@@ -66,9 +66,9 @@ async def _settings(request: Request) -> Settings:
 CurrentSettings = Annotated[Settings, Depends(_settings)]
 
 
-async def _asker(request: Request, settings: CurrentSettings, token: ControlToken = None) -> Asker:
+async def _request_context(request: Request, settings: CurrentSettings, token: ControlToken = None) -> RequestContext:
     """No script in a page can set Sec-Fetch-Site: browsers do."""
-    return Asker(
+    return RequestContext(
         token=token,
         caller=caller_of(request),
         from_our_page=request.headers.get("sec-fetch-site") == "same-origin",
@@ -76,7 +76,7 @@ async def _asker(request: Request, settings: CurrentSettings, token: ControlToke
     )
 
 
-Asking = Annotated[Asker, Depends(_asker)]
+RequestContextDep = Annotated[RequestContext, Depends(_request_context)]
 
 
 def _reader(database: CurrentDatabase) -> Iterator[Session]:
@@ -94,7 +94,7 @@ Reader = Annotated[Session, Depends(_reader, scope="function")]
 Writer = Annotated[Session, Depends(_writer, scope="function")]
 
 
-class Once:
+class IdempotentRequest:
     """Carries out a POST in one transaction, and not again when it comes again with the same idempotency key."""
 
     def __init__(self, database: Database, key: str | None, fingerprint: str) -> None:
@@ -123,11 +123,11 @@ def fingerprint(request: Request, body_digest: str) -> str:
     return hashlib.sha256(f"{request.method} {request.url.path} {body_digest}".encode()).hexdigest()
 
 
-async def _once(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> Once:
-    return Once(database, key, fingerprint(request, hashlib.sha256(await request.body()).hexdigest()))
+async def _once(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> IdempotentRequest:
+    return IdempotentRequest(database, key, fingerprint(request, hashlib.sha256(await request.body()).hexdigest()))
 
 
-Act = Annotated[Once, Depends(_once)]
+IdempotentPost = Annotated[IdempotentRequest, Depends(_once)]
 
 
 async def json_only(request: Request) -> None:

@@ -112,10 +112,10 @@ def _problem(
 
 async def _own_error(_request: Request, error: Exception) -> Response:
     assert isinstance(error, GainlineError)
-    return own_error(error)
+    return problem_response(error)
 
 
-def own_error(error: GainlineError) -> Response:
+def problem_response(error: GainlineError) -> Response:
     """The answer that one of our errors makes, also before the application has seen the request."""
     status, title = kind_of(error)
     return _problem(
@@ -160,7 +160,7 @@ async def _http_error(request: Request, error: Exception) -> Response:
     return _problem(error.status_code, detail, hint, headers=error.headers)
 
 
-def foreign(detail: str, hint: str) -> Response:
+def foreign_request_response(detail: str, hint: str) -> Response:
     """A request that is not from us or not for us."""
     return _problem(HTTPStatus.FORBIDDEN, detail, hint, title="Foreign request")
 

@@ -63,7 +63,7 @@ def get_campaign_figure(
     Of more than 30 flights the takeoffs are drawn as an envelope, with the first, the best, the latest and that
     `flight` by themselves. Between `from_s` and `to_s` curves have as many points again.
     """
-    view = drawing.View(window=_window(from_s, to_s), chosen=flight)
+    view = drawing.FigureView(window=_window(from_s, to_s), chosen=flight)
     return figure_card(drawing.campaign_figure(session, campaign_id, name, theme, view))
 
 

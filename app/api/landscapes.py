@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.access import Act, is_allowed
-from app.api.deps import Asking, CurrentDatabase, Id
+from app.access import Permission, is_allowed
+from app.api.deps import CurrentDatabase, Id, RequestContextDep
 from app.api.figures import FigureCard, Theme, figure_card
 from app.campaigns import landscapes
 
@@ -15,7 +15,7 @@ router = APIRouter(prefix="/api", tags=["figures"])
 @router.get("/campaigns/{campaign_id}/figures/landscape")
 def get_landscape(
     database: CurrentDatabase,
-    asking: Asking,
+    asking: RequestContextDep,
     campaign_id: Id,
     theme: Theme = "light",
     stacked: Annotated[bool, Query(description="slices one below the other, for a narrow page")] = False,
@@ -27,7 +27,7 @@ def get_landscape(
     """
     with database.read() as session:
         asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
-    if asked.wanted and is_allowed(Act.CHANGE, asking.caller):
+    if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
         with database.write() as session:
             landscapes.request_landscape(session, campaign_id)
     return figure_card(asked.card)

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 from pydantic import BaseModel
 
-from app.access import UNLOCK, Act, Caller, Key, Place, is_allowed
+from app.access import UNLOCK_HINT, Caller, Key, Permission, RequestOrigin, is_allowed
 from app.api.access import caller_of
 from app.keyring import LINK_VALID_S, Keyring
 
@@ -51,18 +51,18 @@ class Access(BaseModel):
 def get_access(request: Request) -> Access:
     """What whoever asks may do here."""
     caller = caller_of(request)
-    may_change, may_command = is_allowed(Act.CHANGE, caller), is_allowed(Act.TAKE_OFF, caller)
+    may_change, may_command = is_allowed(Permission.CHANGE, caller), is_allowed(Permission.TAKE_OFF, caller)
     return Access(
-        elsewhere=caller.place is Place.ELSEWHERE,
+        elsewhere=caller.place is RequestOrigin.ELSEWHERE,
         may_change=may_change,
-        may_link=is_allowed(Act.LINK, caller),
+        may_link=is_allowed(Permission.LINK, caller),
         may_command=may_command,
-        hint="" if may_command or not _would_help(caller) else UNLOCK,
+        hint="" if may_command or not _would_help(caller) else UNLOCK_HINT,
     )
 
 
 def _would_help(caller: Caller) -> bool:
-    if caller.place is Place.ELSEWHERE:
+    if caller.place is RequestOrigin.ELSEWHERE:
         return caller.key < Key.REMOTE
     return not caller.exposed
 

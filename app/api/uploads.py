@@ -11,7 +11,7 @@ from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
-from app.api.deps import CurrentDatabase, IdempotencyKey, Once, fingerprint
+from app.api.deps import CurrentDatabase, IdempotencyKey, IdempotentRequest, fingerprint
 from app.errors import InputError, MediaTypeError, Problem
 
 _IN_MEMORY_BYTES: Final = 2**20
@@ -66,7 +66,7 @@ class Upload:
     file: BinaryIO
     name: str
     companion: BinaryIO | None
-    once: Once
+    once: IdempotentRequest
 
     def content(self) -> bytes:
         """All of the file, which the limit on bodies has bounded."""
@@ -82,7 +82,7 @@ class Upload:
 
 
 @dataclass(frozen=True, slots=True)
-class _Arrived:
+class _ReceivedUpload:
     file: BinaryIO
     name: str
     companion: BinaryIO | None
@@ -98,22 +98,22 @@ async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyK
             hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
         )
     async with arriving(request) as arrived:
-        once = Once(database, key, fingerprint(request, f"{request.url.query} {arrived.digest}"))
+        once = IdempotentRequest(database, key, fingerprint(request, f"{request.url.query} {arrived.digest}"))
         yield Upload(arrived.file, arrived.name, arrived.companion, once)
 
 
 @asynccontextmanager
-async def _raw(request: Request) -> AsyncIterator[_Arrived]:
+async def _raw(request: Request) -> AsyncIterator[_ReceivedUpload]:
     digest = hashlib.sha256()
     with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as spool:
         async for chunk in request.stream():
             digest.update(chunk)
             await run_in_threadpool(spool.write, chunk)
-        yield _Arrived(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]  # it reads and seeks as BinaryIO does
+        yield _ReceivedUpload(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]  # it reads and seeks as BinaryIO does
 
 
 @asynccontextmanager
-async def _form(request: Request) -> AsyncIterator[_Arrived]:
+async def _form(request: Request) -> AsyncIterator[_ReceivedUpload]:
     digest = hashlib.sha256()
     async with request.form(max_files=2, max_fields=4) as form:
         part, companion = _part(form, "file"), _part(form, "companion")
@@ -127,7 +127,7 @@ async def _form(request: Request) -> AsyncIterator[_Arrived]:
             while each is not None and (chunk := await each.read(_CHUNK_BYTES)):
                 digest.update(chunk)
         beside = None if companion is None else companion.file
-        yield _Arrived(part.file, part.filename or "", beside, digest.hexdigest())
+        yield _ReceivedUpload(part.file, part.filename or "", beside, digest.hexdigest())
 
 
 def _part(form: FormData, name: str) -> UploadFile | None:

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field
 from app.campaigns.schemas import Definition
 from app.campaigns.states import CampaignState, Outcome
 from app.core.advice import Advice
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.stopping import StopVerdict
 from app.core.strategies.base import Explanation
 from app.core.strategies.base import Kind as ProposalKind
@@ -32,12 +32,12 @@ MAX_CAMPAIGNS: Final = 20
 JsonObject = dict[str, Any]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
-Word = Annotated[str, Field(max_length=200)]
+ShortText = Annotated[str, Field(max_length=200)]
 Sentence = Annotated[str, Field(max_length=10_000)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Part = Annotated[str, Field(pattern=r"^(records|photos|telemetry)/[0-9a-z-]{1,60}\.[a-z]{3,5}$")]
-Gains = Annotated[dict[Word, int | Finite], Field(min_length=1, max_length=50)]
-Options = Annotated[dict[Word, OptionValue], Field(max_length=100)]
+Gains = Annotated[dict[ShortText, int | Finite], Field(min_length=1, max_length=50)]
+Options = Annotated[dict[ShortText, OptionValue], Field(max_length=100)]
 
 
 def _fits(kind: Any) -> AfterValidator:
@@ -55,7 +55,9 @@ def _fits(kind: Any) -> AfterValidator:
 
 
 def _spread_of(given: JsonObject) -> JsonObject:
-    TypeAdapter(Spread).validate_python({name: value for name, value in given.items() if name != "flights"})
+    TypeAdapter(ParameterDistribution).validate_python(
+        {name: value for name, value in given.items() if name != "flights"}
+    )
     TypeAdapter(list[int] | None).validate_python(given.get("flights"))
     return given
 
@@ -69,7 +71,7 @@ class Manifest(_Strict):
 
     format: Literal["gainline-campaign"]
     version: Literal[1, 2]
-    program: Word
+    program: ShortText
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
 
@@ -79,18 +81,18 @@ class Record(_Strict):
 
     part: Part
     codec: Literal[1]
-    columns: Annotated[list[Word], Field(min_length=2, max_length=64)]
+    columns: Annotated[list[ShortText], Field(min_length=2, max_length=64)]
     samples: Annotated[int, Field(ge=1, le=1_000_000)]
     duration_s: Finite
-    source: Word
-    clock: Word
+    source: ShortText
+    clock: ShortText
     checksum: Digest
     created_at: AwareDatetime
 
 
 class Photo(_Strict):
     part: Part
-    media_type: Word
+    media_type: ShortText
     added_at: AwareDatetime
 
 
@@ -152,7 +154,7 @@ class Proposal(_Strict):
 class Vehicle(_Strict):
     """What the campaign was flown on, as it was called there."""
 
-    kind: Word
+    kind: ShortText
     name: Name
     title: Name
     is_real: bool

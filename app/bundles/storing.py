@@ -18,7 +18,7 @@ from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow
 from app.db.types import utc_now
 from app.errors import InputError, Problem
 from app.fleet import service as fleet
-from app.fleet.elsewhere import vehicle_elsewhere
+from app.fleet.elsewhere import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice
 from app.trials import history
 from app.trials.telemetry_logs import log_of_trial
@@ -30,7 +30,7 @@ _HINT: Final = "Bring it in with the version of Gainline that wrote it, or updat
 
 
 @dataclass(slots=True)
-class Arrived:
+class ImportedCampaigns:
     """The campaigns that a bundle became, the wanted one last, and the telemetry logs to be kept once they are
     committed: each by the trial's new id."""
 
@@ -38,9 +38,9 @@ class Arrived:
     telemetry: dict[int, str] = field(default_factory=dict)
 
 
-def store(session: Session, bundle: Bundle) -> Arrived:
+def store(session: Session, bundle: Bundle) -> ImportedCampaigns:
     """Raises InputError for what this version cannot hold. The bundle must have been checked."""
-    arrived, new_ids = Arrived(), dict[int, int]()
+    arrived, new_ids = ImportedCampaigns(), dict[int, int]()
     for place, campaign in enumerate(bundle.contents.campaigns):
         row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
         new_ids[campaign.id] = row.id
@@ -54,7 +54,7 @@ def store(session: Session, bundle: Bundle) -> Arrived:
     return arrived
 
 
-def keep_telemetry(bundle: Bundle, arrived: Arrived, data_dir: Path) -> None:
+def keep_telemetry(bundle: Bundle, arrived: ImportedCampaigns, data_dir: Path) -> None:
     """Write the logs beside those of flights made here."""
     for trial_id, part in arrived.telemetry.items():
         file = log_of_trial(data_dir, trial_id)
@@ -101,7 +101,7 @@ def _vehicle(session: Session, where: str, said: Campaign) -> tuple[VehicleRow, 
     """A simulation is the same everywhere. Any other vehicle is not here, whatever it is called: it is history."""
     vehicle = said.vehicle
     if vehicle.registered:
-        row = vehicle_elsewhere(
+        row = get_or_create_imported_vehicle(
             session, name=vehicle.name, kind=vehicle.kind, is_real=vehicle.is_real, safe_gains=vehicle.safe_gains
         )
         return row, {}

@@ -3,20 +3,20 @@
 from dataclasses import dataclass
 
 from app.core.advice import Advice, advise
-from app.core.calibration import known
+from app.core.calibration import known_distribution
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.takeoff import Takeoff
-from app.core.gate import Gate, check_policy
+from app.core.gate import GateResult, check_policy
 from app.core.landscape import space_of
 from app.core.proposing import next_proposal
-from app.core.spread import Spread
-from app.core.stopping import StopVerdict, judge
+from app.core.spread import ParameterDistribution
+from app.core.stopping import StopVerdict, evaluate_stop_rule
 from app.core.strategies.base import Proposal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class History:
+class CampaignHistory:
     """All that a proposal is computed from. `digest` changes as soon as any of it does. `donor` is the flight that a
     warm start comes from; the definition holds the checksum of its record. `battery_v` is the voltage, V, at which the
     last flight ended, one that does not count included."""
@@ -30,26 +30,26 @@ class History:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Computed:
+class ProposalComputation:
     """A proposal with the gate's word on it, over the `spread` of what is known of the vehicle, the stop rule's, and
     what is recommended."""
 
     history_digest: str
     proposal: Proposal
-    gate: Gate
-    spread: Spread
+    gate: GateResult
+    spread: ParameterDistribution
     flights: tuple[int, ...]
     stop_verdict: StopVerdict
     advice: Advice
 
 
-def compute(past: History) -> Computed:
+def compute(past: CampaignHistory) -> ProposalComputation:
     """Pure: the same history gives the same answer. Takes up to a second; call it outside of any transaction."""
     definition, flights = past.definition, past.flights
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, flights, past.donor)
-    stop_verdict = judge(definition, flights, proposal, battery_v=past.battery_v)
-    spread = known(experiment, flights) if proposal.spread is None else proposal.spread
+    stop_verdict = evaluate_stop_rule(definition, flights, proposal, battery_v=past.battery_v)
+    spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
     gate = check_policy(
         definition,
         experiment,
@@ -59,7 +59,7 @@ def compute(past: History) -> Computed:
         start=proposal.gains if proposal.kind == "start" else None,
         spread=spread,
     )
-    return Computed(
+    return ProposalComputation(
         history_digest=past.digest,
         proposal=proposal,
         gate=gate,
@@ -70,7 +70,7 @@ def compute(past: History) -> Computed:
     )
 
 
-def prepare() -> None:
+def warm_up() -> None:
     """Load and compile what a proposal needs, so that the first one is as quick as the others."""
     definition, experiment = Definition(), Takeoff()
     default = experiment.space.default
@@ -82,4 +82,4 @@ def prepare() -> None:
         error=experiment.error(flown),
         outcome="valid",
     )
-    compute(History(campaign_id=0, definition=definition, flights=(flight,), digest=""))
+    compute(CampaignHistory(campaign_id=0, definition=definition, flights=(flight,), digest=""))

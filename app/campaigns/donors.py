@@ -11,7 +11,7 @@ from app.trials import history
 from app.trials.states import TrialState
 
 
-def with_donor(session: Session, asked: Definition) -> Definition:
+def fill_in_donor(session: Session, asked: Definition) -> Definition:
     """The same definition with the donor's trial number, checksum and gains filled in; without a donor as it is.
 
     The donor is the best valid flight of its campaign unless a trial is named. Its record and its gains are kept from

@@ -14,13 +14,13 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.proposing import is_stale
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
-from app.core.statistics import groups_of, pooled, winner_of
+from app.core.statistics import groups_of, pool_scatter, select_winner
 from app.core.strategies.base import band_channels
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
-from app.figures.crowd import apart
+from app.figures.crowd import select_individual_flights
 from app.figures.flight import FlightFigure, FlightRecordData
 from app.figures.history import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
 from app.figures.theme import ThemeName
@@ -43,14 +43,14 @@ _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.F
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class FigureView:
     """What somebody looks at: seconds of the curves, None for all; and a flight that is to have one, by its number."""
 
     window: Range | None = None
     chosen: int | None = None
 
 
-WHOLE: Final = View()
+WHOLE_FLIGHT: Final = FigureView()
 
 
 def campaign_figure(
@@ -58,7 +58,7 @@ def campaign_figure(
     campaign_id: int,
     name: Literal["takeoffs", "errors", "gains"],
     theme: ThemeName,
-    view: View = WHOLE,
+    view: FigureView = WHOLE_FLIGHT,
 ) -> Card:
     """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
     return card_of(
@@ -74,7 +74,7 @@ def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
     return card_of(FlightFigure(_flight_record(session, row, trials), theme))
 
 
-def history_of(session: Session, campaign_id: int, *, curves: bool, view: View = WHOLE) -> History:
+def history_of(session: Session, campaign_id: int, *, curves: bool, view: FigureView = WHOLE_FLIGHT) -> History:
     """The campaign as its figures see it; without `curves` no record is read, and with them only of those flights that
     have a curve of their own: of many flights the rest come as their coarse copies."""
     campaign = repository.get_one(session, campaign_id)
@@ -100,7 +100,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: View =
     )
     if not curves:
         return bare
-    drawn = _curves(session, flown, apart(bare, view.chosen), experiment.output)
+    drawn = _curves(session, flown, select_individual_flights(bare, view.chosen), experiment.output)
     return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
 
 
@@ -122,10 +122,10 @@ def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
     """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight, and
     while it is not known."""
     groups = groups_of(history.flown_gains(rows))
-    scatter = pooled(groups, prior)
+    scatter = pool_scatter(groups, prior)
     if not groups or not scatter.known:
         return None
-    best = winner_of(groups, scatter)
+    best = select_winner(groups, scatter)
     half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
     return Noise(
         sd=scatter.sigma,

@@ -14,10 +14,10 @@ from app.core.glitches import find_glitches
 from app.core.policy import Gains
 from app.core.predictions import prediction_of
 from app.core.proposing import next_proposal
-from app.core.stopping import judge, landing_battery_v
+from app.core.stopping import evaluate_stop_rule, landing_battery_v
 from app.core.strategies.base import Explanation, Interval, Kind, Proposal
 from app.core.strategies.history import was_flown
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Vehicle
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, Vehicle
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, open_vehicle
 
@@ -54,7 +54,7 @@ class HeadlessCampaign:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Watcher:
+class CampaignListener:
     """What the caller wants to hear: a proposal before its flight, samples during it, the trial after it; and which
     gains the vehicle holds as soon as these are others, None while nobody knows."""
 
@@ -68,7 +68,7 @@ def fly_campaign(
     definition: Definition,
     vehicle: str,
     options: Mapping[str, OptionValue],
-    watcher: Watcher,
+    watcher: CampaignListener,
     *,
     gains: Sequence[Gains] = (),
     overrule: str = "",
@@ -91,7 +91,7 @@ def fly_campaign(
     while True:
         number = len(trials) + 1
         proposal = next_proposal(definition, history)
-        if why := _ended_because(definition, trials, history, proposal, battery_v):
+        if why := _stop_reason(definition, trials, history, proposal, battery_v):
             return HeadlessCampaign(trials=tuple(trials), stopped_because=why)
         if gains:
             if number > len(gains):
@@ -108,7 +108,7 @@ def fly_campaign(
         trial = _assess(experiment, number, proposal, record, overruled)
         trials.append(trial)
         watcher.landed(trial)
-        history.extend(_remembered(trial, proposal, record))
+        history.extend(_flight_of(trial, proposal, record))
 
 
 def _by_hand(gains: Gains, history: Sequence[Flight]) -> Proposal:
@@ -122,7 +122,7 @@ def _by_hand(gains: Gains, history: Sequence[Flight]) -> Proposal:
     )
 
 
-def _ended_because(
+def _stop_reason(
     definition: Definition,
     trials: Sequence[HeadlessTrial],
     history: Sequence[Flight],
@@ -130,7 +130,7 @@ def _ended_because(
     battery_v: float | None,
 ) -> str:
     """Why nothing more is flown; empty while there is more. `battery_v`: where the last trial ended."""
-    judged = judge(definition, history, proposal, battery_v=battery_v)
+    judged = evaluate_stop_rule(definition, history, proposal, battery_v=battery_v)
     if judged.stop:
         return judged.why
     if len(trials) < definition.stop.max_flights:
@@ -138,7 +138,7 @@ def _ended_because(
     return f"All {len(trials)} flights are flown; {len(trials) - len(history)} of them could not be scored."
 
 
-def _remembered(trial: HeadlessTrial, proposal: Proposal, record: FlightRecord) -> tuple[Flight, ...]:
+def _flight_of(trial: HeadlessTrial, proposal: Proposal, record: FlightRecord) -> tuple[Flight, ...]:
     """The trial as the next proposals see it; nothing where it does not count."""
     if trial.outcome == "invalid":
         return ()
@@ -184,7 +184,7 @@ def _fly(
     definition: Definition,
     number: int,
     proposal: Proposal,
-    watcher: Watcher,
+    watcher: CampaignListener,
 ) -> FlightRecord:
     safe_gains = envelope_of(definition, experiment).safe_gains
     opened = False
@@ -202,7 +202,7 @@ def _fly(
 
 
 def _flown(
-    controlled: Vehicle, definition: Definition, number: int, proposal: Proposal, watcher: Watcher
+    controlled: Vehicle, definition: Definition, number: int, proposal: Proposal, watcher: CampaignListener
 ) -> FlightRecord:
     held = controlled.stage(proposal.gains)
     if held != proposal.gains:
@@ -210,7 +210,7 @@ def _flown(
             f"The vehicle holds {held} instead of {proposal.gains}; nothing was flown.",
             hint="Read its gains back by hand before flying it again.",
         )
-    order = FlightOrder(seed=flight_seed(definition.seed, number))
+    order = FlightOptions(seed=flight_seed(definition.seed, number))
     return controlled.fly(order, on_sample=watcher.sampled, should_stop=lambda: None)
 
 

@@ -11,12 +11,12 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
-from app.campaigns.computation import History
+from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
 from app.campaigns.drawing import history_of
 from app.campaigns.proposing import is_stale, read_history
 from app.core.experiments import experiment_of
-from app.core.landscape import Landscape, Plan, free_gains, space_of
+from app.core.landscape import Landscape, LandscapePlan, free_gains, space_of
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
 from app.errors import GainlineError
 from app.figures.base import Card, card_of
@@ -34,14 +34,14 @@ _EVERY: Final = tuple(JobState)
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class LandscapeAnswer:
     """The card, and whether a job has yet to be asked for what it is to show."""
 
     card: Card
     wanted: bool = False
 
 
-def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> Asked:
+def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> LandscapeAnswer:
     """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
     campaign = repository.get_one(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
@@ -53,7 +53,7 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stac
     if found is None:
         return _not_yet(session, campaign, proposal)
     drawn = history_of(session, campaign_id, curves=False)
-    return Asked(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
+    return LandscapeAnswer(card_of(LandscapeFigure(drawn, found, _search(proposal), theme, stacked=stacked)))
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
@@ -66,7 +66,7 @@ def request_landscape(session: Session, campaign_id: int) -> None:
     job.order = order  # one that still waits was meant for a proposal that is overtaken
 
 
-def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Plan:
+def read_plan(session: Session, campaign_id: int, order: JsonObject) -> LandscapePlan:
     """What the job's proposal was computed from. Raises OvertakenError once the campaign's flights are others."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
@@ -74,15 +74,15 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Plan:
     if proposal is None:
         raise GainlineError("The order names no proposal.", hint="Open the campaign to have it computed anew.")
     if proposal.history_digest != past.digest:
-        raise jobs.OvertakenError(
+        raise jobs.SupersededError(
             "The campaign's flights have changed since these gains were proposed.",
             hint="Nothing is to be done: the landscape of the next proposal takes its place.",
         )
-    return Plan(
+    return LandscapePlan(
         definition=past.definition,
         flights=past.flights,
         donor=past.donor,
-        centre=_centre(past, proposal),
+        centre=_grid_centre(past, proposal),
         marks=(*(flight.gains for flight in past.flights), proposal.gains),
     )
 
@@ -101,24 +101,24 @@ def _impossible(campaign: CampaignRow) -> str | None:
     return None
 
 
-def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> Asked:
+def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> LandscapeAnswer:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
         return _waiting("The next gains are being computed; the landscape that they lie in follows.")
     job = _job(session, campaign.id, proposal.id)
     wanted = _is_wanted(job)
     if job is not None and not wanted and job.state in {JobState.FAILED, JobState.CANCELLED}:
-        said = jobs.trouble(job)
+        said = jobs.job_problem(job)
         why = "It was cancelled." if said is None else f"{said.title} {said.hint}"
         return _waiting(f"The landscape could not be computed. {why} The page Jobs can start it again.")
     reason = (
         "The model is being flown with several hundred gain sets around the flown and the proposed ones. That takes "
         "seconds, or half a minute with the calibrated model; the landscape appears here by itself."
     )
-    return Asked(_card(reason), wanted=wanted)
+    return LandscapeAnswer(_card(reason), wanted=wanted)
 
 
-def _waiting(reason: str) -> Asked:
-    return Asked(_card(reason))
+def _waiting(reason: str) -> LandscapeAnswer:
+    return LandscapeAnswer(_card(reason))
 
 
 def _card(reason: str) -> Card:
@@ -147,7 +147,7 @@ def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape |
     return _STORED.validate_python(job.result["landscape"])
 
 
-def _centre(past: History, proposal: ProposalRow) -> dict[str, float]:
+def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, float]:
     """The gains of the flight that the proposal starts from, else its own."""
     number = proposal.explanation.get("base_flight")
     base = next((flight for flight in past.flights if flight.number == number), None)

@@ -5,32 +5,34 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.schemas import Promotion
 from app.campaigns.service import safe_gains_changed
-from app.campaigns.statistics import contest_of
-from app.core.confirming import Standing
-from app.core.strategies.history import describe
+from app.campaigns.statistics import standing_within_bounds_of
+from app.core.confirming import ComparisonState
+from app.core.strategies.history import format_gains
 from app.core.wording import percent
 from app.db.models import CampaignRow
 from app.errors import ConflictError
-from app.fleet.control import Asker
+from app.fleet.control import RequestContext
 from app.fleet.registering import promote_gains
 from app.fleet.schemas import Vehicle
 from app.fleet.service import get_vehicle
 from app.trials import history
 
 
-def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: Asker) -> Vehicle:
+def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: RequestContext) -> Vehicle:
     """The vehicle with its new safe gains; the act that records it names the flights.
 
     Raises ConflictError while the best gains are not shown to be better than the first ones, and when the vehicle is
     shared, not at rest, in somebody else's control, or was changed meanwhile.
     """
     row = repository.get_one(session, campaign_id)
-    now = contest_of(row, history.trials_of(session, campaign_id))
+    now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
     if now is None or now.comparison is None:
         raise _not_shown(row, "it has no gains that are better than its first ones")
     said = now.comparison
     if said.verdict != "better":
-        raise _not_shown(row, f"whether {describe(now.winner.gains)} is better than its first gains is {said.verdict}")
+        raise _not_shown(
+            row, f"whether {format_gains(now.winner.gains)} is better than its first gains is {said.verdict}"
+        )
     gains = dict(now.winner.gains)
     promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), asker=asker)
     safe_gains_changed(session, row.vehicle_id)
@@ -38,7 +40,7 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: As
     return get_vehicle(session, row.vehicle_id)
 
 
-def _because(row: CampaignRow, now: Standing, asked: Promotion) -> str:
+def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
     assert now.comparison is not None
     assert now.comparison.confidence is not None
     flights = ", ".join(map(str, now.winner.numbers))

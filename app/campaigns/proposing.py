@@ -11,22 +11,22 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
-from app.campaigns.computation import Computed, History
+from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of
-from app.campaigns.rehearsals import tell_rehearsed
-from app.campaigns.states import MOVES, CampaignState, Outcome
+from app.campaigns.rehearsals import notify_rehearsed_campaign
+from app.campaigns.states import TRANSITIONS, CampaignState, Outcome
 from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.gate import Gate
+from app.core.gate import GateResult
 from app.core.policy import Gains, PolicySpace
-from app.core.spread import Spread, before_flight
+from app.core.spread import ParameterDistribution, prior_distribution
 from app.core.stopping import Reason, StopVerdict
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.errors import ConflictError, NotFoundError
 from app.jobs import service as jobs
-from app.moves import check_move
+from app.moves import check_transition
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
 from app.trials.states import UNFLOWN, TrialState
@@ -43,11 +43,11 @@ _OUTCOMES: Final[dict[Reason, Outcome]] = {
 _UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no longer say so:"
 
 
-def read_history(session: Session, campaign_id: int) -> History:
+def read_history(session: Session, campaign_id: int) -> CampaignHistory:
     """The campaign's definition and its flights with their trajectories as stored. Raises NotFoundError."""
     row = repository.get_one(session, campaign_id)
     definition, trials = definition_of(row), history.trials_of(session, campaign_id)
-    return History(
+    return CampaignHistory(
         campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
@@ -71,7 +71,7 @@ def _donor(session: Session, definition: Definition) -> Flight | None:
     return found
 
 
-def store_proposal(session: Session, campaign_id: int, computed: Computed) -> ProposalRow:
+def store_proposal(session: Session, campaign_id: int, computed: ProposalComputation) -> ProposalRow:
     """Store a proposal, and let it count: a draft becomes ready, a campaign whose rule says so is finished.
 
     One from an outdated history is stored too, stale from the start, and counts for nothing. Raises NotFoundError when
@@ -97,14 +97,14 @@ def store_proposal(session: Session, campaign_id: int, computed: Computed) -> Pr
     session.add(row)
     session.flush()
     trials = history.trials_of(session, campaign_id)
-    if not is_stale(session, campaign, row, trials) and history.unclassed(trials) is None:
-        _let_count(session, campaign, computed.stop_verdict)
+    if not is_stale(session, campaign, row, trials) and history.find_unreviewed(trials) is None:
+        _apply_to_campaign(session, campaign, computed.stop_verdict)
     return row
 
 
-def _let_count(session: Session, campaign: CampaignRow, said: StopVerdict) -> None:
+def _apply_to_campaign(session: Session, campaign: CampaignRow, said: StopVerdict) -> None:
     if campaign.state == CampaignState.DRAFT:
-        move_campaign(campaign, CampaignState.READY)
+        set_campaign_state(campaign, CampaignState.READY)
     elif campaign.state == CampaignState.DECIDING and said.reason is not None:
         end_campaign(session, campaign, _OUTCOMES[said.reason], said.why)
     elif campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
@@ -132,7 +132,7 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     return row
 
 
-def latest_fresh(session: Session, campaign: CampaignRow) -> ProposalRow:
+def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalRow:
     """The present proposal. Raises ConflictError while there is none for the present flights."""
     row = repository.latest_proposal(session, campaign.id)
     if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
@@ -178,7 +178,7 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
     return latest.gains
 
 
-def stored_spread(session: Session, campaign: CampaignRow, experiment: Experiment) -> Spread:
+def stored_distribution(session: Session, campaign: CampaignRow, experiment: Experiment) -> ParameterDistribution:
     """What was known of the vehicle when the latest proposal was computed: a fit takes too long for a transaction.
 
     One that further flights have overtaken still serves, it only knows less; one from a flight that no longer counts
@@ -187,14 +187,14 @@ def stored_spread(session: Session, campaign: CampaignRow, experiment: Experimen
     """
     latest = repository.latest_proposal(session, campaign.id)
     if latest is None or latest.spread is None:
-        return before_flight(experiment)
+        return prior_distribution(experiment)
     if (shown_by := latest.spread.get("flights")) is None:
         request_proposal(session, campaign)
-        return before_flight(experiment)
+        return prior_distribution(experiment)
     valid = {row.number for row in history.trials_of(session, campaign.id) if row.state == TrialState.VALID}
     if not valid.issuperset(shown_by):
-        return before_flight(experiment)
-    return Spread(
+        return prior_distribution(experiment)
+    return ParameterDistribution(
         mean=tuple(latest.spread["mean"]),
         covariance=tuple(tuple(row) for row in latest.spread["covariance"]),
         origin=latest.spread["origin"],
@@ -203,16 +203,16 @@ def stored_spread(session: Session, campaign: CampaignRow, experiment: Experimen
 
 def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reason: str) -> None:
     """Finish a campaign; what has not flown is cancelled."""
-    move_campaign(campaign, CampaignState.FINISHED)
+    set_campaign_state(campaign, CampaignState.FINISHED)
     campaign.outcome, campaign.stop_reason = outcome, reason
-    tell_rehearsed(session, campaign)
+    notify_rehearsed_campaign(session, campaign)
     flight = history.flight_under_way(session, campaign.id)
     cancel_unflown(history.trials_of(session, campaign.id), flight, "the campaign was finished")
 
 
-def move_campaign(row: CampaignRow, to: CampaignState) -> None:
+def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:
     """Raises ConflictError when the states' table does not lead there."""
-    row.state = check_move(MOVES, row.state, to, f"Campaign {row.id}")
+    row.state = check_transition(TRANSITIONS, row.state, to, f"Campaign {row.id}")
 
 
 def space_of(definition: Definition) -> PolicySpace:
@@ -220,15 +220,15 @@ def space_of(definition: Definition) -> PolicySpace:
     return experiment_of(definition).space.narrowed(definition.bounds)
 
 
-def gate_json(gate: Gate) -> JsonObject:
+def gate_json(gate: GateResult) -> JsonObject:
     """The gate's answer as it is stored; a number that is none is null there."""
     checks = [asdict(check) | {"worst": check.worst if math.isfinite(check.worst) else None} for check in gate.checks]
     return {"passed": gate.passed, "checks": checks}
 
 
-def gate_of(stored: JsonObject) -> Gate:
+def gate_of(stored: JsonObject) -> GateResult:
     """The gate's answer again."""
-    return Gate(
+    return GateResult(
         tuple(
             Check(**check | {"worst": math.inf if check["worst"] is None else check["worst"]})
             for check in stored["checks"]

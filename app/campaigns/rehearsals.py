@@ -19,12 +19,12 @@ from app.trials.states import TrialState
 
 FLIGHTS: Final = 3
 """Valid flights that are enough, where the campaign's own rule has not ended it before."""
-_SPOILT: Final = frozenset({TrialState.ABORTED, TrialState.INVALID, TrialState.LOST})
+_FAILED_STATES: Final = frozenset({TrialState.ABORTED, TrialState.INVALID, TrialState.LOST})
 _NOT_NEEDED: Final = Rehearsal(state="not needed", campaign_id=None, reason="")
 
 
 @dataclass(frozen=True, slots=True)
-class Rehearsed:
+class RehearsalTrial:
     """One trial of a rehearsal: `gate_passed` is false where the gate's refusal was overruled."""
 
     number: int
@@ -32,14 +32,14 @@ class Rehearsed:
     gate_passed: bool
 
 
-def judge(trials: Sequence[Rehearsed], outcome: Outcome | None) -> tuple[RehearsalState, str]:
+def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) -> tuple[RehearsalState, str]:
     """What a rehearsal's flights say, and why. `outcome` is None until its campaign is over.
 
     Passed: at least three valid flights, or as many as the campaign's own rule took to end it; none of them aborted,
     invalid or lost, and none with gains that the gate refused.
     """
     flown = [trial for trial in trials if trial.state in history.FLOWN]
-    if (spoilt := next((trial for trial in flown if trial.state in _SPOILT), None)) is not None:
+    if (spoilt := next((trial for trial in flown if trial.state in _FAILED_STATES), None)) is not None:
         return "failed", f"flight {spoilt.number} is {spoilt.state}"
     if (refused := next((trial for trial in flown if not trial.gate_passed), None)) is not None:
         return "failed", f"the gate refused the gains of flight {refused.number}, and was overruled"
@@ -61,7 +61,9 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     flown = (row for row in held if not row.vehicle.is_real and definition_of(row).digest() == wanted)
     row = next(flown, None)
     if row is not None:
-        state, reason = judge([Rehearsed(*trial) for trial in history.gated(session, row.id)], row.outcome)
+        state, reason = rehearsal_result(
+            [RehearsalTrial(*trial) for trial in history.list_gate_results(session, row.id)], row.outcome
+        )
         return Rehearsal(state=state, campaign_id=row.id, reason=reason)
     if campaign.definition_digest is not None:
         return Rehearsal(state="not needed", campaign_id=None, reason="it flew before rehearsals were asked for")
@@ -69,14 +71,14 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     return Rehearsal(state="missing", campaign_id=None, reason=changed if held else "it was not flown on a simulation")
 
 
-def is_free_to_fly(said: Rehearsal) -> bool:
+def is_rehearsal_satisfied(said: Rehearsal) -> bool:
     return said.state in {"not needed", "passed"}
 
 
 def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
     """Raises ConflictError while a campaign on a real vehicle has no rehearsal that passed."""
     said = rehearsal_of(session, campaign)
-    if not is_free_to_fly(said):
+    if not is_rehearsal_satisfied(said):
         where = "on its simulation" if said.campaign_id is None else f"in campaign {said.campaign_id}"
         raise ConflictError(
             f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal: "
@@ -91,7 +93,7 @@ def rehearsed_by(session: Session, rehearsal: CampaignRow) -> int | None:
     return repository.rehearsed_id(session, rehearsal.id)
 
 
-def tell_rehearsed(session: Session, rehearsal: CampaignRow) -> None:
+def notify_rehearsed_campaign(session: Session, rehearsal: CampaignRow) -> None:
     """What changes in a rehearsal changes the campaign that it is for, and who looks at that one hears of it."""
     if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
         repository.get_one(session, campaign_id).updated_at = utc_now()

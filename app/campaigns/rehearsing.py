@@ -5,7 +5,7 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
-from app.campaigns.rehearsals import rehearsal_of, tell_rehearsed
+from app.campaigns.rehearsals import notify_rehearsed_campaign, rehearsal_of
 from app.campaigns.schemas import Campaign, Definition
 from app.campaigns.service import add_campaign
 from app.campaigns.views import campaign_view
@@ -40,7 +40,7 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
     )
     session.add(RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
     session.flush()
-    tell_rehearsed(session, made)
+    notify_rehearsed_campaign(session, made)
     return campaign_view(session, made)
 
 

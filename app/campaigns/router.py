@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
-from app.api.deps import Act, Asking, CursorText, Id, Limit, Reader, Writer, json_only
+from app.api.deps import CursorText, Id, IdempotentPost, Limit, Reader, RequestContextDep, Writer, json_only
 from app.campaigns import promoting, rehearsing, service
 from app.campaigns.schemas import (
     Campaign,
@@ -43,7 +43,7 @@ def list_campaigns(
 
 
 @router.post("", status_code=status.HTTP_201_CREATED)
-def create_campaign(act: Act, body: NewCampaign) -> Campaign:
+def create_campaign(act: IdempotentPost, body: NewCampaign) -> Campaign:
     """Create a campaign; its first gains are then computed, and it becomes ready."""
     return act(Campaign, lambda session: service.create_campaign(session, body))
 
@@ -68,33 +68,33 @@ def delete_campaign(
 
 
 @router.post("/{campaign_id}/finish")
-def finish_campaign(act: Act, campaign_id: Id, body: Finish | None = None) -> Campaign:
+def finish_campaign(act: IdempotentPost, campaign_id: Id, body: Finish | None = None) -> Campaign:
     """End a campaign between flights, on the operator's word."""
     reason = (body or Finish()).reason
     return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason))
 
 
 @router.post("/{campaign_id}/archive")
-def archive_campaign(act: Act, campaign_id: Id) -> Campaign:
+def archive_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
     """Put a finished campaign away."""
     return act(Campaign, lambda session: service.archive_campaign(session, campaign_id))
 
 
 @router.post("/{campaign_id}/clone", status_code=status.HTTP_201_CREATED)
-def clone_campaign(act: Act, campaign_id: Id, body: Clone | None = None) -> Campaign:
+def clone_campaign(act: IdempotentPost, campaign_id: Id, body: Clone | None = None) -> Campaign:
     """A new campaign with the same definition, linked to this one."""
     return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
 
 
 @router.post("/{campaign_id}/rehearsal", status_code=status.HTTP_201_CREATED)
-def rehearse_campaign(act: Act, campaign_id: Id) -> Campaign:
+def rehearse_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
     """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation, made unless there is one that
     is under way or passed."""
     return act(Campaign, lambda session: rehearsing.rehearse(session, campaign_id))
 
 
 @router.post("/{campaign_id}/promote")
-def promote_best(act: Act, asking: Asking, campaign_id: Id, body: Promotion) -> Vehicle:
+def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Promotion) -> Vehicle:
     """Make the best gains the safe ones of the campaign's registered vehicle, once its flights have shown that they are
     better than the first ones."""
     return act(Vehicle, lambda session: promoting.promote_best(session, campaign_id, body, asking))
@@ -113,6 +113,6 @@ def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
 
 
 @router.post("/{campaign_id}/proposal", status_code=status.HTTP_202_ACCEPTED)
-def compute_proposal(act: Act, campaign_id: Id) -> NextFlight:
+def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
     """Compute the next gain set anew."""
     return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))

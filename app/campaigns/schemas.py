@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from app.campaigns.states import CampaignState, Outcome
 from app.core.advice import AdviceKind
-from app.core.statistics import Word
+from app.core.statistics import Verdict
 from app.core.strategies.base import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 from app.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
@@ -180,7 +180,7 @@ class Campaign(BaseModel):
     rehearsal: Rehearsal
     rehearses: Annotated[int | None, Field(description="the campaign that this one is the rehearsal of")]
     best: BestTrial | None
-    verdict: Annotated[Word | None, Field(description=VERDICT)]
+    verdict: Annotated[Verdict | None, Field(description=VERDICT)]
     trials: TrialCounts
     flying: FlyingTrial | None
     next_action: str
@@ -211,7 +211,7 @@ class CampaignSummary(BaseModel):
     flights: int
     best: BestTrial | None
     first_error: float | None
-    verdict: Annotated[Word | None, Field(description=VERDICT)]
+    verdict: Annotated[Verdict | None, Field(description=VERDICT)]
     rehearsal: RehearsalState
     next_action: str
     spark: list[SparkCurve]
@@ -297,7 +297,7 @@ class Comparison(BaseModel):
     direction, with the allowance for having chosen the best among several. The verdict is `not known yet`, without
     confidence and standard error, while nobody knows how much flights scatter."""
 
-    verdict: Word
+    verdict: Verdict
     confidence: float | None
     difference: float
     standard_error: float | None

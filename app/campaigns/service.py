@@ -7,9 +7,9 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.definitions import check_campaign, frozen_digest, stored
-from app.campaigns.donors import with_donor
-from app.campaigns.proposing import cancel_outdated, end_campaign, move_campaign, request_proposal
-from app.campaigns.rehearsals import tell_rehearsed
+from app.campaigns.donors import fill_in_donor
+from app.campaigns.proposing import cancel_outdated, end_campaign, request_proposal, set_campaign_state
+from app.campaigns.rehearsals import notify_rehearsed_campaign
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -64,7 +64,7 @@ def get_row(session: Session, campaign_id: int) -> CampaignRow:
     return repository.get_one(session, campaign_id)
 
 
-def identify(session: Session, wanted: str) -> int:
+def find_by_id_or_name(session: Session, wanted: str) -> int:
     """The campaign with that id or, whatever its case, that name. Raises NotFoundError, and InputError when several
     have it."""
     if wanted.isdecimal() and len(wanted) < _DIGITS_OF_AN_ID:
@@ -193,7 +193,7 @@ def archive_campaign(session: Session, campaign_id: int) -> Campaign:
     """Raises ConflictError unless it is finished."""
     row = repository.get_one(session, campaign_id)
     check_action(ACTIONS, "archive", row.state, f"Campaign {row.id}")
-    move_campaign(row, CampaignState.ARCHIVED)
+    set_campaign_state(row, CampaignState.ARCHIVED)
     return campaign_view(session, row)
 
 
@@ -210,25 +210,25 @@ def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
     return next_flight_view(session, row)
 
 
-def begin_flying(row: CampaignRow) -> None:
+def start_flying(row: CampaignRow) -> None:
     """A trial lifts off, or a record of one arrives: from the first one on the definition is frozen."""
     if row.definition_digest is None:
         row.safe_gains = row.safe_gains or dict(row.vehicle.safe_gains)
         row.definition_digest = frozen_digest(row)
-    move_campaign(row, CampaignState.FLYING)
+    set_campaign_state(row, CampaignState.FLYING)
 
 
-def end_flying(session: Session, row: CampaignRow) -> None:
+def finish_flying(session: Session, row: CampaignRow) -> None:
     """The trial is down, however it ended; the next gains are computed from what is known now."""
     if row.state == CampaignState.FLYING:
-        move_campaign(row, CampaignState.DECIDING)
+        set_campaign_state(row, CampaignState.DECIDING)
     history_changed(session, row)
 
 
 def history_changed(session: Session, row: CampaignRow) -> None:
     """A flight counts now that did not, or the other way round: everything computed from the flights is outdated."""
     row.updated_at = utc_now()
-    tell_rehearsed(session, row)
+    notify_rehearsed_campaign(session, row)
     cancel_outdated(session, row)
     request_proposal(session, row)
 
@@ -251,7 +251,7 @@ def _checked(
     session: Session, asked: Definition, choice: VehicleChoice
 ) -> tuple[CoreDefinition, dict[str, OptionValue], VehicleRow]:
     """The definition, the campaign's own settings of its vehicle, none for a registered one, and the vehicle."""
-    definition, options = check_campaign(with_donor(session, asked), choice)
+    definition, options = check_campaign(fill_in_donor(session, asked), choice)
     space = get_experiment(definition.experiment).space
     vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
     return definition, options, vehicle

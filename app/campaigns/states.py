@@ -31,7 +31,7 @@ class Outcome(StrEnum):
     STOPPED = "stopped"
 
 
-MOVES: Final[Mapping[CampaignState, frozenset[CampaignState]]] = {
+TRANSITIONS: Final[Mapping[CampaignState, frozenset[CampaignState]]] = {
     CampaignState.DRAFT: frozenset({CampaignState.READY}),
     CampaignState.READY: frozenset({CampaignState.FLYING}),
     CampaignState.FLYING: frozenset({CampaignState.DECIDING}),

@@ -17,13 +17,13 @@ from app.campaigns.schemas import (
     TrackRecord,
     Trend,
 )
-from app.core.confirming import Standing, contest, standing, verdict_sentence
+from app.core.confirming import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.predictions import TrackRecord as Record
 from app.core.predictions import track_record
-from app.core.statistics import Group, drift_of, optimism, pooled, trend_of
-from app.core.strategies.history import describe
+from app.core.statistics import Group, drift_of, optimism, pool_scatter, trend_of
+from app.core.strategies.history import format_gains
 from app.core.wording import percent, plus_minus, short
 from app.db.models import CampaignRow, TrialRow
 from app.trials import history
@@ -39,8 +39,8 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     trials = history.trials_of(session, campaign_id)
     definition, experiment = definition_of(row), get_experiment(row.experiment)
     flights = history.flown_gains(trials)
-    now = standing(definition, experiment, flights)
-    scatter = pooled((), experiment.scatter) if now is None else now.scatter
+    now = compare_winner(definition, experiment, flights)
+    scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
     expected = 0.0 if now is None or not scatter.known else _optimism(now)
     record = track_record(flights)
     drift = None if now is None else _drift(experiment, now)
@@ -60,17 +60,17 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     )
 
 
-def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> Standing | None:
+def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
     """Groups, scatter and winner of a campaign; None before its first valid flight."""
-    return standing(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
+    return compare_winner(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
 
 
-def contest_of(row: CampaignRow, trials: Sequence[TrialRow]) -> Standing | None:
+def standing_within_bounds_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
     """The standing among the gains that may be flown again; None before the first valid flight of any."""
-    return contest(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
+    return standing_within_bounds(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
 
 
-def best_trial(trials: Sequence[TrialRow], now: Standing | None) -> BestTrial | None:
+def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestTrial | None:
     """The valid trial with the lowest error and the mean of its gains."""
     best = history.best_of(trials)
     if best is None or best.error is None or now is None:
@@ -87,7 +87,7 @@ def best_trial(trials: Sequence[TrialRow], now: Standing | None) -> BestTrial | 
     )
 
 
-def _group(now: Standing, group: Group) -> RepeatGroup:
+def _group(now: ComparisonState, group: Group) -> RepeatGroup:
     return RepeatGroup(
         gains=dict(group.gains),
         trial_numbers=list(group.numbers),
@@ -99,7 +99,7 @@ def _group(now: Standing, group: Group) -> RepeatGroup:
     )
 
 
-def _comparison(experiment: Experiment, now: Standing) -> Comparison | None:
+def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | None:
     said = now.comparison
     if said is None:
         return None
@@ -115,11 +115,11 @@ def _comparison(experiment: Experiment, now: Standing) -> Comparison | None:
     )
 
 
-def _optimism(now: Standing) -> float:
+def _optimism(now: ComparisonState) -> float:
     return optimism([group.mean for group in now.groups], [group.standard_error(now.scatter) for group in now.groups])
 
 
-def _drift(experiment: Experiment, now: Standing) -> Drift | None:
+def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
     found = drift_of(now.baseline, now.scatter)
     if found is None:
         return None
@@ -186,12 +186,14 @@ def _track_record(record: Record) -> TrackRecord:
     )
 
 
-def _notes(experiment: Experiment, now: Standing, expected: float, drift: Drift | None, record: Record) -> list[str]:
+def _notes(
+    experiment: Experiment, now: ComparisonState, expected: float, drift: Drift | None, record: Record
+) -> list[str]:
     unit = experiment.error_unit
     notes = [verdict_sentence(experiment, now)]
     if expected > _NO_OPTIMISM * now.winner.standard_error(now.scatter):
         notes.append(
-            f"The best of {len(now.groups)} gain sets ({describe(now.winner.gains)}) looks better than it is, for "
+            f"The best of {len(now.groups)} gain sets ({format_gains(now.winner.gains)}) looks better than it is, for "
             f"having been chosen: by {short(expected)} {unit} on average, so that its error is nearer to "
             f"{short(now.winner.mean + expected)} {unit}."
         )

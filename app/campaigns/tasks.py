@@ -7,28 +7,28 @@ import numpy as np
 import structlog
 
 from app.campaigns import computation, landscapes, proposing
-from app.core.landscape import foreseen, plan_survey
+from app.core.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.errors import GainlineError
 from app.jobs import service as jobs
-from app.jobs.tasks import Claimed
-from app.pool import Pool
+from app.jobs.tasks import ClaimedJob
+from app.pool import ComputePool
 
-POINTS_AT_ONCE: Final = 48
+POINTS_PER_BATCH: Final = 48
 """So many gain sets of a landscape are asked of the pool together: a proposal waits for no more."""
 
 _log = structlog.get_logger(__name__)
 
 
-class Proposer:
+class ProposalJob:
     """What a desk for proposal jobs performs."""
 
-    def __init__(self, database: Database, pool: Pool, *, worker: str) -> None:
+    def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
         self._database = database
         self._pool = pool
         self._worker = worker
 
-    def __call__(self, job: Claimed) -> None:
+    def __call__(self, job: ClaimedJob) -> None:
         """From the stored flights to the stored proposal. Raises GainlineError, and CancelledError when the pool is
         closed meanwhile."""
         if job.campaign_id is None:
@@ -43,15 +43,15 @@ class Proposer:
         _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
 
 
-class Surveyor:
+class LandscapeJob:
     """What a desk for landscape jobs performs."""
 
-    def __init__(self, database: Database, pool: Pool, *, worker: str) -> None:
+    def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
         self._database = database
         self._pool = pool
         self._worker = worker
 
-    def __call__(self, job: Claimed) -> None:
+    def __call__(self, job: ClaimedJob) -> None:
         """From the stored proposal to the stored landscape, a few points at a time. Raises GainlineError, and
         CancelledError when the pool is closed meanwhile."""
         if job.campaign_id is None:
@@ -59,12 +59,12 @@ class Surveyor:
         started_s = monotonic()
         with self._database.read() as session:
             plan = landscapes.read_plan(session, job.campaign_id, job.order)
-        survey = self._pool.run(plan_survey, plan)
+        survey = self._pool.run(plan_grid, plan)
         if survey is None:
             raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
         points = survey.points()
-        parts = np.array_split(points, -(-len(points) // POINTS_AT_ONCE))
-        errors = np.concatenate([self._pool.run(foreseen, survey.foresee, part) for part in parts])
+        parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
+        errors = np.concatenate([self._pool.run(predict_points, survey.foresee, part) for part in parts])
         result = landscapes.as_json(survey.landscape(errors), job.order)
         with self._database.write() as session:
             jobs.finish_job(session, job.id, worker=self._worker, result=result)

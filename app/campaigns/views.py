@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.proposing import PROPOSAL_JOB, is_stale
-from app.campaigns.rehearsals import is_free_to_fly, rehearsal_of, rehearsed_by
+from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of, rehearsed_by
 from app.campaigns.schemas import (
     Advice,
     Campaign,
@@ -26,8 +26,8 @@ from app.campaigns.schemas import (
 )
 from app.campaigns.states import ACTIONS, CampaignState
 from app.campaigns.statistics import best_trial, standing_of
-from app.core.confirming import Standing
-from app.core.statistics import Word
+from app.core.confirming import ComparisonState
+from app.core.statistics import Verdict
 from app.core.strategies.base import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
@@ -69,7 +69,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         rehearsal=rehearsal,
         rehearses=rehearsed_by(session, row),
         best=best_trial(trials, now),
-        verdict=_word(now),
+        verdict=_verdict(now),
         trials=_counts(trials),
         flying=_flying(flight, trials),
         next_action=_next_action(row, trials, rehearsal),
@@ -104,7 +104,7 @@ def _summary(
         flights=_counts(trials).flown,
         best=best_trial(trials, now),
         first_error=valid[0].error if valid else None,
-        verdict=_word(now),
+        verdict=_verdict(now),
         rehearsal=rehearsal.state,
         next_action=_next_action(row, trials, rehearsal),
         spark=spark,
@@ -118,7 +118,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
     trials = history.trials_of(session, row.id)
     latest = repository.latest_proposal(session, row.id)
     shown = None if latest is None else proposal_view(session, row, latest, trials)
-    if (waiting := history.unclassed(trials)) is not None:
+    if (waiting := history.find_unreviewed(trials)) is not None:
         return NextFlight(
             state="none",
             proposal=shown,
@@ -134,7 +134,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
     if shown is not None and not shown.stale:
         return NextFlight(state="ready", proposal=shown, problem=None)
     if job is not None and job.state == JobState.FAILED:
-        return NextFlight(state="failed", proposal=shown, problem=jobs.trouble(job))
+        return NextFlight(state="failed", proposal=shown, problem=jobs.job_problem(job))
     cancelled = job is not None and job.state == JobState.CANCELLED
     return NextFlight(
         state="none",
@@ -192,7 +192,7 @@ def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[s
     }
 
 
-def _word(now: Standing | None) -> Word | None:
+def _verdict(now: ComparisonState | None) -> Verdict | None:
     return None if now is None or now.comparison is None else now.comparison.verdict
 
 
@@ -219,9 +219,9 @@ def _next_action(row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehear
     """One recommended action, in a few words."""
     if row.state in _NEXT_ACTIONS:
         return _NEXT_ACTIONS[row.state]
-    if (waiting := history.unclassed(trials)) is not None:
+    if (waiting := history.find_unreviewed(trials)) is not None:
         return f"Say whether flight {waiting.number} counts"
-    if not is_free_to_fly(rehearsal):
+    if not is_rehearsal_satisfied(rehearsal):
         return "Go on with the rehearsal" if rehearsal.state == "under way" else "Rehearse on the simulation"
     which = "first" if row.state == CampaignState.READY else "next"
     return f"Fly the {which} trial" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
-from app.core.drift import WATCHED, Drift, Fitted, drift
+from app.core.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.batteries import BatteriesFigure, BatteryFlight
@@ -141,7 +141,7 @@ def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
         at=row.computed_at,
         fitted=[
             FittedNumber.model_validate({field: fitted[name][field] for field in names})
-            for name in WATCHED
+            for name in MONITORED_PARAMETERS
             if name in fitted
         ],
     )

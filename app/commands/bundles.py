@@ -21,7 +21,7 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
     database = Database(settings.database_file)
     try:
         with database.read() as session:
-            campaign_id = campaigns.identify(session, campaign)
+            campaign_id = campaigns.find_by_id_or_name(session, campaign)
             target = out or Path(f"campaign-{campaign_id}.gainline.zip")
             arriving = target.with_name(f".{target.name}.part")
             try:

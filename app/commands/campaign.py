@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 from app.campaigns.definitions import check_campaign, stored
 from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
-from app.campaigns.headless import HeadlessCampaign, HeadlessTrial, Watcher, fly_campaign
+from app.campaigns.headless import CampaignListener, HeadlessCampaign, HeadlessTrial, fly_campaign
 from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
 from app.core.definition import Definition
@@ -50,7 +50,7 @@ def run_campaign(
         settings=settings,
     )
     definition, options = check_campaign(file.definition, file.vehicle)
-    _require_wings(file.vehicle, options)
+    _require_flyable(file.vehicle, options)
     experiment = experiment_of(definition)
     given = gains_by_hand(file, definition, within_bounds=not overrule)
     out = console(json_out)
@@ -76,7 +76,7 @@ def _read(source: str) -> CampaignFile:
     return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
 
 
-def _require_wings(vehicle: VehicleChoice, options: Mapping[str, OptionValue]) -> None:
+def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue]) -> None:
     if vehicle.id is not None:
         raise InputError(
             "A registered vehicle cannot be flown from the command line.",
@@ -116,7 +116,7 @@ class _Display:
         self._trials: list[HeadlessTrial] = []
         self.touched = False
         self.held: Mapping[str, float] | None = None
-        self.watcher = Watcher(
+        self.watcher = CampaignListener(
             proposed=self._proposed, sampled=self._sampled, landed=self._landed, holding=self._holding
         )
 
@@ -153,7 +153,8 @@ class _Display:
     def _landed(self, trial: HeadlessTrial) -> None:
         self._trials.append(trial)
         self._progress.console.print(
-            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} ({_came_to(trial)})",
+            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} "
+            f"({_describe_outcome(trial)})",
             highlight=False,
         )
         self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
@@ -211,7 +212,7 @@ def _document(
     }
 
 
-def _came_to(trial: HeadlessTrial) -> str:
+def _describe_outcome(trial: HeadlessTrial) -> str:
     return f"{trial.outcome}: {trial.reason}" if trial.reason else trial.outcome
 
 

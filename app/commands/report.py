@@ -28,7 +28,7 @@ def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format 
     database = Database(settings.database_file)
     try:
         with database.read() as session:
-            found = report_of(session, campaigns.identify(session, campaign))
+            found = report_of(session, campaigns.find_by_id_or_name(session, campaign))
     finally:
         database.close()
     html = render(found, chart_library(settings.ui_dir)).html

@@ -41,7 +41,7 @@ def run_sim_drone(
     seen_at = None if mocap is None else parse_source(mocap)
     if not any_network:
         _require_loopback("--link", address)
-        _require_loopback("--mocap", _led_to(seen_at))
+        _require_loopback("--mocap", _mocap_address(seen_at))
     planned = [parse_fault(text) for text in faults]
     clock = ScaledClock(speed)
     number = kind.system if system is None else system
@@ -63,7 +63,7 @@ def run_sim_drone(
             out.print(f"This computer was too slow: the drone's clock is {server.lost_s:.1f} s late.")
 
 
-def _led_to(source: SourceAddress | None) -> Address | None:
+def _mocap_address(source: SourceAddress | None) -> Address | None:
     """Where what motion capture says is to be heard, None where that is the drone's own link."""
     match source:
         case StreamAddress(link):

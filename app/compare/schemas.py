@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.core.statistics import Word
+from app.core.statistics import Verdict
 from app.schemas import Gains, OptionValue
 from app.trials.schemas import GroupBrief
 from app.trials.states import TrialState
@@ -72,7 +72,7 @@ class FlightPair(BaseModel):
     trial_id: int
     against_id: int
     basis: Annotated[Basis, Field(description=_BASIS)]
-    verdict: Word | None
+    verdict: Verdict | None
     confidence: float | None
     difference: float | None
     standard_error: float | None
@@ -85,7 +85,7 @@ class FlightComparison(BaseModel):
     earlier. `sentence` is the verdict on all of them: the lowest against the first one, or against the next lowest."""
 
     error_unit: str
-    verdict: Word | None
+    verdict: Verdict | None
     sentence: str
     notes: list[str]
     flights: list[ComparedFlight]

@@ -11,12 +11,12 @@ from sqlalchemy.orm import Session
 from app.compare import repository
 from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
 from app.compare.settings import gain_differences, setting_differences, settings_of
-from app.compare.sides import Side, sides_of
-from app.compare.verdicts import notes_on, overall, pair
+from app.compare.sides import ComparisonFlight, sides_of
+from app.compare.verdicts import compare_pair, list_notes, overall_verdict
 from app.compare.words import file_stem
 from app.core.trajectory import CHANNEL_UNITS, Samples
 from app.figures.base import Card, card_of
-from app.figures.comparing import ComparedCurve, ComparingData, ComparingFigure
+from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure
 from app.figures.history import Curve
 from app.figures.theme import ThemeName
 from app.trials import history
@@ -38,23 +38,23 @@ def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightCompari
     sides = sides_of(session, trial_ids)
     batteries = repository.batteries(session, trial_ids)
     settings = [settings_of(side, batteries.get(side.row.id, "")) for side in sides]
-    verdict, sentence = overall(sides)
+    verdict, sentence = overall_verdict(sides)
     return FlightComparison(
         error_unit=sides[0].experiment.error_unit,
         verdict=verdict,
         sentence=sentence,
-        notes=notes_on(sides),
+        notes=list_notes(sides),
         flights=[_flight(side, own) for side, own in zip(sides, settings, strict=True)],
         gains=gain_differences(sides),
         settings=setting_differences(settings),
-        pairs=[pair(later, earlier) for earlier, later in combinations(sides, 2)],
+        pairs=[compare_pair(later, earlier) for earlier, later in combinations(sides, 2)],
         file_stem=file_stem([side.row for side in sides]),
     )
 
 
 def comparison_figure(session: Session, trial_ids: Sequence[int], theme: ThemeName) -> Card:
     """The curves over the set point. Raises InputError naming the flights that cannot be compared."""
-    return card_of(ComparingFigure(_drawn(session, sides_of(session, trial_ids)), theme))
+    return card_of(ComparisonFigure(_drawn(session, sides_of(session, trial_ids)), theme))
 
 
 def export_curves(session: Session, trial_ids: Sequence[int]) -> CurvesExport:
@@ -80,7 +80,7 @@ def _column(curve: Curve | None, grid: Samples) -> list[str]:
     return ["" if np.isnan(value) else f"{value:.6g}" for value in values]
 
 
-def _flight(side: Side, settings: list[FlightSetting]) -> ComparedFlight:
+def _flight(side: ComparisonFlight, settings: list[FlightSetting]) -> ComparedFlight:
     row, campaign, group = side.row, side.campaign, side.group
     return ComparedFlight(
         trial_id=row.id,
@@ -104,12 +104,12 @@ def _flight(side: Side, settings: list[FlightSetting]) -> ComparedFlight:
     )
 
 
-def _drawn(session: Session, sides: Sequence[Side]) -> ComparingData:
+def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonData:
     experiment = sides[0].experiment
     recorded = [side.row.trajectory_id for side in sides if side.row.trajectory_id is not None]
     records = history.trajectories_of(session, recorded)
     unit = CHANNEL_UNITS[experiment.output]
-    return ComparingData(
+    return ComparisonData(
         output_title=experiment.output.removesuffix(f"_{unit}").replace("_", " ").capitalize(),
         output_unit=unit,
         error_unit=experiment.error_unit,

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from app.compare.schemas import FlightDifference, FlightSetting
-from app.compare.sides import Side
+from app.compare.sides import ComparisonFlight
 from app.core.experiments import get_experiment
 from app.core.options import Option
 from app.core.strategies import STRATEGIES
@@ -14,7 +14,7 @@ from app.vehicles.base import VehicleOption
 from app.vehicles.open import VEHICLE_KINDS
 
 
-def settings_of(side: Side, battery: str) -> list[FlightSetting]:
+def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
     """Vehicle, experiment and strategy with their settings, the battery, and what else the vehicle said of itself."""
     row, campaign = side.row, side.campaign
     kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
@@ -44,7 +44,7 @@ def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[Flig
     return _differing((title, unit, [own.get((title, unit)) for own in values]) for title, unit in titles)
 
 
-def gain_differences(sides: Sequence[Side]) -> list[FlightDifference]:
+def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference]:
     """Those gains that are not the same in all flights."""
     known = {gain.name: gain for side in sides for gain in side.experiment.space.gains}
     names = dict.fromkeys(name for side in sides for name in side.row.gains)

@@ -13,7 +13,7 @@ from app.compare import repository
 from app.compare.words import names_of
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.statistics import Group, Pooled, groups_of, pooled
+from app.core.statistics import Group, PooledScatter, groups_of, pool_scatter
 from app.db.models import CampaignRow, TrialRow
 from app.errors import InputError, Problem
 from app.fleet import service as fleet
@@ -24,7 +24,7 @@ MOST_FLIGHTS: Final = len(LABELS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Side:
+class ComparisonFlight:
     """One flight. `group` holds the valid flights of its gains in its campaign, None where the flight is not one of
     them; `scatter` is pooled over the compared campaigns in which the same vehicle flew the same experiment: those of
     the same `population`."""
@@ -35,11 +35,11 @@ class Side:
     label: str
     name: str
     group: Group | None
-    scatter: Pooled
+    scatter: PooledScatter
     population: str
 
 
-def sides_of(session: Session, trial_ids: Sequence[int]) -> list[Side]:
+def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFlight]:
     """The flights in that order. Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared."""
     found = repository.trials_by_id(session, trial_ids)
     campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
@@ -62,7 +62,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[Side]:
     }
     scatters = _scatters(campaigns, experiments, groups)
     return [
-        Side(
+        ComparisonFlight(
             row=row,
             campaign=campaigns[row.campaign_id],
             experiment=experiments[row.campaign_id],
@@ -92,12 +92,12 @@ def _scatters(
     campaigns: Mapping[int, CampaignRow],
     experiments: Mapping[int, Experiment],
     groups: Mapping[int, Sequence[Group]],
-) -> dict[str, Pooled]:
+) -> dict[str, PooledScatter]:
     members: dict[str, list[int]] = {}
     for key in groups:
         members.setdefault(population_of(campaigns[key]), []).append(key)
     return {
-        population: pooled([group for key in keys for group in groups[key]], experiments[keys[0]].scatter)
+        population: pool_scatter([group for key in keys for group in groups[key]], experiments[keys[0]].scatter)
         for population, keys in members.items()
     }
 

@@ -9,16 +9,16 @@ import math
 from collections.abc import Sequence
 
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.compare.sides import Side
+from app.compare.sides import ComparisonFlight
 from app.compare.words import capitalised, measured, named, percent
 from app.core.confirming import SCATTER_NOT_KNOWN
-from app.core.statistics import Comparison, Group, Word, compare, drift_of
-from app.core.strategies.history import describe
+from app.core.statistics import Comparison, Group, Verdict, compare, drift_of
+from app.core.strategies.history import format_gains
 from app.fleet import service as fleet
 from app.trials.comparisons import CONFIDENCE
 
 
-def pair(side: Side, against: Side, *, candidates: int = 1) -> FlightPair:
+def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidates: int = 1) -> FlightPair:
     """`side` against `against`, chosen among so many `candidates` for its low error."""
     if side.group is None or against.group is None:
         missing = side if side.group is None else against
@@ -44,7 +44,7 @@ def pair(side: Side, against: Side, *, candidates: int = 1) -> FlightPair:
     )
 
 
-def overall(sides: Sequence[Side]) -> tuple[Word | None, str]:
+def overall_verdict(sides: Sequence[ComparisonFlight]) -> tuple[Verdict | None, str]:
     """The gains with the lowest mean (plus its standard error, as in a campaign) against those of the first flight, or
     where they are the first flight's, against the next lowest."""
     ranked = sorted((side for side in sides if side.group is not None), key=_rank)
@@ -57,11 +57,11 @@ def overall(sides: Sequence[Side]) -> tuple[Word | None, str]:
         if first.group not in (None, best.group)
         else next((side for side in ranked if side.group is not best.group), ranked[1])
     )
-    said = pair(best, other, candidates=max(1, policies - 1))
+    said = compare_pair(best, other, candidates=max(1, policies - 1))
     return said.verdict, f"{_among(best, policies)}{said.sentence}"
 
 
-def notes_on(sides: Sequence[Side]) -> list[str]:
+def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
     """What has to be known before the numbers are believed."""
     first = sides[0]
     apart = dict.fromkeys(_why_apart(side, first)[1] for side in sides if side.population != first.population)
@@ -78,16 +78,16 @@ def notes_on(sides: Sequence[Side]) -> list[str]:
     return [*apart, *shared]
 
 
-def _rank(side: Side) -> tuple[float, str]:
+def _rank(side: ComparisonFlight) -> tuple[float, str]:
     assert side.group is not None
     return side.group.mean + side.group.standard_error(side.scatter), side.label
 
 
-def _among(best: Side, policies: int) -> str:
+def _among(best: ComparisonFlight, policies: int) -> str:
     return f"{capitalised(best.name)} is the lowest of {policies} gain sets. " if policies > 2 else ""
 
 
-def _pair(side: Side, against: Side, basis: Basis, sentence: str) -> FlightPair:
+def _pair(side: ComparisonFlight, against: ComparisonFlight, basis: Basis, sentence: str) -> FlightPair:
     return FlightPair(
         trial_id=side.row.id,
         against_id=against.row.id,
@@ -101,7 +101,7 @@ def _pair(side: Side, against: Side, basis: Basis, sentence: str) -> FlightPair:
     )
 
 
-def _apart(side: Side, own: Group, against: Side, other: Group) -> FlightPair:
+def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group) -> FlightPair:
     """Two means with scatters of their own: the difference has the sum of both variances."""
     difference = own.mean - other.mean
     known = side.scatter.known and against.scatter.known
@@ -115,7 +115,7 @@ def _apart(side: Side, own: Group, against: Side, other: Group) -> FlightPair:
     return told.model_copy(update={"difference": difference, "standard_error": standard_error})
 
 
-def _why_apart(side: Side, against: Side) -> tuple[str, str]:
+def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, str]:
     """What is not the same in the two campaigns beside the gains: in few words, and with what that means."""
     one, other = side.campaign.vehicle, against.campaign.vehicle
     if side.experiment.name != against.experiment.name:
@@ -136,7 +136,7 @@ def _why_apart(side: Side, against: Side) -> tuple[str, str]:
     )
 
 
-def _repeats(side: Side, against: Side, group: Group) -> FlightPair:
+def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) -> FlightPair:
     """Two flights of the same gains in one campaign: has anything changed between them?"""
     errors = dict(zip(group.numbers, group.errors, strict=True))
     numbers = (against.row.number, side.row.number)
@@ -145,7 +145,7 @@ def _repeats(side: Side, against: Side, group: Group) -> FlightPair:
     amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
     word = "more than flights scatter" if found.confidence >= CONFIDENCE else "no more than flights scatter"
     sentence = (
-        f"The same gains ({describe(group.gains)}): {side.name} and {against.name} are {amount} apart, {word} "
+        f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {word} "
         f"({percent(found.confidence)} confidence that something has changed)."
     )
     told = _pair(side, against, "repeats", sentence)
@@ -158,7 +158,7 @@ def _repeats(side: Side, against: Side, group: Group) -> FlightPair:
     )
 
 
-def _changed(side: Side, against: Side, said: Comparison) -> str:
+def _changed(side: ComparisonFlight, against: ComparisonFlight, said: Comparison) -> str:
     """The same gains in two campaigns."""
     amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
     if said.confidence is None:
@@ -177,7 +177,7 @@ def _changed(side: Side, against: Side, said: Comparison) -> str:
     )
 
 
-def _told(side: Side, own: Group, against: Side, other: Group, said: Comparison) -> str:
+def _told(side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group, said: Comparison) -> str:
     amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
     pair = f"{named(own, side.name)} against {named(other, against.name)}"
     if said.confidence is None:
@@ -192,7 +192,7 @@ def _direction(said: Comparison) -> str:
     return "lower" if said.difference < 0.0 else "higher"
 
 
-def _deciding(side: Side, against: Side, said: Comparison) -> str:
+def _deciding(side: ComparisonFlight, against: ComparisonFlight, said: Comparison) -> str:
     if said.further is None:
         return "Not even 100 further flights would decide it."
     parts = [

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from app.core.statistics import Group
-from app.core.strategies.history import describe
+from app.core.strategies.history import format_gains
 from app.core.wording import plus_minus
 from app.db.models import CampaignRow, TrialRow
 
@@ -25,7 +25,7 @@ def flights(count: int) -> str:
 
 def named(group: Group, name: str) -> str:
     """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains, and how often they were flown."""
-    return f"{name} ({describe(group.gains)}; {flights(group.size)})"
+    return f"{name} ({format_gains(group.gains)}; {flights(group.size)})"
 
 
 def capitalised(sentence: str) -> str:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, status
 
-from app.api.deps import Act, CursorText, Id, Limit, Reader, Writer, json_only
+from app.api.deps import CursorText, Id, IdempotentPost, Limit, Reader, Writer, json_only
 from app.api.figures import FigureCard, Theme, figure_card
 from app.api.uploads import REQUEST_BODY, Record
 from app.controller_checks import service
@@ -35,12 +35,12 @@ def check_controller(
 ) -> ControllerCheck:
     """Hold a recording of the vertical loop against the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
     form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept."""
-    result = service.examine(record.content(), name=record.name, companion=record.beside(), gains=gains)
+    result = service.check_upload(record.content(), name=record.name, companion=record.beside(), gains=gains)
     return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
 
 
 @router.post("/example", status_code=status.HTTP_201_CREATED)
-def check_example_controller(act: Act) -> ControllerCheck:
+def check_example_controller(act: IdempotentPost) -> ControllerCheck:
     """The same with a takeoff that comes with the program, recorded from the autopilot's own code."""
     result = service.examine_example()
     return act(ControllerCheck, lambda session: service.store_example(session, result))

@@ -26,7 +26,7 @@ _UNNAMED: Final = "recording"
 _RESULT: Final = TypeAdapter(Result)
 
 
-def examine(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
+def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
     """Hold a recording that somebody has sent against the replica, in a process with limits; nothing is stored yet.
     Raises InputError naming what is wrong with it."""
     given = None if gains is None else parse_gains(gains)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from app.core.confirming import Confirmation, confirm, contest, standing
+from app.core.confirming import Confirmation, compare_winner, confirm, standing_within_bounds
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
 from app.core.stopping import StopVerdict
@@ -12,7 +12,7 @@ from app.core.strategies.base import Kind, Proposal
 
 AdviceKind = Literal["step", "repeat", "baseline", "stop"]
 
-_FLOWN_ANYWAY: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
+_MANUAL_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,11 +35,11 @@ def advise(
     step that flights cannot tell from noise is advised against. Only gains inside the bounds are advised, except to
     stop with what the flights found best."""
     tells_noise = definition.stop.kind == "noise"
-    now = (standing if said.stop and not tells_noise else contest)(definition, experiment, flights)
+    now = (compare_winner if said.stop and not tells_noise else standing_within_bounds)(definition, experiment, flights)
     if said.stop:
         return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=said.why)
     if now is None or tells_noise:
-        kind = _FLOWN_ANYWAY.get(proposal.kind, "step")
+        kind = _MANUAL_KINDS.get(proposal.kind, "step")
         return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)
     confirmation = confirm(definition, experiment, flights, proposal)
     kind = _kind(confirmation)

@@ -22,8 +22,8 @@ import numpy as np
 from app.core.definition import Flight
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, fitted_parameters
 from app.core.policy import Vector
-from app.core.recorded import on_grid
-from app.core.spread import Spread, before_flight
+from app.core.recorded import resample_to_grid
+from app.core.spread import ParameterDistribution, prior_distribution
 from app.core.trajectory import Samples
 
 EXPERIMENTS: Final = frozenset({"takeoff"})
@@ -34,19 +34,19 @@ MOST_FLIGHTS: Final = 4
 _RATE_HZ: Final = 10.0
 _ORDER: Final = 4
 _FIRST_SCALE: Final = 3.0
-_FLOOR: Final = 0.4
+_NOISE_FLOOR: Final = 0.4
 """Standard deviation of what the first pass takes for noise, and the least that is always assumed: both in units of the
 experiment's scatter."""
 _DIFFERENCE: Final = 0.1
 """Steps of the difference quotients, in prior standard deviations: well above the steps of the loop's integers."""
 _STARTS: Final = 32
 _WIDEST_OWN: Final = 4.0
-_MOST_TRIALS: Final = 20
+_MAX_STEPS: Final = 20
 _LEAST_GAIN: Final = 0.2
 """A step that promises to lower half the sum of squares by less ends the search: it goes under a standard deviation."""
 _DAMPING: Final = 1.0
 """The first that a failed step brings, in units of the priors."""
-_UNMODELLED: Final = 0.05
+_MODEL_ERROR_SD: Final = 0.05
 """What no fit can rule out, in prior standard deviations."""
 
 
@@ -64,12 +64,12 @@ class Calibration:
     own_models: Matrix
     residual: Samples
 
-    def spread(self) -> Spread:
+    def spread(self) -> ParameterDistribution:
         """What is known of the vehicle now, as a distribution."""
-        known = np.diag(self.covariance) + (_UNMODELLED * _prior_sd(self.experiment)) ** 2
+        known = np.diag(self.covariance) + (_MODEL_ERROR_SD * _prior_sd(self.experiment)) ** 2
         covariance = self.covariance + np.diag(known - np.diag(self.covariance))
         flights = f"{len(self.numbers)} flight{'s' if len(self.numbers) > 1 else ''}"
-        return Spread(
+        return ParameterDistribution(
             mean=tuple(self.model.tolist()),
             covariance=tuple(tuple(row) for row in covariance.tolist()),
             origin=f"the calibration on {flights}",
@@ -122,16 +122,16 @@ def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Cali
         noise=float(fit.noise[0]),
         numbers=numbers,
         own_models=own_models,
-        residual=on_grid(experiment, best) - flown,
+        residual=resample_to_grid(experiment, best) - flown,
     )
 
 
-def known(experiment: Experiment, flights: Sequence[Flight]) -> Spread:
+def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
     """What is known of the vehicle: the data sheet's spread before the first valid flight, the calibrated one after it;
     always the data sheet's for experiments without a calibration, and nothing for those without a model."""
     modelled = experiment.modelled
     if modelled is None or modelled.name not in EXPERIMENTS or all(flight.error is None for flight in flights):
-        return before_flight(experiment)
+        return prior_distribution(experiment)
     return calibrate(modelled, flights).spread()
 
 
@@ -170,7 +170,7 @@ class _Fit:
         self.own = np.flatnonzero(self.flight_sd)
         self.gains = np.array([experiment.space.vector(flight.gains) for flight in flights])
         self.every = max(round(1.0 / _RATE_HZ / float(experiment.grid_s[1] - experiment.grid_s[0])), 1)
-        self.measured = np.array([on_grid(experiment, flight) for flight in flights])[:, :: self.every]
+        self.measured = np.array([resample_to_grid(experiment, flight) for flight in flights])[:, :: self.every]
         self.memory = np.zeros(0)
         self.noise = np.full(2, _FIRST_SCALE * experiment.scatter.sd)
 
@@ -183,7 +183,7 @@ class _Fit:
 
     def start(self) -> Vector:
         """The best of a few likely models by the first flight."""
-        prior = Spread(
+        prior = ParameterDistribution(
             mean=tuple(self.mean.tolist()),
             covariance=tuple(tuple(row) for row in np.diag(self.sd**2).tolist()),
             origin="",
@@ -202,7 +202,7 @@ class _Fit:
         at, damping = np.clip(start, lower, upper), 0.0
         outputs, misses = self._flown(at)
         slopes = self.slopes(at, outputs)
-        for _ in range(_MOST_TRIALS):
+        for _ in range(_MAX_STEPS):
             there, gain = _bounded_step(slopes, misses, at, lower, upper, damping / scale)
             if gain < _LEAST_GAIN:
                 break
@@ -245,7 +245,7 @@ class _Fit:
         left = self.outputs(unknowns) - self.measured
         samples = left.shape[1]
         lags = [float(np.sum(left[:, lag:] * left[:, : samples - lag])) / left.size for lag in range(_ORDER + 1)]
-        lags[0] += (_FLOOR * self.experiment.scatter.sd) ** 2
+        lags[0] += (_NOISE_FLOOR * self.experiment.scatter.sd) ** 2
         self.memory = np.asarray(solve_toeplitz(lags[:-1], lags[1:]))
         self.noise = np.sqrt([lags[0], lags[0] - float(self.memory @ lags[1:])])
 

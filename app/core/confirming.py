@@ -12,9 +12,18 @@ from typing import Final, Literal
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
-from app.core.statistics import Comparison, Group, Pooled, compare, groups_of, pooled, smallest_difference, winner_of
+from app.core.statistics import (
+    Comparison,
+    Group,
+    PooledScatter,
+    compare,
+    groups_of,
+    pool_scatter,
+    select_winner,
+    smallest_difference,
+)
 from app.core.strategies.base import Proposal
-from app.core.strategies.history import describe
+from app.core.strategies.history import format_gains
 from app.core.wording import percent, plus_minus, short
 
 SCATTER_NOT_KNOWN: Final = (
@@ -22,17 +31,17 @@ SCATTER_NOT_KNOWN: Final = (
     "chance: fly one of the gain sets again."
 )
 
-_RESERVED: Final = 2
+_CONFIRMATION_FLIGHTS: Final = 2
 """Flights kept back for flying the winner and the baseline again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class ComparisonState:
     """What the flights say at present; at least one is valid. `baseline` holds the first valid flight, `winner` is the
     best policy; `comparison` of the two is None while they are the same."""
 
     groups: tuple[Group, ...]
-    scatter: Pooled
+    scatter: PooledScatter
     baseline: Group
     winner: Group
     comparison: Comparison | None
@@ -53,15 +62,15 @@ class Confirmation:
     why: str
 
 
-def standing(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Standing | None:
+def compare_winner(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> ComparisonState | None:
     """Groups, scatter and winner; None before the first valid flight. Under the rule `noise` the comparison allows for
     its repetition, under the others, which do not decide by it, for the choice among the policies only."""
     groups = groups_of(flights)
     if not groups:
         return None
-    scatter = pooled(groups, experiment.scatter)
-    baseline, winner = groups[0], winner_of(groups, scatter)
-    bare = Standing(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=None)
+    scatter = pool_scatter(groups, experiment.scatter)
+    baseline, winner = groups[0], select_winner(groups, scatter)
+    bare = ComparisonState(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=None)
     if winner is baseline:
         return bare
     comparison = compare(
@@ -72,12 +81,14 @@ def standing(definition: Definition, experiment: Experiment, flights: Sequence[F
         candidates=len(groups) - 1,
         looks=bare.looks if definition.stop.kind == "noise" else 0,
     )
-    return Standing(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=comparison)
+    return ComparisonState(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=comparison)
 
 
-def contest(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Standing | None:
+def standing_within_bounds(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight]
+) -> ComparisonState | None:
     """The standing among the gains that may be flown again: those inside the bounds. None while there are none."""
-    return standing(definition, experiment, _inside(definition, experiment, flights))
+    return compare_winner(definition, experiment, _inside(definition, experiment, flights))
 
 
 def confirm(
@@ -88,7 +99,7 @@ def confirm(
     A proposal of kind `manual` promises nothing and is the operator's own business until the flights run short.
     """
     inside = _inside(definition, experiment, flights)
-    now = standing(definition, experiment, inside)
+    now = compare_winner(definition, experiment, inside)
     assert now is not None
     found = _next(definition, experiment, now, definition.stop.max_flights - len(flights), proposal)
     return replace(found, why=f"{found.why} {_left_out(flights, inside)}".strip())
@@ -108,22 +119,24 @@ def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:
     return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} no part."
 
 
-def _next(definition: Definition, experiment: Experiment, now: Standing, left: int, proposal: Proposal) -> Confirmation:
+def _next(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> Confirmation:
     if now.winner is now.baseline:
-        return _unbeaten(definition, experiment, now, left, proposal)
+        return _confirm_baseline(definition, experiment, now, left, proposal)
     if left <= 0:
         return Confirmation(phase="decided", why=verdict_sentence(experiment, now))
-    if now.winner.size < 2 and left > _RESERVED and _is_worth_a_step(definition, now, left, proposal):
-        return Confirmation(phase="step", why=_promise(definition, experiment, now, left, proposal))
+    if now.winner.size < 2 and left > _CONFIRMATION_FLIGHTS and _is_worth_a_step(definition, now, left, proposal):
+        return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
     return _flown_again(experiment, now)
 
 
-def verdict_sentence(experiment: Experiment, now: Standing) -> str:
+def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
     """The winner against the first gains, in a sentence."""
     if now.comparison is None:
-        return f"The first flight's gains ({describe(now.baseline.gains)}) are the best flown."
+        return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
     unit, said = experiment.error_unit, now.comparison
-    pair = f"{describe(now.winner.gains)} against the first flight's {describe(now.baseline.gains)}"
+    pair = f"{format_gains(now.winner.gains)} against the first flight's {format_gains(now.baseline.gains)}"
     if said.confidence is None or said.standard_error is None:
         return f"Not known yet: {pair}, {short(abs(said.difference))} {unit} {_direction(said)}. {SCATTER_NOT_KNOWN}"
     amount = plus_minus(abs(said.difference), said.standard_error, unit)
@@ -136,50 +149,56 @@ def verdict_sentence(experiment: Experiment, now: Standing) -> str:
     )
 
 
-def _unbeaten(
-    definition: Definition, experiment: Experiment, now: Standing, left: int, proposal: Proposal
+def _confirm_baseline(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
 ) -> Confirmation:
     if left > 0 and _is_worth_a_step(definition, now, left, proposal):
-        return Confirmation(phase="step", why=_promise(definition, experiment, now, left, proposal))
+        return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
     tried = len(now.groups) - 1
     found = f"None of the other sets flown, {tried}, is better." if tried else "No other set was flown."
-    promise = _promise(definition, experiment, now, left, proposal)
+    promise = _describe_improvement(definition, experiment, now, left, proposal)
     return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {promise}".strip())
 
 
-def _flown_again(experiment: Experiment, now: Standing) -> Confirmation:
+def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
     said = now.comparison
     assert said is not None
     sentence = verdict_sentence(experiment, now)
     if now.looks and said.verdict != "unresolved":
         return Confirmation(phase="decided", why=sentence)
     if now.winner.size <= now.baseline.size:
-        why = f"The winner, {describe(now.winner.gains)}, is flown again, to see whether it is better or was lucky."
+        why = f"The winner, {format_gains(now.winner.gains)}, is flown again, to see whether it is better or was lucky."
         return Confirmation(phase="repeat", why=f"{why} {sentence}")
-    why = f"The first flight's gains, {describe(now.baseline.gains)}, are flown again under the winner's conditions."
+    why = (
+        f"The first flight's gains, {format_gains(now.baseline.gains)}, are flown again under the winner's conditions."
+    )
     return Confirmation(phase="baseline", why=f"{why} {sentence}")
 
 
-def _is_worth_a_step(definition: Definition, now: Standing, left: int, proposal: Proposal) -> bool:
+def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:
     if proposal.kind == "manual":
         return True
-    return proposal.kind != "none" and _promised(now, proposal) >= _tellable(definition, now, left)
+    return proposal.kind != "none" and _predicted_improvement(now, proposal) >= _detectable_difference(
+        definition, now, left
+    )
 
 
-def _promised(now: Standing, proposal: Proposal) -> float:
+def _predicted_improvement(now: ComparisonState, proposal: Proposal) -> float:
     return 0.0 if proposal.predicted_error is None else now.winner.mean - proposal.predicted_error
 
 
-def _tellable(definition: Definition, now: Standing, left: int) -> float:
+def _detectable_difference(definition: Definition, now: ComparisonState, left: int) -> float:
     return smallest_difference(now.scatter, now.winner.size, left, definition.stop.confidence)
 
 
-def _promise(definition: Definition, experiment: Experiment, now: Standing, left: int, proposal: Proposal) -> str:
+def _describe_improvement(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> str:
     unit = experiment.error_unit
     if proposal.kind in {"none", "manual"} or left <= 0:
         return "The strategy offers nothing more." if proposal.kind == "none" else ""
-    told = _tellable(definition, now, left)
-    promised = _promised(now, proposal)
+    told = _detectable_difference(definition, now, left)
+    promised = _predicted_improvement(now, proposal)
     relation = "at least" if promised >= told else "below"
     return (
         f"The next step promises {short(promised)} {unit} less, {relation} the {short(told)} {unit} that "

@@ -7,7 +7,7 @@ import numpy as np
 from app.core.policy import Vector
 
 
-def descend(
+def minimise_in_box(
     error: Callable[[Vector], float],
     start: Vector,
     steps: Vector,

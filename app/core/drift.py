@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Final
 
 FALSE_ALARMS: Final = 0.05
-WATCHED: Final[Mapping[str, str]] = MappingProxyType(
+MONITORED_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "hover_throttle": "propellers, weight",
         "start_latency_s": "link",
@@ -49,7 +49,7 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
     """`before` is the fit with which the vehicle was tuned last, `now` the newest, both by the parameters' names."""
     from scipy.special import ndtri
 
-    names = [name for name in WATCHED if name in before and name in now]
+    names = [name for name in MONITORED_PARAMETERS if name in before and name in now]
     reach = float(ndtri(1.0 - FALSE_ALARMS / (2.0 * max(len(names), 1))))
     moved = {name: now[name].value - before[name].value for name in names}
     allowed = {name: reach * hypot(before[name].standard_error, now[name].standard_error) for name in names}
@@ -68,7 +68,7 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
     )
     sentence = (
         f"Since it was last tuned the vehicle has changed by more than chance explains: {told}. Look for the cause "
-        f"({', '.join(WATCHED[name] for name in drifted)}), then tune it again."
+        f"({', '.join(MONITORED_PARAMETERS[name] for name in drifted)}), then tune it again."
     )
     return Drift(due=True, drifted=drifted, sentence=sentence)
 

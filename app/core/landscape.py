@@ -24,7 +24,7 @@ from app.core.experiments.base import Matrix
 from app.core.policy import Gain, Gains, PolicySpace, Vector
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import ErrorsOf
-from app.core.strategies.bias import corrected_by, nominal
+from app.core.strategies.bias import correct_by_bias, uncorrected_model
 from app.core.transfer import transfer
 
 POINTS: Final = 17
@@ -58,7 +58,7 @@ class Landscape:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class LandscapePlan:
     """What is to be computed: through which gains, and which gain sets the slices have to hold."""
 
     definition: Definition
@@ -69,7 +69,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Survey:
+class LandscapeGrid:
     """What it takes to compute the slices, a few points at a time: the model, the gains through which they go, shape
     (n,), the pairs that are varied, and each gain's values."""
 
@@ -112,15 +112,15 @@ class Survey:
         )
 
 
-def plan_survey(plan: Plan) -> Survey | None:
+def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
     """The model and the points. Pure; a calibration takes up to a second. None without a model, and where fewer than
     two gains are free."""
-    foresee, space = _foresight(plan.definition, plan.flights, plan.donor), space_of(plan.definition)
+    foresee, space = _error_model(plan.definition, plan.flights, plan.donor), space_of(plan.definition)
     if foresee is None or free_gains(space) < 2:
         return None
     centre = space.nearest(space.vector(plan.centre))
     marks = np.array([space.vector(gains) for gains in (*plan.marks, space.mapping(centre))])
-    return Survey(
+    return LandscapeGrid(
         space=space,
         foresee=foresee,
         centre=centre,
@@ -129,7 +129,7 @@ def plan_survey(plan: Plan) -> Survey | None:
     )
 
 
-def foreseen(foresee: ErrorsOf, gains: Matrix) -> Vector:
+def predict_points(foresee: ErrorsOf, gains: Matrix) -> Vector:
     """Predicted errors of some points, (c, n) → (c,): what a process of its own is asked for. Pure."""
     return foresee(gains)
 
@@ -144,7 +144,7 @@ def free_gains(space: PolicySpace) -> int:
     return sum(gain.span > 0.0 for gain in space.gains)
 
 
-def _foresight(definition: Definition, flights: Sequence[Flight], donor: Flight | None) -> ErrorsOf | None:
+def _error_model(definition: Definition, flights: Sequence[Flight], donor: Flight | None) -> ErrorsOf | None:
     """The model that `next_proposal` judges gains by, for the same history; None where there is none."""
     experiment = experiment_of(definition).modelled
     if experiment is None:
@@ -152,7 +152,7 @@ def _foresight(definition: Definition, flights: Sequence[Flight], donor: Flight 
     if donor is not None:
         experiment = transfer(definition, experiment, flights, donor).experiment
     if all(flight.outcome != "valid" for flight in flights):
-        return (nominal(experiment) if donor is None else corrected_by(experiment, donor)).errors
+        return (uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)).errors
     return STRATEGIES[definition.strategy].foresee(definition, experiment, flights)
 
 

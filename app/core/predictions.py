@@ -21,15 +21,15 @@ import numpy as np
 from app.core.definition import Flight, Prediction
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
 from app.core.policy import PolicySpace, Vector
-from app.core.recorded import on_grid
-from app.core.spread import Spread
-from app.core.statistics import Group, Pooled, groups_of
+from app.core.recorded import resample_to_grid
+from app.core.spread import ParameterDistribution
+from app.core.statistics import Group, PooledScatter, groups_of
 from app.core.strategies.base import Explanation, Interval, Kind, Proposal, band_channels
 from app.core.trajectory import Samples, Trajectory
 
 CONFIDENCE: Final = 0.9
 MODELS: Final = 16
-_TRUST_IN_THE_MODEL: Final = 4.0
+_PRIOR_WEIGHT: Final = 4.0
 _DISAGREEMENTS: Final = 3
 _TINY: Final = float(np.finfo(float).tiny)
 
@@ -98,12 +98,12 @@ def prediction_of(proposal: Proposal) -> Prediction | None:
     )
 
 
-def expected(
+def with_interval(
     experiment: ModelledExperiment,
     space: PolicySpace,
     flights: Sequence[Flight],
     proposal: Proposal,
-    scatter: Pooled,
+    scatter: PooledScatter,
     *,
     base: Flight | None,
 ) -> Proposal:
@@ -115,13 +115,13 @@ def expected(
 
     if proposal.interval is not None or proposal.predicted is None or proposal.predicted_error is None:
         return proposal
-    outputs = _likely(experiment, space, space.vector(proposal.gains), base)
+    outputs = _sample_outputs(experiment, space, space.vector(proposal.gains), base)
     repeats = next((group.size for group in groups_of(flights) if base and base.number in group.numbers), 0)
     noise = scatter.sigma**2 * (1.0 + (1.0 / repeats if repeats else 0.0))
-    reach = float(stdtrit(scatter.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * experience(flights)
+    reach = float(stdtrit(scatter.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * interval_scale(flights)
     errors, curve = experiment.errors(outputs), proposal.predicted[experiment.output]
     half = reach * float(np.sqrt(noise + np.var(errors, ddof=1)))
-    offset = noise / cost_of_an_offset(experiment) ** 2
+    offset = noise / offset_sensitivity(experiment) ** 2
     band = reach * np.sqrt(offset + np.var(outputs, axis=0, ddof=1))
     middle = np.mean(outputs, axis=0)
     edges = (np.minimum(curve, middle - band), np.maximum(curve, middle + band))
@@ -133,18 +133,23 @@ def expected(
     )
 
 
-def expected_again(
-    experiment: Experiment, flights: Sequence[Flight], group: Group, scatter: Pooled, kind: Kind, why: Explanation
+def repeat_proposal(
+    experiment: Experiment,
+    flights: Sequence[Flight],
+    group: Group,
+    scatter: PooledScatter,
+    kind: Kind,
+    why: Explanation,
 ) -> Proposal:
     """The proposal to fly a policy again: the mean of its flights is expected, with the scatter around it as far as
     that is known."""
-    measured = np.array([on_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
+    measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
     curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
     bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
     if not scatter.known:
         return bare
     half = scatter.half_width(1.0 + 1.0 / group.size, CONFIDENCE)
-    offset = half / cost_of_an_offset(experiment)
+    offset = half / offset_sensitivity(experiment)
     return replace(
         bare,
         predicted=_with_band(
@@ -154,7 +159,7 @@ def expected_again(
     )
 
 
-def experience(flights: Sequence[Flight]) -> float:
+def interval_scale(flights: Sequence[Flight]) -> float:
     """f: above 1 where earlier flights missed their predictions by more than their intervals, below where by less."""
     from scipy.special import ndtri
 
@@ -167,7 +172,7 @@ def experience(flights: Sequence[Flight]) -> float:
         and told.lower is not None
         and told.upper is not None
     ]
-    return float(np.sqrt((_TRUST_IN_THE_MODEL + sum(squares)) / (_TRUST_IN_THE_MODEL + len(squares))))
+    return float(np.sqrt((_PRIOR_WEIGHT + sum(squares)) / (_PRIOR_WEIGHT + len(squares))))
 
 
 def _with_band(curve: Trajectory, output: str, lower: Samples, upper: Samples) -> Trajectory:
@@ -181,10 +186,10 @@ def _interval(lower: float, upper: float) -> Interval:
     return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
 
 
-def _likely(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
+def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
     """Outputs of these gains on a few likely models, shape (k, n), each with its own bias where there is a base."""
     parameters = experiment.model_parameters
-    prior = Spread(
+    prior = ParameterDistribution(
         mean=tuple(parameter.prior_mean for parameter in parameters),
         covariance=tuple(map(tuple, np.diag([parameter.prior_sd**2 for parameter in parameters]).tolist())),
         origin="the priors of a fit",
@@ -194,10 +199,10 @@ def _likely(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, b
     if base is None:
         return proposed
     flown = experiment.outputs(np.tile(space.vector(base.gains), (MODELS, 1)), models)
-    return np.asarray(proposed - flown + on_grid(experiment, base))
+    return np.asarray(proposed - flown + resample_to_grid(experiment, base))
 
 
-def cost_of_an_offset(experiment: Experiment) -> float:
+def offset_sensitivity(experiment: Experiment) -> float:
     """What a constant offset of one unit of the output costs in the error: 1 for a mean, the window for an integral."""
     return float(experiment.errors(experiment.set_point(experiment.grid_s)[np.newaxis] + 1.0)[0])
 

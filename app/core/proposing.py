@@ -3,20 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.core.calibration import known
-from app.core.confirming import confirm, contest
+from app.core.calibration import known_distribution
+from app.core.confirming import confirm, standing_within_bounds
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.gate import Gate, check_policy
+from app.core.gate import GateResult, check_policy
 from app.core.policy import PolicySpace
-from app.core.predictions import expected, expected_again, track_record
+from app.core.predictions import repeat_proposal, track_record, with_interval
 from app.core.starting import start_gains
-from app.core.statistics import Group, groups_of, pooled
+from app.core.statistics import Group, groups_of, pool_scatter
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Explanation, Kind, Proposal
-from app.core.strategies.bias import corrected_by, nominal
-from app.core.strategies.history import describe
+from app.core.strategies.bias import correct_by_bias, uncorrected_model
+from app.core.strategies.history import format_gains
 from app.core.strategies.manual import propose as by_hand
 from app.core.transfer import Transfer, transfer
 from app.core.wording import short
@@ -44,18 +44,18 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     space = chosen.space.narrowed(definition.bounds)
     experiment = chosen.modelled
     if experiment is None:
-        return _by_hand(definition, chosen, space, flights)
+        return _manual_proposal(definition, chosen, space, flights)
     warm = None if donor is None else transfer(definition, experiment, flights, donor)
     if warm is not None:
         experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
     if not _has_flown(flights):
         return _start(definition, experiment, space, flights, donor)
-    scatter = pooled(groups_of(flights), experiment.scatter)
+    scatter = pool_scatter(groups_of(flights), experiment.scatter)
     strategy = STRATEGIES[definition.strategy]
     proposal = strategy.propose(definition, experiment, space, flights)
     number = proposal.explanation.base_flight if strategy.learns else None
     base = next((flight for flight in flights if flight.number == number), None)
-    proposal = expected(experiment, space, flights, proposal, scatter, base=base)
+    proposal = with_interval(experiment, space, flights, proposal, scatter, base=base)
     return _with_notes(_confirmed(definition, experiment, space, flights, proposal), flights, warm)
 
 
@@ -63,14 +63,16 @@ def _has_flown(flights: Sequence[Flight]) -> bool:
     return any(flight.outcome == "valid" for flight in flights)
 
 
-def _by_hand(definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
+def _manual_proposal(
+    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
     """Without a model: the start gains, then the operator's own; nothing is predicted."""
     if _has_flown(flights):
         proposal = by_hand(definition, experiment, space, flights)
         return _confirmed(definition, experiment, space, flights, proposal)
     gains = start_gains(definition, experiment, space)
     summary = (
-        f"The first flight uses {_ORIGIN[definition.start.kind]} ({describe(gains)}); there is no model of this "
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); there is no model of this "
         "vehicle's controller to predict it with."
     )
     lesson = "What these gains do, for the others to be measured against."
@@ -86,11 +88,11 @@ def _start(
     donor: Flight | None,
 ) -> Proposal:
     gains = start_gains(definition, experiment, space)
-    model = nominal(experiment) if donor is None else corrected_by(experiment, donor)
+    model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
     trajectory, error = model.predict(space.vector(gains))
     teller = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     summary = (
-        f"The first flight uses {_ORIGIN[definition.start.kind]} ({describe(gains)}); {teller} "
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {teller} "
         f"predicts {short(error)} {experiment.error_unit}."
     )
     lesson = "How far this vehicle is from the model." if donor is None else "Whether the two vehicles are alike."
@@ -101,7 +103,7 @@ def _start(
         predicted_error=error,
         explanation=Explanation(summary=summary, lesson=lesson),
     )
-    return expected(experiment, space, flights, start, pooled((), experiment.scatter), base=None)
+    return with_interval(experiment, space, flights, start, pool_scatter((), experiment.scatter), base=None)
 
 
 def _confirmed(
@@ -109,17 +111,17 @@ def _confirmed(
 ) -> Proposal:
     """The strategy's proposal; under the rule `noise` only where a step is still worth a flight, else the flight that
     the noise asks for, and nothing more where the gate refuses that one."""
-    now = contest(definition, experiment, flights) if definition.stop.kind == "noise" else None
+    now = standing_within_bounds(definition, experiment, flights) if definition.stop.kind == "noise" else None
     if now is None:
         return proposal
     wanted = confirm(definition, experiment, flights, proposal)
     if wanted.phase == "step":
         notes = (*proposal.explanation.notes, *filter(None, (wanted.why,)))
         return replace(proposal, explanation=replace(proposal.explanation, notes=notes))
-    spread = known(experiment, flights) if proposal.spread is None else proposal.spread
+    spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
 
     def again(group: Group, kind: Kind, why: Explanation) -> Proposal:
-        return replace(expected_again(experiment, flights, group, now.scatter, kind, why), spread=spread)
+        return replace(repeat_proposal(experiment, flights, group, now.scatter, kind, why), spread=spread)
 
     if wanted.phase == "decided":
         return again(now.winner, "none", Explanation(summary=wanted.why))
@@ -131,9 +133,9 @@ def _confirmed(
     return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
 
 
-def _refused(group: Group, gate: Gate) -> str:
+def _refused(group: Group, gate: GateResult) -> str:
     reasons = " ".join(check.sentence for check in gate.refusals)
-    return f"But {describe(group.gains)} cannot be flown again, the gate refuses them: {reasons}"
+    return f"But {format_gains(group.gains)} cannot be flown again, the gate refuses them: {reasons}"
 
 
 def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:

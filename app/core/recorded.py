@@ -7,7 +7,7 @@ from app.core.experiments.base import Experiment
 from app.core.trajectory import Samples
 
 
-def on_grid(experiment: Experiment, flight: Flight) -> Samples:
+def resample_to_grid(experiment: Experiment, flight: Flight) -> Samples:
     """The flight's scored output at the instants of a model run, taken as the database keeps it.
 
     Beyond the flight's samples its nearest one holds.

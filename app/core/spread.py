@@ -16,7 +16,7 @@ WIDEST_SD: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
+class ParameterDistribution:
     """A normal distribution over the model's parameters, in the order of `model_parameters`, cut off at two standard
     deviations along its principal axes and at the parameters' own limits. `origin` says where it comes from."""
 
@@ -49,17 +49,17 @@ class Spread:
 _PROBABILITY_WITHIN: Final = 0.9544997361036416
 
 
-NOTHING: Final = Spread(mean=(), covariance=(), origin="nothing: there is no model")
+NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="nothing: there is no model")
 
 
-def before_flight(experiment: "Experiment") -> Spread:
+def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
     """What the data sheet leaves open: each parameter within `known_within` of its nominal value. Nothing is known
     without a model."""
     modelled = experiment.modelled
     if modelled is None:
-        return NOTHING
+        return NO_PARAMETERS
     sd: Vector = np.array([parameter.known_within for parameter in modelled.model_parameters]) / WIDEST_SD
-    return Spread(
+    return ParameterDistribution(
         mean=tuple(float(value) for value in modelled.nominal_model),
         covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()),
         origin="the data sheet",

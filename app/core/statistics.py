@@ -25,16 +25,16 @@ from app.core.definition import Flight
 from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Gains, Vector
 
-Word = Literal["better", "worse", "unresolved", "not known yet"]
+Verdict = Literal["better", "worse", "unresolved", "not known yet"]
 """`unresolved`: the flights could not tell; `not known yet`: nobody knows how much they scatter."""
 
-MOST_FURTHER_FLIGHTS: Final = 100
+MAX_FURTHER_FLIGHTS: Final = 100
 _OPTIMISM_POINTS: Final = 2001
 _OPTIMISM_REACH: Final = 8.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pooled:
+class PooledScatter:
     """The flight-to-flight scatter: a standard deviation in the error's unit, and how well it is known. One that is not
     `known` is an order of magnitude: good enough to rank by, and told to nobody."""
 
@@ -72,10 +72,10 @@ class Group:
             return 0.0
         return float(np.sum((np.array(self.errors) - self.mean) ** 2))
 
-    def standard_error(self, scatter: Pooled) -> float:
+    def standard_error(self, scatter: PooledScatter) -> float:
         return scatter.sigma / sqrt(self.size)
 
-    def known_error(self, scatter: Pooled) -> float | None:
+    def known_error(self, scatter: PooledScatter) -> float | None:
         """The same; None while the scatter is not known."""
         return self.standard_error(scatter) if scatter.known else None
 
@@ -102,7 +102,7 @@ class Comparison:
     standard error, and every further flight of gains flown before makes it known.
     """
 
-    verdict: Word
+    verdict: Verdict
     confidence: float | None
     difference: float
     standard_error: float | None
@@ -152,18 +152,18 @@ def groups_of(flights: Sequence[Flight]) -> tuple[Group, ...]:
     )
 
 
-def pooled(groups: Sequence[Group], prior: Scatter) -> Pooled:
+def pool_scatter(groups: Sequence[Group], prior: Scatter) -> PooledScatter:
     """σ̂ and ν as above. `prior.degrees_of_freedom` must be above zero, or a policy have been repeated."""
     repeats = sum(group.size - 1 for group in groups)
     if not prior.measured and not repeats:
-        return Pooled(sigma=prior.sd, degrees_of_freedom=prior.degrees_of_freedom, known=False)
+        return PooledScatter(sigma=prior.sd, degrees_of_freedom=prior.degrees_of_freedom, known=False)
     worth = prior.degrees_of_freedom if prior.measured else 0.0
     freedom = worth + repeats
     squares = worth * prior.sd**2 + sum(group.squares for group in groups)
-    return Pooled(sigma=float(np.sqrt(squares / freedom)), degrees_of_freedom=freedom)
+    return PooledScatter(sigma=float(np.sqrt(squares / freedom)), degrees_of_freedom=freedom)
 
 
-def winner_of(groups: Sequence[Group], scatter: Pooled) -> Group:
+def select_winner(groups: Sequence[Group], scatter: PooledScatter) -> Group:
     """The policy with the lowest mean plus one standard error, the earliest of equals: a single lucky flight does not
     overtake a policy that has shown the same twice. There must be a group."""
     return min(groups, key=lambda group: (group.mean + group.standard_error(scatter), group.numbers[0]))
@@ -172,7 +172,7 @@ def winner_of(groups: Sequence[Group], scatter: Pooled) -> Group:
 def compare(
     first: Group,
     second: Group,
-    scatter: Pooled,
+    scatter: PooledScatter,
     confidence: float,
     *,
     candidates: int = 1,
@@ -194,7 +194,7 @@ def compare(
             verdict="not known yet", confidence=None, difference=difference, standard_error=None, further=None
         )
     certainty = _certainty(difference, scatter, (first.size, second.size), allowance)
-    verdict: Word = "unresolved" if certainty < confidence else "better" if difference < 0.0 else "worse"
+    verdict: Verdict = "unresolved" if certainty < confidence else "better" if difference < 0.0 else "worse"
     return Comparison(
         verdict=verdict,
         confidence=certainty,
@@ -237,7 +237,7 @@ def _products_of_others(factors: Matrix) -> Matrix:
     return before * after
 
 
-def drift_of(group: Group, scatter: Pooled) -> Drift | None:
+def drift_of(group: Group, scatter: PooledScatter) -> Drift | None:
     """The last against the first flight of a policy; None unless it was repeated. Two-sided."""
     if group.size < 2:
         return None
@@ -271,7 +271,7 @@ def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.
     )
 
 
-def smallest_difference(scatter: Pooled, flown: int, left: int, confidence: float) -> float:
+def smallest_difference(scatter: PooledScatter, flown: int, left: int, confidence: float) -> float:
     """The least difference that `left` flights, split at best between a policy flown `flown` times already and a new
     one, tell from noise with `confidence`. Infinite without a flight left."""
     from scipy.special import stdtrit
@@ -281,11 +281,11 @@ def smallest_difference(scatter: Pooled, flown: int, left: int, confidence: floa
     return float(stdtrit(freedom, confidence)) * scatter.sigma * float(min(errors, default=np.inf))
 
 
-def _standard_error(scatter: Pooled, sizes: tuple[int, int]) -> float:
+def _standard_error(scatter: PooledScatter, sizes: tuple[int, int]) -> float:
     return scatter.sigma * float(np.sqrt(1.0 / sizes[0] + 1.0 / sizes[1]))
 
 
-def _certainty(difference: float, scatter: Pooled, sizes: tuple[int, int], allowance: float) -> float:
+def _certainty(difference: float, scatter: PooledScatter, sizes: tuple[int, int], allowance: float) -> float:
     """1 − allowance·P(t ≥ |difference|/standard error), not below zero."""
     from scipy.special import stdtr
 
@@ -297,13 +297,13 @@ def _certainty(difference: float, scatter: Pooled, sizes: tuple[int, int], allow
 
 
 def _further(
-    first: Group, second: Group, scatter: Pooled, confidence: float, candidates: int, looks: int
+    first: Group, second: Group, scatter: PooledScatter, confidence: float, candidates: int, looks: int
 ) -> FlightsToDecide | None:
     """Always the policy with fewer flights next, the first of equals, until the same difference would decide."""
     sizes = [first.size, second.size]
-    for count in range(1, MOST_FURTHER_FLIGHTS + 1):
+    for count in range(1, MAX_FURTHER_FLIGHTS + 1):
         sizes[0 if sizes[0] <= sizes[1] else 1] += 1
-        known = Pooled(sigma=scatter.sigma, degrees_of_freedom=scatter.degrees_of_freedom + count)
+        known = PooledScatter(sigma=scatter.sigma, degrees_of_freedom=scatter.degrees_of_freedom + count)
         look = looks + count if looks else 0
         allowance = candidates * max(look * (look + 1), 1)
         if _certainty(first.mean - second.mean, known, (sizes[0], sizes[1]), allowance) >= confidence:

@@ -26,14 +26,14 @@ class StopVerdict:
     threshold: float | None
 
 
-def judge(
+def evaluate_stop_rule(
     definition: Definition, flights: Sequence[Flight], proposal: Proposal, *, battery_v: float | None = None
 ) -> StopVerdict:
     """The campaign's own rule on its flights and on the proposal computed from them.
 
     `battery_v` is the voltage, V, at which the last flight ended, whatever that flight is worth: a low battery is low.
     """
-    return verdict(
+    return decide_stop(
         definition.stop,
         [flight.error for flight in flights],
         proposal.kind,
@@ -57,7 +57,7 @@ def _battery_v(record: Trajectory, sample: int) -> float | None:
     return float(recorded[sample]) if recorded is not None and len(recorded) else None
 
 
-def verdict(
+def decide_stop(
     rule: StopRule,
     errors: Sequence[float | None],
     proposal_kind: Kind | None = None,

@@ -9,7 +9,7 @@ from app.core.trajectory import Samples
 Indices = NDArray[np.uint64]
 
 
-def kept(time_s: Samples, values: Samples, points: int) -> Indices:
+def select_samples(time_s: Samples, values: Samples, points: int) -> Indices:
     """Indices of at most `points` samples, shape (k,), in their order, the first and the last among them."""
     if len(time_s) <= points:
         return np.arange(len(time_s), dtype=np.uint64)
@@ -20,7 +20,7 @@ def kept(time_s: Samples, values: Samples, points: int) -> Indices:
     return chosen
 
 
-def bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
+def select_bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
     """Indices of samples, shape (k,), in their order, whose polyline passes every other sample within `tolerance`, in
     the unit of the values; the first and the last among them. The times ascend."""
     if len(time_s) < 3:

@@ -19,8 +19,8 @@ import numpy as np
 from app.core import calibration
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment
-from app.core.predictions import cost_of_an_offset
-from app.core.strategies.bias import corrected_by
+from app.core.predictions import offset_sensitivity
+from app.core.strategies.bias import correct_by_bias
 from app.core.trajectory import CHANNEL_UNITS
 from app.core.wording import percent
 
@@ -71,9 +71,9 @@ def transfer(
 
 def _agreement(experiment: ModelledExperiment, donor: Flight, own: Flight) -> tuple[float, float, float]:
     """Agreement as above, and the r.m.s. of b_B − b_A and of b_B, in the output's unit."""
-    theirs, ours = corrected_by(experiment, donor).bias, corrected_by(experiment, own).bias
+    theirs, ours = correct_by_bias(experiment, donor).bias, correct_by_bias(experiment, own).bias
     apart, whole = float(np.mean((ours - theirs) ** 2)), float(np.mean(ours**2))
-    scatter = (experiment.scatter.sd / cost_of_an_offset(experiment)) ** 2
+    scatter = (experiment.scatter.sd / offset_sensitivity(experiment)) ** 2
     unexplained = max(apart - 2.0 * scatter, 0.0)
     agreed = 1.0 - unexplained / whole if whole > unexplained else 0.0
     return (agreed if unexplained else 1.0), float(np.sqrt(apart)), float(np.sqrt(whole))

@@ -22,9 +22,9 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 from app.campaigns.states import CampaignState, Outcome
 from app.core.strategies.base import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
-from app.fleet.states import ACT_UNDER_WAY, ActKind, ActState, VehicleState
+from app.fleet.states import ACTIVE_ACT_STATES, ActKind, ActState, VehicleState
 from app.jobs.states import JobState
-from app.trials.states import UNDER_WAY, AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
+from app.trials.states import ACTIVE_STATES, AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
 JsonObject = dict[str, Any]
@@ -118,7 +118,7 @@ class VehicleRow(Base, Reported):
         return "vehicle", self.id, None
 
 
-_ACT_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACT_UNDER_WAY))
+_ACT_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_ACT_STATES))
 
 
 class VehicleActRow(Base, Reported):
@@ -308,7 +308,7 @@ class ControllerCheckRow(Base, Reported):
         return "check", self.id, None
 
 
-_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(UNDER_WAY))
+_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_STATES))
 
 
 class FlightRow(Base, Reported):

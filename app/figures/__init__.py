@@ -11,12 +11,12 @@ from app.figures.base import Figure
 from app.figures.errors import ErrorsFigure
 from app.figures.gains import GainsFigure
 from app.figures.history import History
-from app.figures.takeoffs import TakeoffsFigure
+from app.figures.takeoffs import TrajectoriesFigure
 from app.figures.theme import ThemeName
 
 CAMPAIGN_FIGURES: Final[Mapping[str, Callable[[History, ThemeName], Figure]]] = MappingProxyType(
     {
-        "takeoffs": TakeoffsFigure,
+        "takeoffs": TrajectoriesFigure,
         "errors": ErrorsFigure,
         "gains": GainsFigure,
     }

@@ -8,7 +8,7 @@ import numpy as np
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, literal, plotly_json
 from app.figures.history import Curve
-from app.figures.scale import outlined, robust_span, thinned
+from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 600
@@ -33,7 +33,7 @@ Drawn = tuple[int, ComparedCurve, Curve]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ComparingData:
+class ComparisonData:
     """At least two flights, at most 36: so many pairs of colour and dash there are."""
 
     output_title: str
@@ -44,14 +44,14 @@ class ComparingData:
 
 
 @dataclass(frozen=True, slots=True)
-class ComparingFigure:
+class ComparisonFigure:
     """Table columns: `time_s`, `set_point`, the flights by their letters (`a`, `b`, …), and `b_less_a` and so on.
 
     Every trace carries `meta`: `role` (set point, flight, difference, off scale) and, but for the set point, `trial`.
     A flight has the same colour and dash in both panels; no other has both in common with it.
     """
 
-    data: ComparingData
+    data: ComparisonData
     theme: ThemeName = "light"
     name: ClassVar[str] = "comparing"
     title: ClassVar[str] = "Curves compared"
@@ -119,7 +119,7 @@ class ComparingFigure:
         )
 
     def _set_point(self, palette: Palette) -> dict[str, object]:
-        x, y = outlined(self.data.set_point.time_s, self.data.set_point.values)
+        x, y = thin_by_bends(self.data.set_point.time_s, self.data.set_point.values)
         return {
             "type": "scatter",
             "mode": "lines",
@@ -159,7 +159,7 @@ class ComparingFigure:
         }
 
     def _line(self, palette: Palette, index: int, flight: ComparedCurve, role: str) -> dict[str, object]:
-        colour, dash = pen(palette, index)
+        colour, dash = line_style(palette, index)
         return {
             "type": "scatter",
             "mode": "lines",
@@ -204,7 +204,7 @@ class ComparingFigure:
         return Table((Column("time_s", "Time", "s", 2), *(column for column, _ in named)), rows)
 
 
-def pen(palette: Palette, index: int) -> tuple[str, str]:
+def line_style(palette: Palette, index: int) -> tuple[str, str]:
     """Colour and dash of the flight at that place; neighbours differ in both."""
     teal, orange, blue = palette.gains
     colours = (palette.ink, teal, orange, blue, palette.prediction, palette.bad)

@@ -12,7 +12,7 @@ from app.figures import theme
 from app.figures.history import Band, Curve, FlightData, History
 from app.figures.theme import Palette
 
-APART: Final = 30
+MAX_INDIVIDUAL_FLIGHTS: Final = 30
 """Up to so many flights each is drawn by itself."""
 MANY: Final = 120
 """From more flights than this on, marks over the flights' numbers are small and bare."""
@@ -33,10 +33,10 @@ class Envelope:
     flights: int
 
 
-def apart(history: History, chosen: int | None = None) -> frozenset[int]:
+def select_individual_flights(history: History, chosen: int | None = None) -> frozenset[int]:
     """Numbers of the flights with curves of their own: all of a few; of many the first, the best and those next to it,
     the latest, and the `chosen` one."""
-    if len(history.flights) <= APART:
+    if len(history.flights) <= MAX_INDIVIDUAL_FLIGHTS:
         return frozenset(flight.number for flight in history.flights)
     ranked = sorted(history.valid, key=lambda flight: (flight.error, flight.number))
     emphasised = [*history.flights[:1], *history.flights[-LATEST:], *ranked[: NEAR_BEST + 1]]
@@ -74,7 +74,7 @@ def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> l
         | {
             "name": name,
             "fill": "tonexty",
-            "fillcolor": theme.faint(palette.earlier, 0.3),
+            "fillcolor": theme.with_opacity(palette.earlier, 0.3),
             "meta": {"role": "envelope", "edge": "upper"},
         },
         quiet

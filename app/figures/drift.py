@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from app.core.drift import WATCHED, Fitted
+from app.core.drift import MONITORED_PARAMETERS, Fitted
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -67,7 +67,7 @@ class CalibrationFigure:
         )
 
     def _names(self) -> list[str]:
-        return [name for name in WATCHED if any(name in point.fitted for point in self.points)]
+        return [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
 
     def _panel(self, palette: Palette, index: int, name: str) -> dict[str, object]:
         shown = [point for point in self.points if name in point.fitted]

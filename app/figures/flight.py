@@ -10,7 +10,7 @@ from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
 from app.figures.history import Band, Curve, Range
 from app.figures.marks import band_traces, glitch_traces
-from app.figures.scale import outlined, robust_span, thinned
+from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 1200
@@ -144,7 +144,7 @@ class FlightFigure:
 def _line(
     name: str, curve: Curve, colour: str, width: float, role: str, hover: str | None, dash: str = "solid"
 ) -> dict[str, object]:
-    x, y = outlined(curve.time_s, curve.values) if hover is None else thinned(curve.time_s, curve.values, POINTS)
+    x, y = thin_by_bends(curve.time_s, curve.values) if hover is None else thinned(curve.time_s, curve.values, POINTS)
     reading: dict[str, object] = (
         {"hoverinfo": "skip"} if hover is None else {"hovertemplate": f"<b>{name}</b><br>{hover}<extra></extra>"}
     )

@@ -318,7 +318,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
         "yaxis": f"y{suffix}",
         "showscale": False,
         # Straight pieces: to place labels along smooth ones takes Plotly most of a second.
-        "line": {"width": 0.9, "color": theme.faint(palette.dim, 0.75), "smoothing": 0},
+        "line": {"width": 0.9, "color": theme.with_opacity(palette.dim, 0.75), "smoothing": 0},
     }
     ground = common | {
         "name": "Predicted error",

@@ -5,7 +5,7 @@ from typing import Final
 
 from app.figures import theme
 from app.figures.history import Band, Curve, Range
-from app.figures.scale import outlined, thinned
+from app.figures.scale import thin_by_bends, thinned
 from app.figures.theme import Palette
 
 GLITCH_POINTS: Final = 60
@@ -18,12 +18,12 @@ def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
     quiet: dict[str, object] = {
         "type": "scatter",
         "mode": "lines",
-        "line": theme.line(theme.faint(palette.prediction, 0.35), 0.75),
+        "line": theme.line(theme.with_opacity(palette.prediction, 0.35), 0.75),
         "hoverinfo": "skip",
         "legendgroup": "band",
         "legendrank": 900,
     }
-    lower, upper = (outlined(curve.time_s, curve.values) for curve in (band.lower, band.upper))
+    lower, upper = (thin_by_bends(curve.time_s, curve.values) for curve in (band.lower, band.upper))
     return [
         {
             **quiet,
@@ -39,7 +39,7 @@ def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
             "x": upper[0],
             "y": upper[1],
             "fill": "tonexty",
-            "fillcolor": theme.faint(palette.prediction, 0.14),
+            "fillcolor": theme.with_opacity(palette.prediction, 0.14),
             "meta": {"role": "band", "edge": "upper"},
         },
     ]

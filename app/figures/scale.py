@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.thinning import bends, kept
+from app.core.thinning import select_bends, select_samples
 from app.core.trajectory import Samples
 from app.figures.history import Range
 
@@ -56,19 +56,19 @@ def thinned(
 ) -> tuple[list[float], list[float]]:
     """At most `points` samples that keep the curve's look and its extremes, at 0.1 ms and 0.1 mm; a curve that stays
     below 1 keeps a digit more. With a `window` of seconds as many again inside it, up to its edges and just past."""
-    chosen = kept(time_s, values, points)
+    chosen = select_samples(time_s, values, points)
     if window is not None:
         first, end = window.slice_of(time_s)
-        inside = first + kept(time_s[first:end], values[first:end], points).astype(np.int64)
+        inside = first + select_samples(time_s[first:end], values[first:end], points).astype(np.int64)
         chosen = np.concatenate([chosen[chosen < first], inside.astype(np.uint64), chosen[chosen >= end]])
     return _short(time_s[chosen], values[chosen])
 
 
-def outlined(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
+def thin_by_bends(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
     """The samples at which a smooth curve bends, for a line that nobody points at."""
-    near = kept(time_s, values, SMOOTH_POINTS)
+    near = select_samples(time_s, values, SMOOTH_POINTS)
     time_s, values = time_s[near], values[near]
-    chosen = bends(time_s, values, SMOOTH * float(np.ptp(values)) if len(values) else 0.0)
+    chosen = select_bends(time_s, values, SMOOTH * float(np.ptp(values)) if len(values) else 0.0)
     return _short(time_s[chosen], values[chosen])
 
 

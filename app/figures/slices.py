@@ -11,7 +11,7 @@ NUMBER_ROOM: Final = (0.07, 0.075)
 """A flight's number takes this share of a slice's width and of its height."""
 _EDGE: Final = 0.03
 
-Spot = tuple[float, float]
+PlotPosition = tuple[float, float]
 
 
 def numbers(
@@ -36,7 +36,7 @@ def numbers(
     return [", ".join(map(str, sorted(told.pop(flight.number, [])))) for flight in flights]
 
 
-def spot(one: Slice, gains: Gains) -> Spot:
+def spot(one: Slice, gains: Gains) -> PlotPosition:
     """Where gains lie in a slice, as shares of its width and height."""
     x, y = (
         (gains[name] - values[0]) / (values[-1] - values[0])
@@ -50,7 +50,7 @@ def is_high(one: Slice, gains: Gains) -> bool:
     return spot(one, gains)[1] > 1.0 - NUMBER_ROOM[1]
 
 
-def _collide(one: Spot, other: Spot, count: int = 1) -> bool:
+def _collide(one: PlotPosition, other: PlotPosition, count: int = 1) -> bool:
     """Whether a number at `one` would touch the `count` numbers at `other`."""
     width, height = NUMBER_ROOM
     return abs(one[0] - other[0]) < width * (1 + count) / 2 and abs(one[1] - other[1]) < height

@@ -5,23 +5,23 @@ from typing import ClassVar, Final
 
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
-from app.figures.crowd import PERCENTILES, Envelope, apart, envelope_of, envelope_traces
+from app.figures.crowd import PERCENTILES, Envelope, envelope_of, envelope_traces, select_individual_flights
 from app.figures.history import Curve, FlightData, History
 from app.figures.marks import band_traces, glitch_traces
-from app.figures.scale import outlined, robust_span, thinned
+from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
 """Room above the set point, as a multiple of it, for the flight that is still to come."""
-ALIKE: Final = {"earlier": "Earlier", "invalid": "Not counted"}
+SHARED_LEGEND: Final = {"earlier": "Earlier", "invalid": "Not counted"}
 """Standings whose flights look alike and share an entry of the legend."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
 
 @dataclass(frozen=True, slots=True)
-class TakeoffsFigure:
+class TrajectoriesFigure:
     """Table columns: `time_s`, `set_point`, `reference` (where known), `envelope_lower`, `envelope_middle` and
     `envelope_upper` (of many flights), `flight_N` for each flight that is drawn by itself, and `prediction` (where
     there is one) with `prediction_lower` and `prediction_upper` (where its band is known), at those seconds of
@@ -46,7 +46,7 @@ class TakeoffsFigure:
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history
-        emphasised = apart(history, history.chosen)
+        emphasised = select_individual_flights(history, history.chosen)
         recorded = [flight for flight in history.flights if flight.curve is not None and len(flight.curve.time_s)]
         drawn = [flight for flight in recorded if flight.number in emphasised]
         envelope = envelope_of(recorded, self._lasts_s) if len(drawn) < len(recorded) else None
@@ -131,7 +131,7 @@ class TakeoffsFigure:
             line=_style(palette, standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
-            showlegend=standing not in ALIKE,
+            showlegend=standing not in SHARED_LEGEND,
             meta={"role": "flight", "trial": flight.number, "standing": standing},
             hovertemplate=f"<b>Flight {label}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
             f"{self.history.output_unit}{error}<extra></extra>",
@@ -153,7 +153,7 @@ class TakeoffsFigure:
                 "legendrank": 800,
                 "hoverinfo": "skip",
             }
-            for standing, name in ALIKE.items()
+            for standing, name in SHARED_LEGEND.items()
             if standing in standings
         ]
 
@@ -255,7 +255,7 @@ def _rounded(time_s: float, curves: list[Curve]) -> list[Cell]:
 
 
 def _goal(name: str, curve: Curve, **style: object) -> dict[str, object]:
-    x, y = outlined(curve.time_s, curve.values)
+    x, y = thin_by_bends(curve.time_s, curve.values)
     return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "hoverinfo": "skip", **style}
 
 

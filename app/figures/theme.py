@@ -107,7 +107,7 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
     }
 
 
-def faint(colour: str, opacity: float) -> str:
+def with_opacity(colour: str, opacity: float) -> str:
     """A hex colour as a see-through one."""
     red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity:g})"

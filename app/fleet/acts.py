@@ -16,22 +16,28 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.access import Act
+from app.access import Permission
 from app.core.policy import Gains
 from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.errors import ConflictError
 from app.fleet import repository
-from app.fleet.control import Asker, record_act, require_may, require_may_command, require_no_other
+from app.fleet.control import (
+    RequestContext,
+    record_act,
+    require_may,
+    require_may_command,
+    require_not_controlled_by_other,
+)
 from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
-from app.fleet.service import hold_gains, move_vehicle, require_idle
-from app.fleet.states import ACT_MOVES, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
+from app.fleet.service import hold_gains, require_idle, set_vehicle_state
+from app.fleet.states import ACT_TRANSITIONS, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
 from app.fleet.views import act_view, is_linked_or_wanted, vehicle_view
-from app.moves import check_action, check_move
+from app.moves import check_action, check_transition
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
-BEGINS_WITHIN: Final = timedelta(seconds=10)
+REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """How old a request may be when a worker takes it."""
 BY_WORKER: Final = "the worker"
 
@@ -39,7 +45,7 @@ _WITHDRAWN: Final = {
     ActState.REQUESTED: "It was not begun: the worker was away when it was asked for.",
     ActState.RUNNING: "It was not finished: the worker ended.",
 }
-_LOOKS_ONLY: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
+_READ_ONLY_ACTS: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
 """Acts that change nothing on the vehicle, and so are open to everybody."""
 
 
@@ -66,7 +72,7 @@ class ActTask:
     vehicle: LinkedVehicle
 
 
-def ask_vehicle(session: Session, vehicle_id: int, kind: ActKind, asker: Asker) -> VehicleAct:
+def request_act(session: Session, vehicle_id: int, kind: ActKind, asker: RequestContext) -> VehicleAct:
     """What a person asks. Raises ConflictError in states in which it is not possible or while somebody else is in
     control, BusyError while something else is under way, NotAllowedError for who may not command it."""
     row = repository.get_one(session, vehicle_id)
@@ -77,12 +83,12 @@ def ask_vehicle(session: Session, vehicle_id: int, kind: ActKind, asker: Asker) 
     return act_view(_requested(session, row, kind, asker))
 
 
-def require_may_stop_motors(session: Session, vehicle_id: int, asker: Asker) -> None:
+def require_may_stop_motors(session: Session, vehicle_id: int, asker: RequestContext) -> None:
     """Raises NotAllowedError for who may not command a real vehicle, NotFoundError."""
-    require_may(Act.STOP, repository.get_one(session, vehicle_id), asker)
+    require_may(Permission.STOP, repository.get_one(session, vehicle_id), asker)
 
 
-def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: Asker) -> Vehicle:
+def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: RequestContext) -> Vehicle:
     """Out of quarantine, on a person's word; a registered vehicle once the worker has seen it disarmed and holding its
     safe gains. Raises as `ask_vehicle` does."""
     row = repository.get_one(session, vehicle_id)
@@ -90,22 +96,24 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: As
         _requested(session, row, ActKind.RELEASE, asker, reason=statement)
         return vehicle_view(row)
     check_action(ACTIONS, "release", row.state, row.name)
-    by = require_no_other(row, asker)
+    by = require_not_controlled_by_other(row, asker)
     record_act(session, row, ActKind.RELEASE, by=by, reason=statement)
-    vehicle_released(session, row.id)
+    record_released(session, row.id)
     session.flush()
     return vehicle_view(row)
 
 
-def _requested(session: Session, row: VehicleRow, kind: ActKind, asker: Asker, *, reason: str = "") -> VehicleActRow:
+def _requested(
+    session: Session, row: VehicleRow, kind: ActKind, asker: RequestContext, *, reason: str = ""
+) -> VehicleActRow:
     check_action(ACTIONS, kind, row.state, row.name)
     if kind == ActKind.DISCONNECT:
-        require_may(Act.STOP, row, asker)
+        require_may(Permission.STOP, row, asker)
         if not is_linked_or_wanted(row):
             raise ConflictError(f"{row.name} is neither connected nor looked for.", hint="Connect it, if it is wanted.")
     else:
         require_may_command(row, asker)
-    by = "" if kind in _LOOKS_ONLY else require_no_other(row, asker)
+    by = "" if kind in _READ_ONLY_ACTS else require_not_controlled_by_other(row, asker)
     require_idle(session, row)
     if kind in {ActKind.CONNECT, ActKind.DISCONNECT}:
         row.wanted_connected = kind == ActKind.CONNECT
@@ -130,11 +138,11 @@ def claim_act(session: Session, worker: str) -> ActTask | None:
     """The act that has waited longest, now this worker's; None when none waits. One that could not be begun within
     10 s is given up: nothing happens later than its operator expects it."""
     while (act := repository.first_requested_act(session)) is not None:
-        if utc_now() - act.requested_at <= BEGINS_WITHIN:
+        if utc_now() - act.requested_at <= REQUEST_TIMEOUT:
             _move(act, ActState.RUNNING)
             act.worker, act.claimed_at = worker, utc_now()
             return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(act.vehicle))
-        _end(act, problem=f"It could not be begun within {BEGINS_WITHIN.total_seconds():g} s. Ask again.")
+        _end(act, problem=f"It could not be begun within {REQUEST_TIMEOUT.total_seconds():g} s. Ask again.")
     return None
 
 
@@ -173,7 +181,7 @@ def withdraw_acts(session: Session) -> list[int]:
 def forget_connections(session: Session) -> None:
     """At a worker's start: nobody has a link to any vehicle. One that is quarantined stays so."""
     for row in repository.registered_in(session, VehicleState.READY):
-        move_vehicle(row, VehicleState.DISCONNECTED)
+        set_vehicle_state(row, VehicleState.DISCONNECTED)
 
 
 def request_reconnections(session: Session) -> list[int]:
@@ -181,7 +189,7 @@ def request_reconnections(session: Session) -> list[int]:
     return [_add(session, row, ActKind.CONNECT, by=BY_WORKER).id for row in _wanted(session)]
 
 
-def wanted_links(session: Session) -> list[LinkedVehicle]:
+def list_vehicles_to_reconnect(session: Session) -> list[LinkedVehicle]:
     """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it."""
     rows = _wanted(session)
     return [_linked(row) for row in rows if repository.flight_under_way(session, row.id) is None]
@@ -192,7 +200,7 @@ def _wanted(session: Session) -> list[VehicleRow]:
     return [row for row in rows if row.wanted_connected and repository.act_under_way(session, row.id) is None]
 
 
-def vehicle_found(
+def record_reconnected(
     session: Session, vehicle_id: int, identity: Identity, *, concern: str, held: Mapping[str, float]
 ) -> bool:
     """A vehicle that was wanted connected is there again; False for one that is not wanted any more, and stays
@@ -201,14 +209,14 @@ def vehicle_found(
     if not row.wanted_connected:
         return False
     read_back = dict(held) or None
-    vehicle_connected(session, vehicle_id, identity, concern=concern, held=read_back)
+    record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
     given = dict(row.safe_gains) if _was_given(row, read_back) else None
     act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=given)
     act.read_back = read_back
     return True
 
 
-def vehicle_connected(
+def record_connected(
     session: Session,
     vehicle_id: int,
     identity: Identity,
@@ -234,7 +242,7 @@ def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
     _pin(repository.get_one(session, vehicle_id), identity)
 
 
-def vehicle_gone(session: Session, vehicle_id: int, *, concern: str = "") -> None:
+def record_disconnected(session: Session, vehicle_id: int, *, concern: str = "") -> None:
     """The link is closed. A concern outlives that: when it is connected again, the vehicle is quarantined."""
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
@@ -248,7 +256,7 @@ def quarantine_vehicle(session: Session, vehicle_id: int, concern: str) -> None:
     _move_to(row, VehicleState.QUARANTINED)
 
 
-def vehicle_released(session: Session, vehicle_id: int, *, identity: Identity | None = None) -> None:
+def record_released(session: Session, vehicle_id: int, *, identity: Identity | None = None) -> None:
     """A person's word is carried out. `identity`: who answers now, which that person has accepted."""
     row = repository.get_one(session, vehicle_id)
     row.concern = ""
@@ -268,7 +276,7 @@ def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]
     row.checks, row.checked_at = [asdict(check) for check in checks], utc_now()
 
 
-def record_order(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:
+def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:
     """After the fact: the vehicle was told to land, or its motors to stop."""
     row = repository.get_one(session, vehicle_id)
     act = record_act(session, row, kind, by="", reason=reason)
@@ -305,11 +313,11 @@ def _pin(row: VehicleRow, identity: Identity) -> None:
 
 def _move_to(row: VehicleRow, state: VehicleState) -> None:
     if row.state != state:
-        move_vehicle(row, state)
+        set_vehicle_state(row, state)
 
 
 def _move(act: VehicleActRow, to: ActState) -> None:
-    act.state = check_move(ACT_MOVES, act.state, to, f"Act {act.id}")
+    act.state = check_transition(ACT_TRANSITIONS, act.state, to, f"Act {act.id}")
 
 
 def _end(act: VehicleActRow, *, problem: str, still_wanted: bool = False) -> None:

@@ -13,7 +13,7 @@ from typing import Final
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
-from app.access import COMMAND_LINE, Act, Caller, require
+from app.access import COMMAND_LINE, Caller, Permission, require
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.errors import ConflictError, NotAllowedError
@@ -26,7 +26,7 @@ LEASE: Final = timedelta(seconds=15)
 
 
 @dataclass(frozen=True, slots=True)
-class Asker:
+class RequestContext:
     """Where a request comes from: the lease's token that it carries, who sent it and from where, whether a page of ours
     did, and the hosts that the administrator says simulate vehicles."""
 
@@ -36,7 +36,7 @@ class Asker:
     simulation_hosts: frozenset[str] = frozenset()
 
 
-NOBODY: Final = Asker()
+LOCAL_CLI: Final = RequestContext()
 """Somebody at this computer's command line, who is in control of nothing."""
 
 
@@ -47,7 +47,7 @@ def control_of(row: VehicleRow) -> Control | None:
     return Control(operator=row.operator, until=row.operator_until)
 
 
-def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, asker: Asker) -> Lease:
+def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, asker: RequestContext) -> Lease:
     """A new lease, or the same one renewed by its token; with `take_over` also somebody else's, which an act records.
 
     Raises ConflictError naming who is in control, or saying that the token's lease is no longer there; NotAllowedError
@@ -87,7 +87,7 @@ def holds(row: VehicleRow, token: str) -> bool:
     return row.operator_token_hash is not None and hmac.compare_digest(row.operator_token_hash, _digest(token))
 
 
-def require_no_other(row: VehicleRow, asker: Asker) -> str:
+def require_not_controlled_by_other(row: VehicleRow, asker: RequestContext) -> str:
     """The operator who asks, empty when nobody is in control. Raises ConflictError when somebody else is."""
     if (held := control_of(row)) is None:
         return ""
@@ -99,28 +99,28 @@ def require_no_other(row: VehicleRow, asker: Asker) -> str:
     return held.operator
 
 
-def require_control(row: VehicleRow, asker: Asker) -> str:
+def require_control(row: VehicleRow, asker: RequestContext) -> str:
     """The operator in control, who asks from a page of ours in an unlocked browser on this computer: the only one who
     may have a real vehicle take off. Raises NotAllowedError or ConflictError otherwise."""
-    require(Act.TAKE_OFF, asker.caller, row.name)
+    require(Permission.TAKE_OFF, asker.caller, row.name)
     if not asker.from_our_page:
         raise NotAllowedError(
             f"{row.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
             hint="A script can propose gains and stage the flight; the operator then holds the button on the fly page.",
         )
-    operator = require_no_other(row, asker)
+    operator = require_not_controlled_by_other(row, asker)
     if not operator:
         raise ConflictError(f"Nobody is in control of {row.name}.", hint="Take control on the fly page first.")
     return operator
 
 
-def require_may_command(row: VehicleRow, asker: Asker) -> None:
+def require_may_command(row: VehicleRow, asker: RequestContext) -> None:
     """Raises NotAllowedError for who may not command a vehicle that has a link; simulations without one are for all."""
     if row.registered:
-        require(Act.REAL if row.is_real else Act.LINK, asker.caller, row.name)
+        require(Permission.REAL if row.is_real else Permission.LINK, asker.caller, row.name)
 
 
-def require_may(act: Act, row: VehicleRow, asker: Asker) -> None:
+def require_may(act: Permission, row: VehicleRow, asker: RequestContext) -> None:
     """Raises NotAllowedError for who may not do this with a real vehicle that has a link; any other is for all."""
     if row.registered and row.is_real:
         require(act, asker.caller, row.name)

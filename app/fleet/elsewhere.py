@@ -17,7 +17,7 @@ _KIND: Final = "origin"
 _NAME: Final = "origin_name"
 
 
-def vehicle_elsewhere(
+def get_or_create_imported_vehicle(
     session: Session, *, name: str, kind: str, is_real: bool, safe_gains: Mapping[str, float]
 ) -> VehicleRow:
     """The one that stands for a vehicle of that name and kind, made when it is wanted first.

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 from sqlalchemy.orm import Session
 
-from app.access import Act, require
+from app.access import Permission, require
 from app.core.experiments import get_experiment
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
 from app.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.fleet import repository
-from app.fleet.control import Asker, record_act, require_may_command, require_no_other
+from app.fleet.control import RequestContext, record_act, require_may_command, require_not_controlled_by_other
 from app.fleet.kinds import is_registered_one_by_one, settings_of
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
@@ -22,7 +22,7 @@ from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 
-def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle:
+def register_vehicle(session: Session, new: NewVehicle, asker: RequestContext) -> Vehicle:
     """A vehicle of its own, not connected yet.
 
     Raises InputError naming what cannot be used, ConflictError when the name is taken, UnconfirmedError when nobody has
@@ -35,14 +35,14 @@ def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle
             hint=f"Create a campaign with the vehicle {kind.name}.",
             problems=(Problem("kind", "has no vehicles of its own"),),
         )
-    require(Act.LINK, asker.caller, new.name)
+    require(Permission.LINK, asker.caller, new.name)
     options = kind.check(new.options, field="options", simulation_hosts=asker.simulation_hosts)
     is_real = kind.is_real_with(options, asker.simulation_hosts)
     space = _space(kind, options, new.safe_gains)
     gains = space.check(new.safe_gains, field="safe_gains") if new.safe_gains else space.mapping(space.default)
     _require_free(session, new.name)
     if is_real:
-        require(Act.REAL, asker.caller, new.name)
+        require(Permission.REAL, asker.caller, new.name)
         _require_confirmed(new, gains)
     row = VehicleRow(
         kind=kind.name,
@@ -60,7 +60,7 @@ def register_vehicle(session: Session, new: NewVehicle, asker: Asker) -> Vehicle
     return vehicle_view(row)
 
 
-def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: Asker) -> Vehicle:
+def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: RequestContext) -> Vehicle:
     """Raises ConflictError when somebody else was faster or is in control, or the vehicle is not at rest; InputError
     naming what cannot be used, NotAllowedError for who may not command the vehicle."""
     row = repository.get_one(session, vehicle_id)
@@ -69,7 +69,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: As
     require_may_command(row, asker)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
-    by = require_no_other(row, asker)
+    by = require_not_controlled_by_other(row, asker)
     if edit.options is not None:
         _set_options(row, edit.options, asker)
     if edit.safe_gains is not None:
@@ -86,7 +86,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: As
 
 
 def promote_gains(
-    session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, asker: Asker
+    session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, asker: RequestContext
 ) -> None:
     """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
     check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
@@ -94,7 +94,7 @@ def promote_gains(
     require_may_command(row, asker)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
-    _set_safe_gains(session, row, gains, statement=reason, by=require_no_other(row, asker))
+    _set_safe_gains(session, row, gains, statement=reason, by=require_not_controlled_by_other(row, asker))
     row.version += 1
 
 
@@ -110,7 +110,7 @@ def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, 
     return {field: (getattr(row, field), value) for field, value in sent.items()}
 
 
-def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: Asker) -> None:
+def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: RequestContext) -> None:
     kind = VEHICLE_KINDS[row.kind]
     options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=asker.simulation_hosts)
     if options == settings_of(row):

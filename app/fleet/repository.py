@@ -10,8 +10,8 @@ from app.db.models import FlightRow, VehicleActRow, VehicleRow
 from app.db.paging import Position, instant
 from app.db.types import UtcDateTime
 from app.errors import NotFoundError
-from app.fleet.states import ACT_UNDER_WAY, GIVES_GAINS, ActKind, ActState, VehicleState
-from app.trials.states import UNDER_WAY
+from app.fleet.states import ACTIVE_ACT_STATES, GIVES_GAINS, ActKind, ActState, VehicleState
+from app.trials.states import ACTIVE_STATES
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 Line = tuple[str, int]
@@ -54,7 +54,9 @@ def registered_in(session: Session, *states: VehicleState) -> Sequence[VehicleRo
 
 
 def flight_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
-    return session.scalar(select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(UNDER_WAY)))
+    return session.scalar(
+        select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(ACTIVE_STATES))
+    )
 
 
 def get_act(session: Session, act_id: int) -> VehicleActRow:
@@ -66,11 +68,11 @@ def get_act(session: Session, act_id: int) -> VehicleActRow:
 
 def act_under_way(session: Session, vehicle_id: int) -> VehicleActRow | None:
     wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
-    return session.scalar(wanted.where(VehicleActRow.state.in_(ACT_UNDER_WAY)))
+    return session.scalar(wanted.where(VehicleActRow.state.in_(ACTIVE_ACT_STATES)))
 
 
 def acts_under_way(session: Session) -> Sequence[VehicleActRow]:
-    return session.scalars(select(VehicleActRow).where(VehicleActRow.state.in_(ACT_UNDER_WAY))).all()
+    return session.scalars(select(VehicleActRow).where(VehicleActRow.state.in_(ACTIVE_ACT_STATES))).all()
 
 
 def first_requested_act(session: Session) -> VehicleActRow | None:

@@ -7,7 +7,18 @@ from starlette.concurrency import run_in_threadpool
 
 from app import access
 from app.access import is_allowed
-from app.api.deps import Act, Asking, CurrentDatabase, CursorText, Id, Limit, Live, Reader, Writer, json_only
+from app.api.deps import (
+    CurrentDatabase,
+    CursorText,
+    Id,
+    IdempotentPost,
+    Limit,
+    Live,
+    Reader,
+    RequestContextDep,
+    Writer,
+    json_only,
+)
 from app.campaigns import service as campaigns
 from app.fleet import acts, control, registering, service, views
 from app.fleet.schemas import (
@@ -37,7 +48,7 @@ def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None)
 
 
 @router.post("", status_code=status.HTTP_201_CREATED)
-def register_vehicle(act: Act, asking: Asking, body: NewVehicle) -> Vehicle:
+def register_vehicle(act: IdempotentPost, asking: RequestContextDep, body: NewVehicle) -> Vehicle:
     """Register a vehicle that the program keeps a link to. Whether it is REAL follows from its settings."""
     return act(Vehicle, lambda session: registering.register_vehicle(session, body, asking))
 
@@ -48,7 +59,7 @@ def get_vehicle(session: Reader, vehicle_id: Id) -> Vehicle:
 
 
 @router.patch("/{vehicle_id}")
-def edit_vehicle(session: Writer, asking: Asking, vehicle_id: Id, body: VehicleEdit) -> Vehicle:
+def edit_vehicle(session: Writer, asking: RequestContextDep, vehicle_id: Id, body: VehicleEdit) -> Vehicle:
     """Change a registered vehicle's name, settings, battery or safe gains, while it is at rest."""
     edited = registering.edit_vehicle(session, vehicle_id, body, asking)
     if body.safe_gains is not None:
@@ -57,33 +68,33 @@ def edit_vehicle(session: Writer, asking: Asking, vehicle_id: Id, body: VehicleE
 
 
 @router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)
-def connect_vehicle(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+def connect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Open the link, and keep it open; the vehicle's safe gains are written and read back, unless it is armed."""
-    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.CONNECT, asking))
+    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.CONNECT, asking))
 
 
 @router.post("/{vehicle_id}/disconnect", status_code=status.HTTP_202_ACCEPTED)
-def disconnect_vehicle(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+def disconnect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Close the link."""
-    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.DISCONNECT, asking))
+    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.DISCONNECT, asking))
 
 
 @router.post("/{vehicle_id}/check", status_code=status.HTTP_202_ACCEPTED)
-def check_vehicle(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+def check_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Look at everything that has to be so before a flight."""
-    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.CHECK, asking))
+    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.CHECK, asking))
 
 
 @router.post("/{vehicle_id}/restore", status_code=status.HTTP_202_ACCEPTED)
-def restore_safe_gains(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+def restore_safe_gains(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Write the safe gains and read them back."""
-    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.RESTORE, asking))
+    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.RESTORE, asking))
 
 
 @router.post("/{vehicle_id}/parameters", status_code=status.HTTP_202_ACCEPTED)
-def read_parameters(act: Act, asking: Asking, vehicle_id: Id) -> VehicleAct:
+def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Read every parameter of the vehicle; they are in the act's result."""
-    return act(VehicleAct, lambda session: acts.ask_vehicle(session, vehicle_id, ActKind.PARAMETERS, asking))
+    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.PARAMETERS, asking))
 
 
 @router.get("/{vehicle_id}/acts")
@@ -106,16 +117,16 @@ async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = N
 
 @router.post("/{vehicle_id}/motors-off", status_code=status.HTTP_202_ACCEPTED)
 async def stop_motors(
-    live: Live, database: CurrentDatabase, asking: Asking, vehicle_id: Id, body: VehicleOrder | None = None
+    live: Live, database: CurrentDatabase, asking: RequestContextDep, vehicle_id: Id, body: VehicleOrder | None = None
 ) -> OrderAnswer:
     """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage,
     unless whoever asks may not command real vehicles: then the database says whether it is one."""
-    if not is_allowed(access.Act.STOP, asking.caller):
+    if not is_allowed(access.Permission.STOP, asking.caller):
         await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The vehicle is told to stop its motors.")
 
 
-def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: Asking) -> None:
+def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: RequestContextDep) -> None:
     with database.read() as session:
         acts.require_may_stop_motors(session, vehicle_id, asking)
 
@@ -129,19 +140,19 @@ async def _order(
 
 
 @router.post("/{vehicle_id}/release")
-def release_vehicle(act: Act, asking: Asking, vehicle_id: Id, body: Release) -> Vehicle:
+def release_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id, body: Release) -> Vehicle:
     """Take a vehicle out of quarantine, on the word of a person who has looked at it. One with a link is released once
     it is seen to be disarmed and to hold its safe gains; the act says what came of that."""
     return act(Vehicle, lambda session: acts.release_vehicle(session, vehicle_id, body.statement, asking))
 
 
 @router.put("/{vehicle_id}/control")
-def take_control(session: Writer, asking: Asking, vehicle_id: Id, body: LeaseRequest) -> Lease:
+def take_control(session: Writer, asking: RequestContextDep, vehicle_id: Id, body: LeaseRequest) -> Lease:
     """Take control for 15 s, or renew it with one's token; a take-over from somebody else is recorded as an act."""
     return control.take_control(session, vehicle_id, body, asking)
 
 
 @router.delete("/{vehicle_id}/control", status_code=status.HTTP_204_NO_CONTENT)
-def give_up_control(session: Writer, asking: Asking, vehicle_id: Id) -> None:
+def give_up_control(session: Writer, asking: RequestContextDep, vehicle_id: Id) -> None:
     """Hand over: nobody is in control afterwards."""
     control.give_up_control(session, vehicle_id, asking.token)

@@ -17,98 +17,107 @@ from typing import Final
 
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
-from app.fleet.session import Answered, Asked, Call, Connected, FromSeat, Obeyed, Ordered, ToSeat
+from app.fleet.session import (
+    CommandForwarded,
+    ConnectionOpened,
+    ConnectionRequest,
+    FromVehicleProcess,
+    ToVehicleProcess,
+    VehicleCommand,
+    VehicleRequest,
+    VehicleResponse,
+)
 from app.fleet.states import ActKind
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.trials.crew import (
-    Decline,
-    Free,
-    Landed,
-    Orders,
-    Restored,
-    Staged,
-    StandDown,
-    TakeOff,
-    as_asked,
-    in_control,
-    mistake,
-    trouble,
+    CancelFlight,
+    CancelTakeOff,
+    FlightFinished,
+    FlightLanded,
+    FlightRequest,
+    GainsStaged,
+    SafeGainsRestored,
+    TakeOffCommand,
+    failure_from,
+    hold_vehicle_lock,
+    internal_error,
+    mark_if_requested,
 )
-from app.trials.flying import Monitor
-from app.vehicles.base import ConnectedVehicle, FlightRecord, Stop
+from app.trials.flying import FlightMonitor
+from app.vehicles.base import ConnectedVehicle, FlightRecord, StopRequest
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, restore_safe_gains
 
-LOOK_EVERY_S: Final = 0.005
-SHOW_EVERY_S: Final = 0.2
-GONE_AFTER_S: Final = 3.0
+POLL_INTERVAL_S: Final = 0.005
+STATUS_INTERVAL_S: Final = 0.2
+LOST_AFTER_S: Final = 3.0
 """Without a heartbeat for so long, a vehicle is shown as gone."""
-CONTROL_WITHIN_S: Final = 120.0
+LOCK_TIMEOUT_S: Final = 120.0
 """How long a session waits for the one of a worker that was killed: it may be landing, or waiting for a lost link."""
-LOOK_AGAIN_S: Final = 2.0
-_LATE: Final = "It came too late, when whoever asked had been told that it could not be; it was not passed on."
+RECONNECT_INTERVAL_S: Final = 2.0
+_EXPIRED: Final = "It came too late, when whoever asked had been told that it could not be; it was not passed on."
 
 
-class WorkerGoneError(Exception):
+class PipeClosedError(Exception):
     """The pipe is broken: nobody keeps the books any more."""
 
 
-class Line:
+class WorkerPipe:
     """The process's end of the pipe. Once it is broken, `hear` says so; `show` and `say` are for nobody then."""
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
 
-    def hear(self) -> ToSeat | None:
+    def hear(self) -> ToVehicleProcess | None:
         """The next message; None when there is none. Raises WorkerGoneError."""
         try:
             return self._pipe.recv() if self._pipe.poll() else None
         except (EOFError, OSError) as error:
-            raise WorkerGoneError from error
+            raise PipeClosedError from error
 
     def is_open(self) -> bool:
         """To be asked while nothing is to be heard. Raises WorkerGoneError rather than say no."""
         self.hear()
         return True
 
-    def say(self, message: FromSeat) -> None:
+    def say(self, message: FromVehicleProcess) -> None:
         with suppress(OSError):
             self._pipe.send(message)
 
-    def show(self, message: FromSeat) -> None:
+    def show(self, message: FromVehicleProcess) -> None:
         """Say it if it can be said at once."""
         with suppress(OSError, ValueError):
             if select.select([], [self._pipe], [], 0.0)[1]:
                 self._pipe.send(message)
 
 
-def work(pipe: Connection, call: Call) -> None:
+def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
     """The process, from connecting until the worker closes the pipe or dies, or the link fails."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    line = Line(pipe)
+    line = WorkerPipe(pipe)
     try:
-        with in_control(call.lock, within_s=CONTROL_WITHIN_S, wanted=line.is_open, clock=call.clock):
-            seat = Seat(line, call)
+        with hold_vehicle_lock(call.lock, within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock):
+            seat = VehicleProcess(line, call)
             try:
                 seat.work()
             finally:
                 seat.leave()
-    except WorkerGoneError:
+    except PipeClosedError:
         pass
     except GainlineError as error:
-        line.say(trouble(error))
+        line.say(failure_from(error))
     except Exception as error:  # noqa: BLE001 - the edge of the process; the worker's log says it
-        line.say(mistake(error))
+        line.say(internal_error(error))
     finally:
         pipe.close()
         os._exit(0)
 
 
-class Seat:
+class VehicleProcess:
     """One vehicle under control."""
 
-    def __init__(self, line: Line, call: Call) -> None:
+    def __init__(self, line: WorkerPipe, call: ConnectionRequest) -> None:
         """Raises VehicleError when the vehicle does not answer."""
         self._line, self._call = line, call
         self._speed = float(call.options.get("clock_speed", 1.0))
@@ -116,18 +125,18 @@ class Seat:
         self._vehicle = self._found()
         self._show_due_s = 0.0
         self._trial_id: int | None = None
-        self._stop: Stop | None = None
+        self._stop: StopRequest | None = None
         self._is_worker_gone = False
-        line.say(Connected(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
+        line.say(ConnectionOpened(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
 
     def work(self) -> None:
         """Do what is asked, one thing after the other. Raises WorkerGoneError at the end, VehicleError when the link
         fails."""
         while True:
             match self._next():
-                case Orders() as orders:
+                case FlightRequest() as orders:
                     self._fly(orders)
-                case Asked() as asked:
+                case VehicleRequest() as asked:
                     self._line.say(self._act(asked))
                 case _:
                     continue  # of a flight that is over
@@ -144,9 +153,9 @@ class Seat:
             except VehicleError as error:
                 if not self._call.patient or isinstance(error, SafeGainsError):
                     raise
-            for _ in range(round(LOOK_AGAIN_S / LOOK_EVERY_S)):
+            for _ in range(round(RECONNECT_INTERVAL_S / POLL_INTERVAL_S)):
                 self._line.hear()
-                self._call.clock.wait_s(LOOK_EVERY_S)
+                self._call.clock.wait_s(POLL_INTERVAL_S)
 
     def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
         connect = get_kind(self._call.kind).connect
@@ -160,39 +169,39 @@ class Seat:
         if not vehicle.concern:
             self._identity = vehicle.identity
 
-    def _next(self) -> ToSeat:
+    def _next(self) -> ToVehicleProcess:
         """The worker's next message that is no order, listening to the vehicle meanwhile."""
         while (message := self._heed()) is None:
-            self._vehicle.attend(LOOK_EVERY_S * self._speed)
+            self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             self._show()
         return message
 
-    def _heed(self) -> ToSeat | None:
+    def _heed(self) -> ToVehicleProcess | None:
         """Pass an order on at once; any other message is returned."""
         message = self._line.hear()
-        if not isinstance(message, Ordered):
+        if not isinstance(message, VehicleCommand):
             return message
         self._obey(message)
         return None
 
-    def _obey(self, ordered: Ordered) -> None:
-        problem = _LATE if self._is_late(ordered) else ""
+    def _obey(self, ordered: VehicleCommand) -> None:
+        problem = _EXPIRED if self._is_late(ordered) else ""
         if not problem:
             try:
                 act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
                 act(ordered.reason)
             except VehicleError as error:
                 problem = str(error)
-        self._line.say(Obeyed(ordered.order, ordered.reason, problem))
+        self._line.say(CommandForwarded(ordered.order, ordered.reason, problem))
 
     @staticmethod
-    def _is_late(ordered: Ordered) -> bool:
+    def _is_late(ordered: VehicleCommand) -> bool:
         return time.monotonic() > ordered.by_s
 
     def _show(self) -> None:
         now_s = self._call.clock.now_s()
         if now_s >= self._show_due_s:
-            self._show_due_s = max(self._show_due_s + SHOW_EVERY_S, now_s)
+            self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
             self._line.show(self._status())
 
     def _status(self) -> VehicleStatus:
@@ -201,7 +210,7 @@ class Seat:
         age_s = condition.heartbeat_age_s
         return VehicleStatus(
             vehicle_id=self._call.vehicle_id,
-            state="gone" if age_s is None or age_s > GONE_AFTER_S * self._speed else "connected",
+            state="gone" if age_s is None or age_s > LOST_AFTER_S * self._speed else "connected",
             at=dt.datetime.now(dt.UTC).isoformat(),
             concern=self._vehicle.concern,
             **known | {"held": dict(condition.held)},
@@ -212,17 +221,17 @@ class Seat:
 
     # ---- acts
 
-    def _act(self, asked: Asked) -> Answered:
+    def _act(self, asked: VehicleRequest) -> VehicleResponse:
         try:
             if self._vehicle.condition().armed:  # whatever takes time would keep Land waiting
                 raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
             self._have(asked.safe_gains)
             answer = self._acted(asked.kind)
         except VehicleError as error:
-            return Answered(problem=str(error), concern=self._vehicle.concern, held=self._held())
+            return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
         return answer
 
-    def _acted(self, kind: ActKind) -> Answered:
+    def _acted(self, kind: ActKind) -> VehicleResponse:
         checks, parameters = None, None
         match kind:
             case ActKind.CHECK:
@@ -236,7 +245,7 @@ class Seat:
             case _:
                 raise VehicleError(f"A session cannot carry out “{kind}”.", hint="Report this with the worker's log.")
         self._pin(self._vehicle)
-        return Answered(
+        return VehicleResponse(
             concern=self._vehicle.concern,
             held=self._held(),
             checks=checks,
@@ -256,29 +265,29 @@ class Seat:
 
     # ---- flights
 
-    def _fly(self, orders: Orders) -> None:
+    def _fly(self, orders: FlightRequest) -> None:
         self._trial_id, self._stop = orders.trial_id, None
         try:
             self._have(orders.safe_gains)
             with self._logged(orders):
                 try:
-                    self._line.say(Staged(self._vehicle.stage(orders.gains)))
+                    self._line.say(GainsStaged(self._vehicle.stage(orders.gains)))
                     if self._is_cleared():
-                        self._line.say(Landed(self._take_off(orders)))
+                        self._line.say(FlightLanded(self._take_off(orders)))
                 finally:
-                    self._line.say(Restored(restore_safe_gains(self._vehicle)))
+                    self._line.say(SafeGainsRestored(restore_safe_gains(self._vehicle)))
         except GainlineError as error:
-            self._line.say(trouble(error))
-        except WorkerGoneError:
+            self._line.say(failure_from(error))
+        except PipeClosedError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
-            self._line.say(mistake(error))
+            self._line.say(internal_error(error))
         finally:
             self._trial_id = None
-        self._line.say(Free())
+        self._line.say(FlightFinished())
 
     @contextmanager
-    def _logged(self, orders: Orders) -> Iterator[None]:
+    def _logged(self, orders: FlightRequest) -> Iterator[None]:
         self._vehicle.log_to(orders.tlog)
         try:
             yield
@@ -287,17 +296,17 @@ class Seat:
 
     def _is_cleared(self) -> bool:
         """Wait for the worker's word, attending the vehicle. Raises WorkerGoneError."""
-        while not isinstance(answer := self._next(), TakeOff | Decline):
+        while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
             self._note(answer)
-        return isinstance(answer, TakeOff)
+        return isinstance(answer, TakeOffCommand)
 
-    def _take_off(self, orders: Orders) -> FlightRecord:
+    def _take_off(self, orders: FlightRequest) -> FlightRecord:
         experiment = get_experiment(orders.experiment)
-        monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, self._publish, self._call.clock)
+        monitor = FlightMonitor(orders.campaign_id, orders.trial_id, experiment, self._publish, self._call.clock)
         monitor.phase("flying")
         asked: set[str] = set()
 
-        def should_stop() -> Stop | None:
+        def should_stop() -> StopRequest | None:
             stop = self._should_stop()
             if stop is not None:
                 asked.add(stop.reason)
@@ -306,33 +315,33 @@ class Seat:
         record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=should_stop)
         monitor.flush()
         monitor.phase("landed")
-        return as_asked(record, asked)
+        return mark_if_requested(record, asked)
 
     def _publish(self, message: Telemetry | FlightPhase | VehicleStatus) -> None:
         (self._line.say if isinstance(message, FlightPhase) else self._line.show)(message)
 
-    def _should_stop(self) -> Stop | None:
+    def _should_stop(self) -> StopRequest | None:
         """Asked every few milliseconds in the air."""
         self._show()
         try:
             while not self._is_worker_gone and (message := self._line.hear()) is not None:
                 self._note(message)
-        except WorkerGoneError:
+        except PipeClosedError:
             self._is_worker_gone = True
-            self._stop = self._stop or Stop("the worker is gone")
+            self._stop = self._stop or StopRequest("the worker is gone")
         return self._stop
 
-    def _note(self, message: ToSeat) -> None:
+    def _note(self, message: ToVehicleProcess) -> None:
         """What ends the flight: the first reason counts, but motors off counts more."""
         match message:
-            case StandDown(trial_id, reason) if trial_id == self._trial_id:
-                self._stop = self._stop or Stop(reason)
-            case Ordered(order, reason) if self._is_late(message):
-                self._line.say(Obeyed(order, reason, _LATE))
-            case Ordered(order, reason):
+            case CancelFlight(trial_id, reason) if trial_id == self._trial_id:
+                self._stop = self._stop or StopRequest(reason)
+            case VehicleCommand(order, reason) if self._is_late(message):
+                self._line.say(CommandForwarded(order, reason, _EXPIRED))
+            case VehicleCommand(order, reason):
                 if order == "motors off":
-                    self._stop = Stop(reason, motors_off=True)
-                self._stop = self._stop or Stop(reason)
-                self._line.say(Obeyed(order, reason))
+                    self._stop = StopRequest(reason, motors_off=True)
+                self._stop = self._stop or StopRequest(reason)
+                self._line.say(CommandForwarded(order, reason))
             case _:
                 pass

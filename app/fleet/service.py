@@ -19,7 +19,7 @@ from app.fleet.kinds import can_fly, experiments_of, is_registered_one_by_one, n
 from app.fleet.schemas import Vehicle, VehicleChoice
 from app.fleet.states import ACTIONS, MOVES, VehicleState
 from app.fleet.views import campaign_vehicle, options_of, vehicle_view
-from app.moves import check_action, check_move
+from app.moves import check_action, check_transition
 from app.schemas import Page
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
@@ -28,17 +28,17 @@ __all__ = [
     "campaign_vehicle",
     "can_fly",
     "chosen_vehicle",
-    "classed_by_program",
     "get_vehicle",
     "hold_gains",
+    "is_classed_automatically",
     "list_vehicles",
-    "move_vehicle",
     "needs_staging",
     "options_of",
     "require_idle",
     "require_ready",
     "safe_gains_changes",
-    "settle_vehicle",
+    "set_state_after_flight",
+    "set_vehicle_state",
     "simulation_for",
 ]
 
@@ -135,18 +135,18 @@ def require_idle(session: Session, row: VehicleRow) -> None:
         raise BusyError(f"{row.name} is busy: “{act.kind}” is under way.", hint="Wait until that is done.")
 
 
-def move_vehicle(row: VehicleRow, to: VehicleState) -> None:
+def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:
     """Raises ConflictError when the states' table does not lead there."""
-    row.state = check_move(MOVES, row.state, to, row.name)
+    row.state = check_transition(MOVES, row.state, to, row.name)
 
 
-def settle_vehicle(row: VehicleRow, *, concern: str = "") -> None:
+def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:
     """After a flight, however it ended: ready again, or quarantined when there is a concern."""
     if concern:
         row.concern = concern
     target = VehicleState.QUARANTINED if concern else VehicleState.READY
     if row.state not in {target, VehicleState.QUARANTINED}:
-        move_vehicle(row, target)
+        set_vehicle_state(row, target)
 
 
 def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
@@ -154,7 +154,7 @@ def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
     row.held, row.held_at = dict(held), utc_now()
 
 
-def classed_by_program(row: VehicleRow) -> bool:
+def is_classed_automatically(row: VehicleRow) -> bool:
     """Whether a complete flight counts without a person's word: simulated ones do, and records sent in from outside."""
     return not row.is_real or not can_fly(row)
 

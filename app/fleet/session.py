@@ -18,17 +18,29 @@ from typing import Final
 
 from app.core.clock import REAL_TIME, Clock
 from app.fleet.states import ActKind
-from app.live.messages import FlightPhase, Order, Telemetry, VehicleStatus
+from app.live.messages import FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import process_context
-from app.trials.crew import Decline, Free, Landed, Orders, Restored, Said, Staged, StandDown, TakeOff, Trouble, died
+from app.trials.crew import (
+    CancelFlight,
+    CancelTakeOff,
+    FlightFailure,
+    FlightFinished,
+    FlightLanded,
+    FlightMessage,
+    FlightRequest,
+    GainsStaged,
+    SafeGainsRestored,
+    TakeOffCommand,
+    process_died_error,
+)
 from app.vehicles.base import CheckItem, Identity, OptionValue
 from app.vehicles.errors import SafeGainsError, VehicleError
 
-ENDS_WITHIN_S: Final = 5.0
+SHUTDOWN_TIMEOUT_S: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Call:
+class ConnectionRequest:
     """Whom a session is for. `lock` is held as long as it has the vehicle; `identity` is the pinned one, None before
     the first time; `trial_parameters` is the file of what a trial changes beside the gains. `patient`: look for a
     vehicle that does not answer until it does."""
@@ -46,7 +58,7 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Connected:
+class ConnectionOpened:
     """Said by the process once the link is open; `concern` is why the vehicle may only be observed."""
 
     identity: Identity
@@ -55,7 +67,7 @@ class Connected:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class VehicleRequest:
     """Said to the process: carry this act out, for a vehicle with these safe gains."""
 
     kind: ActKind
@@ -63,7 +75,7 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answered:
+class VehicleResponse:
     """Said by the process: what came of an act; `problem` when it failed. `held` are the gains as last read back."""
 
     problem: str = ""
@@ -75,43 +87,45 @@ class Answered:
 
 
 @dataclass(frozen=True, slots=True)
-class Ordered:
+class VehicleCommand:
     """Said to the process at any moment: land, or motors off; not to be carried out after `by_s` of this computer's
     monotonic clock."""
 
-    order: Order
+    order: VehicleCommandKind
     reason: str
     by_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class Obeyed:
+class CommandForwarded:
     """Said by the process: an order was passed on to the vehicle; `problem` when it could not be."""
 
-    order: Order
+    order: VehicleCommandKind
     reason: str
     problem: str = ""
 
 
-FromSeat = Connected | Answered | Obeyed | VehicleStatus | Said
-ToSeat = Orders | TakeOff | Decline | StandDown | Asked | Ordered
-Hear = Callable[[VehicleStatus | Obeyed], None]
+FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | FlightMessage
+ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
+MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 
 
-class Session:
+class VehicleConnection:
     """The worker's handle of such a process: a Crew for flights, and a link to the vehicle in between.
 
     `hear` is told, on a thread of the session's own, how the vehicle is and what became of orders. One conversation at
     a time: a flight or an act; orders may come at any moment, from any thread.
     """
 
-    def __init__(self, call: Call, seat: Callable[[Connection, Call], None], *, hear: Hear) -> None:
+    def __init__(
+        self, call: ConnectionRequest, seat: Callable[[Connection, ConnectionRequest], None], *, hear: MessageHandler
+    ) -> None:
         self.call: Final = call
         self._hear_of = hear
         context = process_context()
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
-        self._said: queue.SimpleQueue[FromSeat | None] = queue.SimpleQueue()
+        self._said: queue.SimpleQueue[FromVehicleProcess | None] = queue.SimpleQueue()
         self._process = context.Process(target=seat, args=(theirs, call), name=f"session {call.name}", daemon=True)
         self._process.start()
         theirs.close()
@@ -129,48 +143,50 @@ class Session:
     def pid(self) -> int | None:
         return self._process.pid
 
-    def connected(self) -> Connected:
+    def connected(self) -> ConnectionOpened:
         """Wait until the link is open. Raises VehicleError when it cannot be, SafeGainsError when the vehicle's gains
         are in doubt; the process has ended then."""
         match self._next():
-            case Connected() as said:
+            case ConnectionOpened() as said:
                 self._open = True
                 return said
-            case Trouble(what, unsafe):
+            case FlightFailure(what, unsafe):
                 raise (SafeGainsError if unsafe else VehicleError)(what, hint="Then connect it again.")
             case other:
                 raise AssertionError(f"A session began with {other!r}.")
 
-    def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> Answered:
+    def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> VehicleResponse:
         """Have an act carried out and wait for what came of it. Raises VehicleError when the process dies."""
-        self._tell(Asked(kind=kind, safe_gains=dict(safe_gains)))
+        self._tell(VehicleRequest(kind=kind, safe_gains=dict(safe_gains)))
         said = self._next()
-        assert isinstance(said, Answered), said
+        assert isinstance(said, VehicleResponse), said
         return said
 
-    def fly(self, orders: Orders) -> Iterator[Said]:
+    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
         """As `Crew.fly` says."""
         self.trial_id = orders.trial_id
         try:
             self._tell(orders)
-            while not isinstance(said := self._next(), Free):
-                assert isinstance(said, Staged | Telemetry | FlightPhase | Landed | Restored | Trouble), said
+            while not isinstance(said := self._next(), FlightFinished):
+                assert isinstance(
+                    said, GainsStaged | Telemetry | FlightPhase | FlightLanded | SafeGainsRestored | FlightFailure
+                ), said
                 yield said
         finally:
             self.trial_id = None
 
     def take_off(self) -> None:
-        self._tell(TakeOff())
+        self._tell(TakeOffCommand())
 
     def decline(self) -> None:
-        self._tell(Decline())
+        self._tell(CancelTakeOff())
 
     def stand_down(self, trial_id: int, reason: str) -> None:
-        self._tell(StandDown(trial_id, reason))
+        self._tell(CancelFlight(trial_id, reason))
 
-    def order(self, order: Order, reason: str, by_s: float) -> bool:
+    def order(self, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
         """Whether the process was told; it passes the order on at once. False while there is no link."""
-        return self._open and self.alive and self._tell(Ordered(order, reason, by_s))
+        return self._open and self.alive and self._tell(VehicleCommand(order, reason, by_s))
 
     def hang_up(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
@@ -180,38 +196,38 @@ class Session:
     def close(self) -> None:
         """Hang up and see the process end, unless it takes long."""
         self.hang_up()
-        self._process.join(ENDS_WITHIN_S)
+        self._process.join(SHUTDOWN_TIMEOUT_S)
 
-    def _next(self) -> FromSeat:
+    def _next(self) -> FromVehicleProcess:
         """What the process says next, apart from what is heard at once. Raises VehicleError when it is dead."""
         if (said := self._said.get()) is None:
             self._said.put(None)
-            raise died(self._process.exitcode)
+            raise process_died_error(self._process.exitcode)
         return said
 
     def _listen(self) -> None:
         try:
             while True:
                 match self._pipe.recv():
-                    case VehicleStatus() | Obeyed() as news:
+                    case VehicleStatus() | CommandForwarded() as news:
                         self._hear_of(news)
                     case said:
                         self._said.put(said)
         except (EOFError, OSError):
-            self._process.join(ENDS_WITHIN_S)
+            self._process.join(SHUTDOWN_TIMEOUT_S)
         finally:
             self._ended.set()
             self._said.put(None)
             with self._sending:
                 self._pipe.close()
 
-    def _tell(self, message: ToSeat) -> bool:
+    def _tell(self, message: ToVehicleProcess) -> bool:
         try:
             self._send(message)
         except OSError:  # it is dead, which whoever listens to it learns
             return False
         return True
 
-    def _send(self, message: ToSeat) -> None:
+    def _send(self, message: ToVehicleProcess) -> None:
         with self._sending:
             self._pipe.send(message)

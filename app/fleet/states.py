@@ -82,10 +82,10 @@ class ActState(StrEnum):
     FAILED = "failed"
 
 
-ACT_UNDER_WAY: Final = frozenset({ActState.REQUESTED, ActState.RUNNING})
+ACTIVE_ACT_STATES: Final = frozenset({ActState.REQUESTED, ActState.RUNNING})
 """A vehicle has at most one act in these states."""
 
-ACT_MOVES: Final[Mapping[ActState, frozenset[ActState]]] = {
+ACT_TRANSITIONS: Final[Mapping[ActState, frozenset[ActState]]] = {
     ActState.REQUESTED: frozenset({ActState.RUNNING, ActState.FAILED}),
     ActState.RUNNING: frozenset({ActState.DONE, ActState.FAILED}),
     ActState.DONE: frozenset(),

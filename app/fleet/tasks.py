@@ -24,39 +24,39 @@ from app.db.session import Database
 from app.errors import ConflictError, StorageError
 from app.fleet import acts
 from app.fleet.acts import ActTask, LinkedVehicle
-from app.fleet.seat import work
-from app.fleet.session import Answered, Call, Connected, Obeyed, Session
+from app.fleet.seat import run_vehicle_process
+from app.fleet.session import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleConnection, VehicleResponse
 from app.fleet.states import GIVES_GAINS, ActKind
-from app.live.messages import LinkTo, Order, VehicleStatus
-from app.trials.flying import Airspace, Publish
+from app.live.messages import VehicleCommandKind, VehicleLinkState, VehicleStatus
+from app.trials.flying import AbortRegistry, Publish
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 T = TypeVar("T")
 
 RETRY_S: Final = 1.0
-GIVES_WAY_S: Final = 0.1
-LOOK_FOR_LINKS_EVERY_S: Final = 2.0
-AT_ONCE: Final = 16
+YIELD_POLL_S: Final = 0.1
+RECONNECT_INTERVAL_S: Final = 2.0
+MAX_CONCURRENT: Final = 16
 
 _log = structlog.get_logger(__name__)
 
 
 @dataclass(slots=True)
-class Berth:
+class VehicleSlot:
     """A vehicle's place: the session that has it. `busy` is held while one is opened or closed."""
 
     busy: threading.Lock = field(default_factory=threading.Lock)
-    session: Session | None = None
-    seeking: Session | None = None
+    session: VehicleConnection | None = None
+    seeking: VehicleConnection | None = None
     """One that waits for a vehicle that does not answer."""
     concern: str = ""
 
     @property
-    def live(self) -> Session | None:
+    def live(self) -> VehicleConnection | None:
         return self.session if self.session is not None and self.session.alive else None
 
 
-class SessionDeck:
+class VehicleConnectionManager:
     """Claims acts and carries them out, and has the sessions. `closing` ends the waiting for a database that takes
     nothing. `order` and `session` may be called from any thread. Without `real`, no real vehicle is connected again by
     itself: others reach the server."""
@@ -65,7 +65,7 @@ class SessionDeck:
         self,
         database: Database,
         data_dir: Path,
-        airspace: Airspace,
+        airspace: AbortRegistry,
         publish: Publish,
         *,
         worker: str,
@@ -81,9 +81,9 @@ class SessionDeck:
         self._closing = closing
         self._links = links
         self._clock = clock
-        self._berths: dict[int, Berth] = {}
+        self._berths: dict[int, VehicleSlot] = {}
         self._look_due_s = 0.0
-        self._seekers = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="link")
+        self._seekers = ThreadPoolExecutor(MAX_CONCURRENT, thread_name_prefix="link")
         self._books = ThreadPoolExecutor(1, thread_name_prefix="books")
 
     def recover(self) -> None:
@@ -106,7 +106,7 @@ class SessionDeck:
 
     # ---- from any thread
 
-    def order(self, vehicle_id: int, order: Order, reason: str, by_s: float) -> bool:
+    def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
         """Whether the vehicle's session was told. A flight that waits for its take-off stands down by it too."""
         berth = self._berths.get(vehicle_id)
         if berth is None or (session := berth.live) is None:
@@ -116,11 +116,11 @@ class SessionDeck:
             self._airspace.abort(trial_id, reason)
         return told
 
-    def session(self, vehicle_id: int) -> Session:
+    def session(self, vehicle_id: int) -> VehicleConnection:
         """For a flight. Raises VehicleError when there is no link."""
         berth = self._berths.get(vehicle_id)
         if berth is None or (session := berth.live) is None:
-            raise _no_link()
+            raise _no_link_error()
         return session
 
     # ---- acts
@@ -149,7 +149,9 @@ class SessionDeck:
                 berth.busy.release()
         except GainlineError as error:
             concern = str(error) if isinstance(error, SafeGainsError) else ""
-            self._fail(task, str(error), also=lambda t: acts.vehicle_gone(t, task.vehicle.vehicle_id, concern=concern))
+            self._fail(
+                task, str(error), also=lambda t: acts.record_disconnected(t, task.vehicle.vehicle_id, concern=concern)
+            )
             return
         self._store_patiently(partial(_connected, task=task, said=said))
 
@@ -157,7 +159,7 @@ class SessionDeck:
         self._close(task.vehicle.vehicle_id)
         self._store_patiently(partial(_disconnected, task=task))
 
-    def _close(self, vehicle_id: int, *, only: Session | None = None) -> None:
+    def _close(self, vehicle_id: int, *, only: VehicleConnection | None = None) -> None:
         """The vehicle's session, whichever it is or `only` that one."""
         berth = self._berth(vehicle_id)
         self._take(berth)
@@ -171,9 +173,9 @@ class SessionDeck:
             berth.busy.release()
         self._show(vehicle_id, "gone")
 
-    def _take(self, berth: Berth) -> None:
+    def _take(self, berth: VehicleSlot) -> None:
         """The berth for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
-        while not berth.busy.acquire(timeout=self._clock.wall_s(GIVES_WAY_S)):
+        while not berth.busy.acquire(timeout=self._clock.wall_s(YIELD_POLL_S)):
             if (seeking := berth.seeking) is not None:
                 seeking.hang_up()
 
@@ -205,16 +207,16 @@ class SessionDeck:
                 self._let_go(vehicle_id, berth, session)
         if not self._links or self._clock.now_s() < self._look_due_s:
             return
-        self._look_due_s = self._clock.now_s() + LOOK_FOR_LINKS_EVERY_S
+        self._look_due_s = self._clock.now_s() + RECONNECT_INTERVAL_S
         with self._database.read() as transaction:
-            wanted = acts.wanted_links(transaction)
+            wanted = acts.list_vehicles_to_reconnect(transaction)
         for vehicle in wanted:
             self._look_for(vehicle)
 
-    def _let_go(self, vehicle_id: int, berth: Berth, gone: Session) -> None:
+    def _let_go(self, vehicle_id: int, berth: VehicleSlot, gone: VehicleConnection) -> None:
         try:
             with self._database.write() as transaction:
-                acts.vehicle_gone(transaction, vehicle_id)
+                acts.record_disconnected(transaction, vehicle_id)
         except ConflictError:
             return  # its flight is still in the books; later
         _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
@@ -230,7 +232,7 @@ class SessionDeck:
         if berth.session is None and seeking is None and berth.busy.acquire(blocking=False):
             self._seekers.submit(self._seek, berth, vehicle)
 
-    def _seek(self, berth: Berth, vehicle: LinkedVehicle) -> None:
+    def _seek(self, berth: VehicleSlot, vehicle: LinkedVehicle) -> None:
         """With `busy` held. Raises nothing that matters: who is wanted is looked for again."""
         try:
             said = self._opened(berth, vehicle, patient=True)
@@ -241,18 +243,20 @@ class SessionDeck:
         finally:
             berth.busy.release()
         kept = self._store_patiently(
-            lambda t: acts.vehicle_found(t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held)
+            lambda t: acts.record_reconnected(
+                t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held
+            )
         )
         if kept is False:
             self._close(vehicle.vehicle_id, only=found)
 
-    def _opened(self, berth: Berth, vehicle: LinkedVehicle, *, patient: bool = False) -> Connected:
+    def _opened(self, berth: VehicleSlot, vehicle: LinkedVehicle, *, patient: bool = False) -> ConnectionOpened:
         """With `busy` held. Raises VehicleError when there is no link in the end."""
         vehicle_id = vehicle.vehicle_id
         if berth.session is not None:
             berth.session.close()
         self._show(vehicle_id, "connecting")
-        call = Call(
+        call = ConnectionRequest(
             vehicle_id=vehicle_id,
             name=vehicle.name,
             kind=vehicle.kind,
@@ -264,10 +268,12 @@ class SessionDeck:
             patient=patient,
             clock=self._clock,
         )
-        session = berth.seeking = Session(call, work, hear=partial(self._heard, berth, vehicle_id))
+        session = berth.seeking = VehicleConnection(
+            call, run_vehicle_process, hear=partial(self._heard, berth, vehicle_id)
+        )
         try:
             if self._closing.is_set():
-                raise _no_link()
+                raise _no_link_error()
             said = session.connected()
         except BaseException:
             session.close()
@@ -279,12 +285,12 @@ class SessionDeck:
         _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(said.identity), concern=said.concern)
         return said
 
-    def _berth(self, vehicle_id: int) -> Berth:
-        return self._berths.setdefault(vehicle_id, Berth())
+    def _berth(self, vehicle_id: int) -> VehicleSlot:
+        return self._berths.setdefault(vehicle_id, VehicleSlot())
 
     # ---- what sessions say by themselves
 
-    def _heard(self, berth: Berth, vehicle_id: int, news: VehicleStatus | Obeyed) -> None:
+    def _heard(self, berth: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
         """On the session's own thread."""
         match news:
             case VehicleStatus(concern=concern):
@@ -292,11 +298,11 @@ class SessionDeck:
                 if concern and not berth.concern:
                     self._write_down(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
                 berth.concern = concern
-            case Obeyed(order, reason, problem):
+            case CommandForwarded(order, reason, problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
-                self._write_down(lambda t: acts.record_order(t, vehicle_id, kind, reason, problem=problem))
+                self._write_down(lambda t: acts.record_command(t, vehicle_id, kind, reason, problem=problem))
 
-    def _show(self, vehicle_id: int, state: LinkTo) -> None:
+    def _show(self, vehicle_id: int, state: VehicleLinkState) -> None:
         now = dt.datetime.now(dt.UTC).isoformat()
         self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=now, step=""))
 
@@ -322,19 +328,19 @@ class SessionDeck:
                 return None
 
 
-def _connected(transaction: Transaction, task: ActTask, said: Connected) -> None:
-    acts.vehicle_connected(
+def _connected(transaction: Transaction, task: ActTask, said: ConnectionOpened) -> None:
+    acts.record_connected(
         transaction, task.vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held or None
     )
     acts.finish_act(transaction, task.act_id, read_back=said.held or None)
 
 
 def _disconnected(transaction: Transaction, task: ActTask) -> None:
-    acts.vehicle_gone(transaction, task.vehicle.vehicle_id)
+    acts.record_disconnected(transaction, task.vehicle.vehicle_id)
     acts.finish_act(transaction, task.act_id)
 
 
-def _answered(transaction: Transaction, task: ActTask, answered: Answered) -> None:
+def _answered(transaction: Transaction, task: ActTask, answered: VehicleResponse) -> None:
     vehicle_id = task.vehicle.vehicle_id
     result: dict[str, object] | None = None
     if answered.checks is not None:
@@ -343,7 +349,7 @@ def _answered(transaction: Transaction, task: ActTask, answered: Answered) -> No
     if answered.parameters is not None:
         result = {"parameters": answered.parameters}
     if task.kind == ActKind.RELEASE and not answered.problem:
-        acts.vehicle_released(transaction, vehicle_id, identity=answered.identity)
+        acts.record_released(transaction, vehicle_id, identity=answered.identity)
     elif answered.concern:
         acts.quarantine_vehicle(transaction, vehicle_id, answered.concern)
     elif answered.identity is not None:
@@ -352,7 +358,7 @@ def _answered(transaction: Transaction, task: ActTask, answered: Answered) -> No
     acts.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
 
 
-def _no_link() -> VehicleError:
+def _no_link_error() -> VehicleError:
     return VehicleError(
         "There is no link to the vehicle.", hint="It is looked for; wait until it is connected, then ask again."
     )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from app.api.deps import Act, CurrentSettings, CursorText, Id, Limit, Reader, json_only
+from app.api.deps import CurrentSettings, CursorText, Id, IdempotentPost, Limit, Reader, json_only
 from app.jobs import service
 from app.jobs.schemas import Job, JobLog
 from app.jobs.states import JobState
@@ -37,12 +37,12 @@ def get_job_log(session: Reader, settings: CurrentSettings, job_id: Id, limit: L
 
 
 @router.post("/{job_id}/cancel")
-def cancel_job(act: Act, job_id: Id) -> Job:
+def cancel_job(act: IdempotentPost, job_id: Id) -> Job:
     """End a job that waits or runs; what it has computed is dropped."""
     return act(Job, lambda session: service.cancel_job(session, job_id))
 
 
 @router.post("/{job_id}/retry")
-def retry_job(act: Act, job_id: Id) -> Job:
+def retry_job(act: IdempotentPost, job_id: Id) -> Job:
     """Let a failed or cancelled job run again."""
     return act(Job, lambda session: service.retry_job(session, job_id))

@@ -20,7 +20,7 @@ from app.jobs import repository
 from app.jobs.logs import lines_of_job
 from app.jobs.schemas import Job, JobLog
 from app.jobs.states import ACTIONS, MOVES, JobState
-from app.moves import allowed, check_action, check_move
+from app.moves import allowed, check_action, check_transition
 from app.schemas import Page, Trouble
 
 LEAST_PACE_S: Final = 30.0
@@ -31,7 +31,7 @@ MAX_ATTEMPTS: Final = 3
 """A job that lost its worker so many times probably killed it, and is failed."""
 
 
-class OvertakenError(GainlineError):
+class SupersededError(GainlineError):
     """What a job was to compute, a newer state has overtaken: nothing failed, and nobody wants it any more."""
 
 
@@ -101,7 +101,7 @@ def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject
     return True
 
 
-def put_back_job(session: Session, job_id: int, *, worker: str) -> bool:
+def requeue_job(session: Session, job_id: int, *, worker: str) -> bool:
     """The worker ends, in good order: the job waits again as if it had not been begun. False when it was no longer
     this worker's."""
     row = repository.held_by_or_none(session, job_id, worker)
@@ -112,7 +112,7 @@ def put_back_job(session: Session, job_id: int, *, worker: str) -> bool:
     return True
 
 
-def give_up_job(session: Session, job_id: int, *, worker: str) -> bool:
+def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> bool:
     """What computed it went away: it waits again, or is failed when that has happened too often. False when it was no
     longer this worker's."""
     row = repository.held_by_or_none(session, job_id, worker)
@@ -131,7 +131,7 @@ def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str
     return True
 
 
-def withdraw_job(session: Session, job_id: int, error: OvertakenError, *, worker: str) -> bool:
+def cancel_superseded_job(session: Session, job_id: int, error: SupersededError, *, worker: str) -> bool:
     """What it was to compute is no longer wanted: it is cancelled, and says why. False when it was no longer this
     worker's."""
     row = repository.held_by_or_none(session, job_id, worker)
@@ -220,7 +220,7 @@ def job_view(row: JobRow) -> Job:
         name=_ordered(row),
         state=row.state,
         campaign_id=row.campaign_id,
-        problem=trouble(row),
+        problem=job_problem(row),
         done_share=row.done_share,
         doing=row.doing,
         remaining_s=_remaining_s(row),
@@ -232,7 +232,7 @@ def job_view(row: JobRow) -> Job:
     )
 
 
-def trouble(row: JobRow) -> Trouble | None:
+def job_problem(row: JobRow) -> Trouble | None:
     """Why a job failed, or was withdrawn."""
     return None if row.problem is None else Trouble.model_validate(row.problem)
 
@@ -278,7 +278,7 @@ def _end(row: JobRow, state: JobState, happened: str, hint: str, problems: list[
 
 
 def _move(row: JobRow, to: JobState) -> None:
-    row.state = check_move(MOVES, row.state, to, _name(row))
+    row.state = check_transition(MOVES, row.state, to, _name(row))
 
 
 def _name(row: JobRow) -> str:

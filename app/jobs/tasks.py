@@ -13,13 +13,13 @@ from app.db.session import Database
 from app.errors import GainlineError, StorageError
 from app.jobs import service as jobs
 
-BEATS_PER_LEASE: Final = 3
+HEARTBEATS_PER_LEASE: Final = 3
 
 _log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Claimed:
+class ClaimedJob:
     """A claimed job, apart from its row."""
 
     id: int
@@ -34,7 +34,7 @@ def recover(database: Database) -> None:
             _log.warning("job waits again: its worker ended", job_id=job_id)
 
 
-class Desk:
+class JobRunner:
     """Claims jobs of one kind, at most `room` at a time. `claim` and `heartbeat` belong to one thread, `carry_out` to
     any.
 
@@ -46,7 +46,7 @@ class Desk:
         self,
         database: Database,
         kind: str,
-        perform: Callable[[Claimed], None],
+        perform: Callable[[ClaimedJob], None],
         *,
         room: int,
         worker: str,
@@ -68,7 +68,7 @@ class Desk:
         """How many jobs are claimed and not finished."""
         return len(self._at_work)
 
-    def claim(self) -> Claimed | None:
+    def claim(self) -> ClaimedJob | None:
         """The job that has waited longest, now this worker's; None when none waits or the desk is full. Raises
         StorageError."""
         if self.at_work >= self._room:
@@ -77,7 +77,7 @@ class Desk:
             row = jobs.claim_job(session, worker=self._worker, kinds=(self._kind,), lease_s=self._lease_s)
             if row is None:
                 return None
-            job = Claimed(row.id, row.campaign_id, dict(row.order or {}))
+            job = ClaimedJob(row.id, row.campaign_id, dict(row.order or {}))
         self._at_work.add(job.id)
         return job
 
@@ -86,13 +86,13 @@ class Desk:
         disk) wait again once their lease is over. Raises StorageError."""
         if self._clock.now_s() < self._beat_due_s:
             return
-        self._beat_due_s = self._clock.now_s() + self._lease_s / BEATS_PER_LEASE
+        self._beat_due_s = self._clock.now_s() + self._lease_s / HEARTBEATS_PER_LEASE
         with self._database.write() as session:
             for job_id in tuple(self._at_work):
                 jobs.heartbeat_job(session, job_id, worker=self._worker, lease_s=self._lease_s)
             jobs.requeue_expired_jobs(session)
 
-    def carry_out(self, job: Claimed) -> None:
+    def carry_out(self, job: ClaimedJob) -> None:
         """The whole job, from the stored order to the stored result. Raises nothing."""
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
             began_s = self._clock.now_s()
@@ -105,23 +105,23 @@ class Desk:
                 _log.info("job dropped, because the worker ends; it runs again with the next one")
             except StorageError as error:
                 _log.error("job given up; it runs again when its lease is over", why=str(error))
-            except jobs.OvertakenError as error:
+            except jobs.SupersededError as error:
                 self._withdraw(job, error)
             except GainlineError as error:
                 self._fail(job, error)
             except Exception as error:  # noqa: BLE001 - the edge of the thread
                 _log.exception("job failed by a mistake of the program")
-                self._fail(job, mistake(f"{type(error).__name__}: {error}"))
+                self._fail(job, internal_error(f"{type(error).__name__}: {error}"))
             finally:
                 self._at_work.discard(job.id)
 
-    def _fail(self, job: Claimed, error: GainlineError) -> None:
+    def _fail(self, job: ClaimedJob, error: GainlineError) -> None:
         _log.warning("job failed", why=str(error))
         self._end(lambda session: jobs.fail_job(session, job.id, error, worker=self._worker))
 
-    def _withdraw(self, job: Claimed, error: jobs.OvertakenError) -> None:
+    def _withdraw(self, job: ClaimedJob, error: jobs.SupersededError) -> None:
         _log.info("job withdrawn", why=str(error))
-        self._end(lambda session: jobs.withdraw_job(session, job.id, error, worker=self._worker))
+        self._end(lambda session: jobs.cancel_superseded_job(session, job.id, error, worker=self._worker))
 
     def _end(self, store: Callable[[Session], bool]) -> None:
         try:
@@ -131,7 +131,7 @@ class Desk:
             _log.error("job given up; it runs again when its lease is over", why=str(refused))
 
 
-def mistake(what: str) -> GainlineError:
+def internal_error(what: str) -> GainlineError:
     """The error that a person sees when the program itself is to blame."""
     return GainlineError(
         f"The program made a mistake ({what}).",

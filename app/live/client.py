@@ -19,10 +19,10 @@ from app.live.messages import (
     Answer,
     FromWorker,
     Message,
-    Order,
     Ping,
     Pong,
     ToWorker,
+    VehicleCommandKind,
     VehicleOrder,
     VehicleOrderAnswer,
     WorkerHello,
@@ -106,7 +106,7 @@ class LiveClient:
         question = Abort(request=next(self._numbers), trial_id=trial_id, reason=reason, by_s=_deadline_s())
         return await self._ask(question, AbortAnswer)
 
-    async def order(self, vehicle_id: int, order: Order, reason: str) -> VehicleOrderAnswer:
+    async def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
         """Have the worker tell a vehicle to land or to stop its motors. Raises LinkDownError as `abort` does."""
         question = VehicleOrder(
             request=next(self._numbers), vehicle_id=vehicle_id, order=order, reason=reason, by_s=_deadline_s()

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
-from app.live.memory import Memory
-from app.live.messages import FlightPhase, Shown, Telemetry, VehicleStatus, encode
+from app.live.memory import LiveState
+from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleStatus, encode
 
 WAITING_CHANGES: Final = 2000
 """Changes a stream may lag behind before it is ended; its client comes back with the last id and misses none."""
@@ -36,7 +36,7 @@ class LinkState:
     worker: bool
 
 
-Live = Shown | LinkState
+Live = PublishedMessage | LinkState
 
 
 class Subscription:
@@ -78,8 +78,8 @@ class Hub:
 
     def __init__(self) -> None:
         self._subscriptions: set[Subscription] = set()
-        self._memory = Memory()
-        self._written: dict[int, tuple[Shown, str]] = {}
+        self._memory = LiveState()
+        self._written: dict[int, tuple[PublishedMessage, str]] = {}
         self._open = True
 
     @contextmanager
@@ -110,7 +110,7 @@ class Hub:
         for subscription in self._subscriptions:
             subscription.push(item)
 
-    def text(self, item: Shown) -> str:
+    def text(self, item: PublishedMessage) -> str:
         """Its JSON, written once for all streams."""
         known = self._written.get(id(item))
         if known is None:  # the item is kept with its text, so that its id is nobody else's meanwhile

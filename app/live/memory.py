@@ -5,12 +5,12 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.live.messages import FlightPhase, Shown, Telemetry, VehicleStatus
+from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleStatus
 
 _OVER = frozenset({"landed", "ended"})
 
 
-class Memory:
+class LiveState:
     """Grows with the telemetry of a flight and forgets it when the flight is over; of a vehicle's status it keeps the
     newest. `clock_s` tells how old each is when it is told again: of a worker that hangs nothing newer comes."""
 
@@ -19,7 +19,7 @@ class Memory:
         self._flights: dict[int, tuple[Telemetry, float]] = {}
         self._vehicles: dict[int, tuple[VehicleStatus, float]] = {}
 
-    def take(self, message: Shown) -> None:
+    def take(self, message: PublishedMessage) -> None:
         match message:
             case VehicleStatus():
                 self._vehicles[message.vehicle_id] = message, self._clock_s()
@@ -34,7 +34,7 @@ class Memory:
         self._flights.clear()
         self._vehicles.clear()
 
-    def so_far(self) -> list[Shown]:
+    def so_far(self) -> list[PublishedMessage]:
         """One message for each vehicle, and one for each flight with everything measured since its command, each with
         its age."""
         now_s = self._clock_s()

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 MAX_LINE_BYTES: Final = 256 * 1024
 
 Phase = Literal["staging", "staged", "flying", "landed", "ended"]
-LinkTo = Literal["connecting", "connected", "gone"]
-Order = Literal["land", "motors off"]
+VehicleLinkState = Literal["connecting", "connected", "gone"]
+VehicleCommandKind = Literal["land", "motors off"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class VehicleStatus(Condition):
     in `Telemetry`; the other ages are as they were when it was said."""
 
     vehicle_id: int
-    state: LinkTo
+    state: VehicleLinkState
     at: str
     concern: str = ""
     age_s: float = 0.0
@@ -99,7 +99,7 @@ class VehicleOrder:
 
     request: int
     vehicle_id: int
-    order: Order
+    order: VehicleCommandKind
     reason: str
     by_s: float
     type: Literal["order"] = "order"
@@ -129,10 +129,10 @@ class Pong:
     type: Literal["pong"] = "pong"
 
 
-Shown = Telemetry | FlightPhase | VehicleStatus
+PublishedMessage = Telemetry | FlightPhase | VehicleStatus
 """What streams show, as it comes."""
 Answer = AbortAnswer | VehicleOrderAnswer | Pong
-FromWorker = Shown | WorkerHello | Answer
+FromWorker = PublishedMessage | WorkerHello | Answer
 ToWorker = Abort | VehicleOrder | Ping
 Message = FromWorker | ToWorker
 

@@ -23,11 +23,11 @@ from app.live.messages import (
     AbortAnswer,
     FromWorker,
     Message,
-    Order,
     Ping,
     Pong,
-    Shown,
+    PublishedMessage,
     Telemetry,
+    VehicleCommandKind,
     VehicleOrder,
     VehicleOrderAnswer,
     VehicleStatus,
@@ -57,7 +57,7 @@ class LiveServer:
         path: Path,
         *,
         abort: Callable[[int, str], bool],
-        order: Callable[[int, Order, str, float], bool],
+        order: Callable[[int, VehicleCommandKind, str, float], bool],
         hello: Callable[[], WorkerHello],
     ) -> None:
         self._path = path
@@ -83,7 +83,7 @@ class LiveServer:
         self._loop.close()
         self._path.unlink(missing_ok=True)
 
-    def publish(self, message: Shown) -> None:
+    def publish(self, message: PublishedMessage) -> None:
         """Send to every client, from any thread, without waiting."""
         self._loop.call_soon_threadsafe(self._send_all, message)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from app.core.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
 from app.logs.gains import ARDUPILOT_SETS, names_in
-from app.logs.takeoffs import FlightLog, Moment, Setting
+from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 _SYNC: Final = b"\xa3\x95"
 _FMT: Final = 128
@@ -176,20 +176,20 @@ def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
             yield Setting(float(time_s), name, float(value))
 
 
-def _moments(tables: Mapping[str, Table]) -> tuple[list[Moment], list[Moment], list[Moment]]:
+def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
     """Commands to take off, what ends the flight under them, and landings."""
     accepted = [
         (time_s, command) for time_s, command, result in _rows(tables, "MAVC", "Cmd", "Res") if result in _ACCEPTED
     ]
-    starts = [Moment(time_s, "the command NAV_TAKEOFF") for time_s, command in accepted if command == _TAKEOFF]
-    ends = [Moment(time_s, "the command NAV_LAND") for time_s, command in accepted if command == _LAND]
+    starts = [LogEvent(time_s, "the command NAV_TAKEOFF") for time_s, command in accepted if command == _TAKEOFF]
+    ends = [LogEvent(time_s, "the command NAV_LAND") for time_s, command in accepted if command == _LAND]
     modes = list(_rows(tables, "MODE", "ModeNum"))
     ends += [
-        Moment(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
+        LogEvent(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
         for (_, before), (time_s, mode) in pairwise(modes)
         if mode != before
     ]
-    landings = [Moment(time_s, _LANDINGS[event]) for time_s, event in _rows(tables, "EV", "Id") if event in _LANDINGS]
+    landings = [LogEvent(time_s, _LANDINGS[event]) for time_s, event in _rows(tables, "EV", "Id") if event in _LANDINGS]
     return starts, ends, landings
 
 

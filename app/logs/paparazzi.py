@@ -20,7 +20,7 @@ from app.core.loop_log import FIELDS, GAINS, LoopLog, infer_gains
 from app.core.trajectory import Samples
 from app.logs.contents import refused
 from app.logs.gains import PAPARAZZI_SETS
-from app.logs.takeoffs import FlightLog, Moment, Setting
+from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20
 _MAX_SAMPLES: Final = 2_000_000
@@ -51,8 +51,8 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
         configuration.read(companion)
     settings = configuration.settings(lines.values)
     notes = []
-    starts: list[Moment] = []
-    ends: list[Moment] = []
+    starts: list[LogEvent] = []
+    ends: list[LogEvent] = []
     if len(lines.loop_time_s):
         log = lines.loop_log()
         starts, ends = _starts(log), _ends(log)
@@ -193,23 +193,23 @@ def _loop_channels(log: LoopLog) -> dict[str, Samples]:
     }
 
 
-def _starts(log: LoopLog) -> list[Moment]:
+def _starts(log: LoopLog) -> list[LogEvent]:
     """The last samples before the reference sets out on its own."""
     idle = log.idle
     sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
-    return [Moment(float(log.time_s[place]), "the reference setting out") for place in sets_out]
+    return [LogEvent(float(log.time_s[place]), "the reference setting out") for place in sets_out]
 
 
-def _ends(log: LoopLog) -> list[Moment]:
+def _ends(log: LoopLog) -> list[LogEvent]:
     """Where a set point that was held for two seconds becomes another one, or the loop stops working."""
     idle, set_point = log.idle, log["z_sp"]
     stops = np.flatnonzero(~idle[:-1] & idle[1:])
-    moments = [Moment(float(log.time_s[place]), "the loop being switched off") for place in stops]
+    moments = [LogEvent(float(log.time_s[place]), "the loop being switched off") for place in stops]
     held_since_s = float(log.time_s[0])
     for place in np.flatnonzero(np.diff(set_point) != 0).tolist():
         now_s, is_working = float(log.time_s[place]), not idle[place] and not idle[place + 1]
         if is_working and now_s - held_since_s >= _PLATEAU_S:
-            moments.append(Moment(now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m"))
+            moments.append(LogEvent(now_s, f"the set point becoming {-set_point[place + 1] / 2**8:g} m"))
         held_since_s = float(log.time_s[place + 1])
     return moments
 

@@ -36,7 +36,7 @@ _ALTITUDES: Final = frozenset({"altitude_m", "reference_m", "set_point_m"})
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class LogEvent:
     """Something that happened, in seconds of the log, and what it was: "the block Takeoff"."""
 
     time_s: float
@@ -79,9 +79,9 @@ class FlightLog:
     from_ground: bool
     gain_sets: Sequence[Sequence[str]] = ()
     settings: Sequence[Setting] = ()
-    starts: Sequence[Moment] = ()
-    ends: Sequence[Moment] = ()
-    landings: Sequence[Moment] = ()
+    starts: Sequence[LogEvent] = ()
+    ends: Sequence[LogEvent] = ()
+    landings: Sequence[LogEvent] = ()
     in_air: Sequence[Span] | None = None
     armed: Sequence[Span] | None = None
     notes: Sequence[str] = ()
@@ -117,7 +117,7 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
     free_from_s = -np.inf
     for stood, down in _flights(log, time_s, altitude_m):
         begin, is_commanded = _beginning(log, float(time_s[stood]), free_from_s)
-        held = _Held(log, begin.time_s)
+        held = _GainsAt(log, begin.time_s)
         kept, end = _kept(log, time_s, begin, held, stood, down)
         if kept.stop - kept.start >= MIN_SAMPLES:
             ground_m = _ground_m(time_s, altitude_m, begin.time_s, stood)
@@ -241,16 +241,18 @@ def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int
     return len(time_s)
 
 
-def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[Moment, bool]:
+def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[LogEvent, bool]:
     """What time counts from, and whether it is a command: the first one, since what comes after repeats it."""
     ahead_s = max(free_from_s, stood_s - _COMMAND_AHEAD_S)
     commands = [start for start in log.starts if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
     if not commands:
-        return Moment(stood_s, "lift-off"), False
+        return LogEvent(stood_s, "lift-off"), False
     return min(commands, key=lambda start: start.time_s), True
 
 
-def _kept(log: FlightLog, time_s: Samples, begin: Moment, held: "_Held", stood: int, down: int) -> tuple[slice, Moment]:
+def _kept(
+    log: FlightLog, time_s: Samples, begin: LogEvent, held: "_GainsAt", stood: int, down: int
+) -> tuple[slice, LogEvent]:
     """Which samples make the record, and what ends it; nothing in words where that is the landing or the log's end.
 
     Commands that end a flight can do so only in the air: what a heartbeat tells of a mode may be a second old.
@@ -258,8 +260,8 @@ def _kept(log: FlightLog, time_s: Samples, begin: Moment, held: "_Held", stood: 
     off_s = max(begin.time_s, float(time_s[stood]))
     ends = [moment for moment in log.ends if moment.time_s > off_s]
     changes = [moment for moment in held.changes if moment.time_s > begin.time_s]
-    too_long = Moment(begin.time_s + LONGEST_S, "the longest record that is kept")
-    landing = Moment(float(time_s[down]), "")
+    too_long = LogEvent(begin.time_s + LONGEST_S, "the longest record that is kept")
+    landing = LogEvent(float(time_s[down]), "")
     end = min((*ends, *changes, landing, too_long), key=lambda moment: moment.time_s)
     first, past = _between(time_s, begin.time_s - _BEFORE_S, end.time_s)
     return slice(first, min(past, first + MAX_SAMPLES)), end
@@ -276,7 +278,7 @@ def _ground_m(time_s: Samples, altitude_m: Samples, begin_s: float, stood: int) 
     return float(altitude_m[first:past].mean() if past > first else altitude_m[stood])
 
 
-class _Held:
+class _GainsAt:
     """The gains that the vehicle held at a time, and when they became others."""
 
     def __init__(self, log: FlightLog, at_s: float) -> None:
@@ -292,7 +294,7 @@ class _Held:
             gains.setdefault(each.name, each.value)
         self.gains: Gains = {name: gains[name] for name in names}
         self.changes = [
-            Moment(each.time_s, f"{each.name} becoming {each.value:g}")
+            LogEvent(each.time_s, f"{each.name} becoming {each.value:g}")
             for each in settings
             if each.time_s > at_s and each.value != gains[each.name]
         ]
@@ -303,11 +305,11 @@ class _Record:
     """What is known about one takeoff, to be put together."""
 
     log: FlightLog
-    begin: Moment
-    end: Moment
+    begin: LogEvent
+    end: LogEvent
     is_commanded: bool
     ground_m: float
-    held: _Held
+    held: _GainsAt
 
     def takeoff(self, number: int, time_s: Samples, channels: Mapping[str, Samples], kept: slice) -> Takeoff:
         ground_m = self.ground_m if self.log.from_ground else 0.0

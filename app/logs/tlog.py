@@ -18,7 +18,7 @@ import numpy as np
 from app.core.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
 from app.logs.gains import ARDUPILOT_SETS, PAPARAZZI, PAPARAZZI_SETS, PX4_SETS, names_in
-from app.logs.takeoffs import FlightLog, Moment, Setting
+from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 _STAMP_BYTES: Final = 8
 _MAGICS: Final = (0xFE, 0xFD)
@@ -108,7 +108,7 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
     """Read a whole log. Raises TrajectoryError when nothing in it is a flight of a vehicle that is known here."""
     data = contents(stream)
     system, autopilot = _vehicle(data)
-    conversation = _Conversation(autopilot, system)
+    conversation = _Telemetry(autopilot, system)
     dialect = autopilot.dialect
     decoder = dialect.MAVLink(None)
     extra = bytes([dialect.MAVLink_local_position_ned_message.crc_extra])
@@ -185,12 +185,12 @@ def _payload(data: Contents, frame: _Frame, size: int) -> bytes:
 class _Sent:
     """A command that waits for its answer."""
 
-    moment: Moment
-    moments: list[Moment]
+    moment: LogEvent
+    moments: list[LogEvent]
 
 
 @dataclass(slots=True)
-class _Conversation:
+class _Telemetry:
     """What ground and vehicle said to each other, in the vehicle's time; that of the last position holds for all."""
 
     autopilot: _Autopilot
@@ -209,9 +209,9 @@ class _Conversation:
     _settings: list[Setting] = field(default_factory=list)
     _asked: dict[str, float] = field(default_factory=dict)
     _sent: dict[int, _Sent] = field(default_factory=dict)
-    _starts: list[Moment] = field(default_factory=list)
-    _ends: list[Moment] = field(default_factory=list)
-    _landings: list[Moment] = field(default_factory=list)
+    _starts: list[LogEvent] = field(default_factory=list)
+    _ends: list[LogEvent] = field(default_factory=list)
+    _landings: list[LogEvent] = field(default_factory=list)
     _armed: bool = False
     _mode: int | None = None
 
@@ -252,7 +252,7 @@ class _Conversation:
         for time_s, number in self._activated:
             name = self._blocks.get(number, "")
             moments = self._starts if "takeoff" in name.casefold().replace(" ", "").replace("_", "") else self._ends
-            moments.append(Moment(time_s, f"the block {name}" if name else f"block {number}"))
+            moments.append(LogEvent(time_s, f"the block {name}" if name else f"block {number}"))
         return FlightLog(
             title=f"MAVLink log of {self.autopilot.title}",
             clock="vehicle",
@@ -288,7 +288,7 @@ class _Conversation:
             return
         armed, mode = bool(int(message.base_mode) & _ARMED), int(message.custom_mode)
         if self._armed and not armed:
-            self._landings.append(Moment(self._now_s, "motors off"))
+            self._landings.append(LogEvent(self._now_s, "motors off"))
         if self._mode not in {None, mode} and self._armed:
             self._mode_changed(mode)
         self._armed, self._mode = armed, mode
@@ -297,9 +297,9 @@ class _Conversation:
         main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
         if self.autopilot.has_takeoff_mode and main == 4 and sub in {_PX4_TAKEOFF_MODE, _PX4_HOVER_MODE}:
             if sub == _PX4_TAKEOFF_MODE:
-                self._starts.append(Moment(self._now_s, "takeoff mode"))
+                self._starts.append(LogEvent(self._now_s, "takeoff mode"))
             return
-        self._ends.append(Moment(self._now_s, f"mode {sub or mode}"))
+        self._ends.append(LogEvent(self._now_s, f"mode {sub or mode}"))
 
     def _status(self, message: _Message) -> None:
         millivolt = int(message.voltage_battery)
@@ -308,7 +308,7 @@ class _Conversation:
 
     def _set_mode(self, message: _Message) -> None:
         if not self._is_vehicle(message):
-            self._ends.append(Moment(self._now_s, "SET_MODE"))
+            self._ends.append(LogEvent(self._now_s, "SET_MODE"))
 
     def _parameter(self, message: _Message) -> None:
         name, value = str(message.param_id), float(message.param_value)
@@ -320,7 +320,7 @@ class _Conversation:
             if self._asked.get(gain) == value:
                 del self._asked[gain]
         elif name in ("kil_thr", "aut_kil_thr") and value:
-            self._landings.append(Moment(self._now_s, "motors off"))
+            self._landings.append(LogEvent(self._now_s, "motors off"))
 
     def _parameter_asked(self, message: _Message) -> None:
         name, value = str(message.param_id), float(message.param_value)
@@ -337,9 +337,9 @@ class _Conversation:
         )
         lands = number == _LAND or (number == _MOTORS and not message.param1)
         if takeoff:
-            self._sent[number] = _Sent(Moment(self._now_s, f"the command {_spoken(number)}"), self._starts)
+            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_spoken(number)}"), self._starts)
         elif lands or number == _SET_MODE:
-            self._sent[number] = _Sent(Moment(self._now_s, f"the command {_spoken(number)}"), self._ends)
+            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_spoken(number)}"), self._ends)
 
     def _answer(self, message: _Message) -> None:
         sent = self._sent.pop(int(message.command), None) if self._is_vehicle(message) else None

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from app.core.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
 from app.logs.gains import PX4_SETS, names_in
-from app.logs.takeoffs import FlightLog, Moment, Setting, Span
+from app.logs.takeoffs import FlightLog, LogEvent, Setting, Span
 
 if TYPE_CHECKING:
     from pyulog import ULog
@@ -69,7 +69,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
     data = contents(stream)
     if not is_ulog(data[:_HEADER_BYTES]) or len(data) < _HEADER_BYTES:
         raise refused("is no ULog", _HINT)
-    sieve = _Sieve()
+    sieve = _LogFilter()
     sieve.sift(data)
     try:
         log = ULog(io.BytesIO(sieve.kept))
@@ -98,7 +98,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
 
 
 @dataclass(slots=True)
-class _Sieve:
+class _LogFilter:
     """What of a log is worth reading. `damages` counts the stretches that were passed over."""
 
     kept: bytearray = field(default_factory=bytearray)
@@ -215,31 +215,31 @@ def _channels(position: Topic, topics: Mapping[str, Topic]) -> dict[str, Samples
     return channels
 
 
-def _moments(topics: Mapping[str, Topic]) -> tuple[list[Moment], list[Moment], list[Moment]]:
+def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
     """Commands and modes that take off, those that end a flight, and landings."""
-    starts: list[Moment] = []
-    ends: list[Moment] = []
-    landings: list[Moment] = []
+    starts: list[LogEvent] = []
+    ends: list[LogEvent] = []
+    landings: list[LogEvent] = []
     refusals = [(time_s, command) for time_s, command, result in _rows(topics, _ANSWER, "command", "result") if result]
     for time_s, command in _rows(topics, _COMMAND, "command"):
         refused_at = [at for at, what in refusals if what == command and 0.0 <= at - time_s <= _ANSWERED_WITHIN_S]
         if command in {_TAKEOFF, _LAND} and not refused_at:
             moments, spoken = (starts, "NAV_TAKEOFF") if command == _TAKEOFF else (ends, "NAV_LAND")
-            moments.append(Moment(time_s, f"the command {spoken}"))
+            moments.append(LogEvent(time_s, f"the command {spoken}"))
     before: float | None = None
     is_armed = _at(_rows(topics, _STATUS, "arming_state"))
     was_taking_off = False
     for time_s, mode in _rows(topics, _STATUS, "nav_state"):
         takes_off = mode == _TAKEOFF_MODE and is_armed(time_s) in {_ARMED, None}
         if takes_off and not was_taking_off:
-            starts.append(Moment(time_s, "the takeoff mode"))
+            starts.append(LogEvent(time_s, "the takeoff mode"))
         elif before not in {None, mode} and mode not in {_TAKEOFF_MODE, _HOVER_MODE}:
-            ends.append(Moment(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}"))
+            ends.append(LogEvent(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}"))
         before, was_taking_off = mode, takes_off
     before = None
     for time_s, landed in _rows(topics, _LANDED, "landed"):
         if landed and before == 0.0:
-            landings.append(Moment(time_s, "the landing"))
+            landings.append(LogEvent(time_s, "the landing"))
         before = landed
     return starts, ends, landings
 
@@ -307,7 +307,7 @@ def _missing(topics: Mapping[str, Topic]) -> Iterator[str]:
         yield f"no {_STATUS} in the log, so the takeoff is told by the land detector alone: see that it is the flight"
 
 
-def _notes(sieve: _Sieve, log: "ULog") -> Iterator[str]:
+def _notes(sieve: _LogFilter, log: "ULog") -> Iterator[str]:
     if sieve.damages:
         yield f"{sieve.damages} damaged stretches passed over"
     if log.dropouts:

@@ -18,7 +18,7 @@ from app.fleet import service as fleet
 from app.fleet.views import acts_view, ledger_view
 from app.reports import anomalies, remarks
 from app.reports.content import Anomaly, Report
-from app.reports.settings_in_words import experiment_of, how_it_was_tuned, what_was_tuned
+from app.reports.settings_in_words import describe_method, describe_vehicle, experiment_of
 from app.schemas import Page
 from app.trials import service as trials_service
 from app.trials.integrity import damaged_trials
@@ -41,8 +41,8 @@ def report_of(session: Session, campaign_id: int) -> Report:
         statistics=statistics,
         trials=trials,
         gains=experiment.space.gains,
-        what=what_was_tuned(campaign, experiment, vehicle.identity),
-        how=how_it_was_tuned(campaign, experiment),
+        what=describe_vehicle(campaign, experiment, vehicle.identity),
+        how=describe_method(campaign, experiment),
         cards=(
             *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
             *_landscape(session, campaign),

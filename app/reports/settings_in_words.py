@@ -32,7 +32,7 @@ class _Described(Protocol):
     def unit(self) -> str: ...
 
 
-def what_was_tuned(campaign: Campaign, experiment: Experiment, identity: Identity | None) -> tuple[Fact, ...]:
+def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Identity | None) -> tuple[Fact, ...]:
     """The vehicle, REAL or simulated, with its settings; and the manoeuvre that was flown."""
     vehicle = campaign.vehicle
     kind = VEHICLE_KINDS.get(vehicle.kind)
@@ -56,7 +56,7 @@ def what_was_tuned(campaign: Campaign, experiment: Experiment, identity: Identit
     return tuple(facts)
 
 
-def how_it_was_tuned(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:
+def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:
     """Strategy, start, bounds and stop rule, each with its settings."""
     definition = campaign.definition
     strategy = STRATEGIES.get(definition.strategy)

@@ -24,7 +24,7 @@ ENDS_WITHIN_S: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Advance:
+class Progress:
     """Said by the process: the share done, 0 … 1, and what it is at."""
 
     share: float
@@ -32,7 +32,7 @@ class Advance:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class StudyError:
     """Said by the process: an error of ours, for a person."""
 
     message: str
@@ -41,17 +41,17 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
-class Mistaken:
+class InternalFailure:
     """Said by the process: the program's own mistake, and where it was made."""
 
     what: str
     traceback: str
 
 
-Said = Advance | Result | Refused | Mistaken
+StudyMessage = Progress | Result | StudyError | InternalFailure
 
 
-class DiedError(Exception):
+class ProcessDiedError(Exception):
     """The process is gone without a word; `args` hold its exit code."""
 
 
@@ -77,15 +77,15 @@ class StudyProcess:
         self._process.kill()
         self._process.join(ENDS_WITHIN_S)
 
-    def listen(self, within_s: float) -> Said | None:
+    def listen(self, within_s: float) -> StudyMessage | None:
         """What it says next, None when it says nothing for so long. Raises DiedError."""
         try:
             if not self._pipe.poll(within_s):
                 return None
-            said: Said = self._pipe.recv()
+            said: StudyMessage = self._pipe.recv()
         except (EOFError, OSError) as error:
             self._process.join(ENDS_WITHIN_S)
-            raise DiedError(self._process.exitcode) from error
+            raise ProcessDiedError(self._process.exitcode) from error
         return said
 
 
@@ -93,16 +93,16 @@ def _work(pipe: Connection, name: str, full: bool) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
     threading.Thread(target=_end_with, args=(pipe,), daemon=True).start()
-    pipe.send(_outcome(lambda share, doing: pipe.send(Advance(share, doing)), name, full))
+    pipe.send(_outcome(lambda share, doing: pipe.send(Progress(share, doing)), name, full))
 
 
-def _outcome(tell: Callable[[float, str], None], name: str, full: bool) -> Result | Refused | Mistaken:
+def _outcome(tell: Callable[[float, str], None], name: str, full: bool) -> Result | StudyError | InternalFailure:
     try:
         return get_reproduction(name).run(tell, full)
     except GainlineError as error:
-        return Refused(error.message, error.hint, error.problems)
+        return StudyError(error.message, error.hint, error.problems)
     except Exception as error:  # noqa: BLE001 - the edge of the process
-        return Mistaken(f"{type(error).__name__}: {error}", format_exc())
+        return InternalFailure(f"{type(error).__name__}: {error}", format_exc())
 
 
 def _end_with(pipe: Connection) -> None:

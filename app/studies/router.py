@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, status
 
-from app.api.deps import Act, Reader, json_only
+from app.api.deps import IdempotentPost, Reader, json_only
 from app.api.figures import FigureCard, Theme, figure_card
 from app.jobs.schemas import Job
 from app.schemas import Page
@@ -30,7 +30,7 @@ def get_reproduction(session: Reader, name: Name) -> Reproduction:
 
 
 @router.post("/{name}/run", status_code=status.HTTP_202_ACCEPTED)
-def run_reproduction(act: Act, name: Name, body: Run | None = None) -> Job:
+def run_reproduction(act: IdempotentPost, name: Name, body: Run | None = None) -> Job:
     """Have it run. While it waits or runs already, the answer is that job."""
     return act(Job, lambda session: service.request_run(session, name, full=(body or Run()).full))
 

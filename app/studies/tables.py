@@ -15,7 +15,7 @@ from app.core.trajectory import Samples, Trajectory
 from app.figures.panels import Line, Panel, Plot, Style
 from app.studies.gate import overruled_for
 from app.studies.results import OVERRULE, Progress, Result, Row, curve
-from app.vehicles.base import FlightOrder, OptionValue
+from app.vehicles.base import FlightOptions, OptionValue
 from app.vehicles.open import open_vehicle
 
 VEHICLES: Final[Mapping[str, Mapping[str, OptionValue]]] = MappingProxyType({"jsbsim": {}, "twin": {"scatter": 0.0}})
@@ -187,7 +187,7 @@ def _flown(table: Table, kind: str) -> Iterator[Takeoff]:
             wanted = dict(zip(experiment.space.names, map(float, published.gains), strict=True))
             overruled = overruled_for(wanted, kind)
             gains = vehicle.stage(wanted)
-            flight = vehicle.fly(FlightOrder(seed=1), on_sample=lambda _: None, should_stop=lambda: None).trajectory
+            flight = vehicle.fly(FlightOptions(seed=1), on_sample=lambda _: None, should_stop=lambda: None).trajectory
             yield Takeoff(
                 published=published,
                 gains=gains,

@@ -10,8 +10,8 @@ import structlog
 from app.db.session import Database
 from app.errors import GainlineError
 from app.jobs import service as jobs
-from app.jobs.tasks import Claimed, mistake
-from app.studies.process import Advance, DiedError, Mistaken, Refused, Said, StudyProcess
+from app.jobs.tasks import ClaimedJob, internal_error
+from app.studies.process import InternalFailure, ProcessDiedError, Progress, StudyError, StudyMessage, StudyProcess
 from app.studies.results import Result
 from app.studies.service import read_order
 
@@ -21,7 +21,7 @@ LOOK_S: Final = 0.5
 _log = structlog.get_logger(__name__)
 
 
-class Reproducer:
+class ReproductionJob:
     """What a desk for reproductions performs. `closing` ends what is under way; it runs again with the next worker."""
 
     def __init__(self, database: Database, *, worker: str, lease_s: float, closing: threading.Event) -> None:
@@ -30,17 +30,17 @@ class Reproducer:
         self._lease_s = lease_s
         self._closing = closing
 
-    def __call__(self, job: Claimed) -> None:
+    def __call__(self, job: ClaimedJob) -> None:
         """From the stored order to the stored result. Raises GainlineError for a person, and CancelledError when the
         worker ends."""
         order, started_s = read_order(job.order), monotonic()
         with StudyProcess(order.name, full=order.full) as process:
             try:
                 result = self._watch(job, process)
-            except DiedError as death:
+            except ProcessDiedError as death:
                 _log.warning("the process that computed died", name=order.name, exit_code=death.args[0])
                 with self._database.write() as session:
-                    jobs.give_up_job(session, job.id, worker=self._worker)
+                    jobs.requeue_or_fail_job(session, job.id, worker=self._worker)
                 return
         if result is None:
             _log.info("reproduction cancelled", name=order.name)
@@ -49,13 +49,13 @@ class Reproducer:
             jobs.finish_job(session, job.id, worker=self._worker, result=result.as_json())
         _log.info("reproduction stored", name=order.name, seconds=round(monotonic() - started_s, 1))
 
-    def _watch(self, job: Claimed, process: StudyProcess) -> Result | None:
+    def _watch(self, job: ClaimedJob, process: StudyProcess) -> Result | None:
         """Until it has a result, storing how far it is; None when the job was cancelled meanwhile."""
-        latest, stored = Advance(0.0, "starting"), Advance(0.0, "")
+        latest, stored = Progress(0.0, "starting"), Progress(0.0, "")
         due_s = 0.0
         while True:
             said = process.listen(max(due_s - monotonic(), 0.0))
-            if isinstance(said, Advance):
+            if isinstance(said, Progress):
                 latest = said
             elif said is not None:
                 return _checked(said)
@@ -68,12 +68,12 @@ class Reproducer:
                 return None
             stored = latest
 
-    def _put_back(self, job: Claimed) -> NoReturn:
+    def _put_back(self, job: ClaimedJob) -> NoReturn:
         with self._database.write() as session:
-            jobs.put_back_job(session, job.id, worker=self._worker)
+            jobs.requeue_job(session, job.id, worker=self._worker)
         raise CancelledError
 
-    def _still_wanted(self, job: Claimed, latest: Advance, *, is_news: bool) -> bool:
+    def _still_wanted(self, job: ClaimedJob, latest: Progress, *, is_news: bool) -> bool:
         """Whether the job is still this worker's; what is news is stored, and told to the browsers by that."""
         with self._database.write() as session:
             if not is_news:
@@ -83,15 +83,15 @@ class Reproducer:
             )
 
 
-def _checked(said: Said) -> Result:
+def _checked(said: StudyMessage) -> Result:
     """The result. Raises GainlineError when the process met with an error."""
     match said:
         case Result():
             return said
-        case Refused(message, hint, problems):
+        case StudyError(message, hint, problems):
             raise GainlineError(message, hint=hint, problems=problems)
-        case Mistaken(what, traceback):
+        case InternalFailure(what, traceback):
             _log.error("the process that computed made a mistake", exception=traceback)
-            raise mistake(what)
-        case Advance():
+            raise internal_error(what)
+        case Progress():
             raise AssertionError

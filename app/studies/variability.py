@@ -15,7 +15,7 @@ from app.core.definition import flight_seed
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Vector
-from app.core.statistics import Group, pooled, trend_of
+from app.core.statistics import Group, pool_scatter, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
 from app.studies.gate import overruled_for
 from app.studies.results import OVERRULE, Progress, Result, Row, marks, ratio
@@ -125,7 +125,7 @@ def _fly(policy: RepeatedPolicy, groups: int, fading_groups: int, tell: Callable
 def pooled_sigma(errors: Matrix) -> float:
     """σ in the errors' unit, pooled over the rows of (groups, repeats)."""
     groups = [Group(gains={}, numbers=(), errors=tuple(row)) for row in errors.tolist()]
-    return pooled(groups, _NO_PRIOR).sigma
+    return pool_scatter(groups, _NO_PRIOR).sigma
 
 
 def share_with_trend(errors: Matrix) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.core.control.fixed_point import fix
 from app.core.control.vertical_loop import ALT, POSITION_BITS
-from app.core.descent import descend
+from app.core.descent import minimise_in_box
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
@@ -220,7 +220,9 @@ _VALLEYS: Final = np.array([[1600.0, 1023.0, 130.0], [3500.0, 1040.0, 220.0]])
 def _descend(error: Callable[[Vector], float], start: Vector, step: float, evaluations: int) -> Vector:
     """Nelder–Mead with a first step of a share of each gain's scale."""
     space = _TAKEOFF.space
-    return descend(error, start, step * space.scale, space.lower, space.upper, evaluations=evaluations, tolerance=0.5)
+    return minimise_in_box(
+        error, start, step * space.scale, space.lower, space.upper, evaluations=evaluations, tolerance=0.5
+    )
 
 
 def _polish(error: Callable[[Vector], float], start: Vector, coarsest: float, finest: float) -> Vector:

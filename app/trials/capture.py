@@ -11,7 +11,7 @@ from app.core.trajectory import Trajectory
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
 from app.trials import history
-from app.trials.lifecycle import move_trial
+from app.trials.lifecycle import set_trial_state
 from app.trials.scoring import score
 from app.trials.states import Ending, TrialState
 
@@ -50,20 +50,20 @@ def capture(
     if ending == "aborted":
         row.abort_cause = "operator" if on_request else "limit"
     if ending == "aborted" and row.state == TrialState.FLYING:
-        move_trial(row, TrialState.ABORTED, reason=reason or "aborted")
+        set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
         return
-    move_trial(row, TrialState.CAPTURED, reason=reason if ending == "invalid" else "")
+    set_trial_state(row, TrialState.CAPTURED, reason=reason if ending == "invalid" else "")
     if ending == "aborted":
-        move_trial(row, TrialState.ABORTED, reason=reason or "aborted")
+        set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
         return
     row.error = judged.error  # told before somebody classes the flight; classing scores it again
-    if fleet.classed_by_program(campaign.vehicle):
+    if fleet.is_classed_automatically(campaign.vehicle):
         _classify(row, reason or "the measurement is no good" if ending == "invalid" else judged.refusal)
 
 
 def _classify(row: TrialRow, refusal: str) -> None:
     if row.error is None or row.ending == "invalid":
         row.error = None
-        move_trial(row, TrialState.INVALID, reason=refusal)
+        set_trial_state(row, TrialState.INVALID, reason=refusal)
     elif not row.glitches:
-        move_trial(row, TrialState.VALID)
+        set_trial_state(row, TrialState.VALID)

@@ -17,22 +17,22 @@ from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
 from app.processes import process_context
 from app.trials.crew import (
-    Decline,
-    Free,
-    Landed,
-    Orders,
-    Said,
-    Staged,
-    StandDown,
-    TakeOff,
-    as_asked,
-    died,
-    in_control,
-    mistake,
-    trouble,
+    CancelFlight,
+    CancelTakeOff,
+    FlightFinished,
+    FlightLanded,
+    FlightMessage,
+    FlightRequest,
+    GainsStaged,
+    TakeOffCommand,
+    failure_from,
+    hold_vehicle_lock,
+    internal_error,
+    mark_if_requested,
+    process_died_error,
 )
-from app.trials.flying import Monitor
-from app.vehicles.base import FlightRecord, ShouldStop, Stop, Vehicle
+from app.trials.flying import FlightMonitor
+from app.vehicles.base import FlightRecord, ShouldStop, StopRequest, Vehicle
 from app.vehicles.jsbsim.kind import prepare
 from app.vehicles.open import open_vehicle
 
@@ -41,7 +41,7 @@ CONTROL_WITHIN_S: Final = 10.0
 ENDS_WITHIN_S: Final = 5.0
 
 
-class Cockpit:
+class FlightProcess:
     """The worker's handle of one such process. `stand_down` may be called from any thread and from signal handlers."""
 
     def __init__(self) -> None:
@@ -52,31 +52,31 @@ class Cockpit:
         self._process.start()
         theirs.close()
 
-    def fly(self, orders: Orders) -> Iterator[Said]:
+    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
         """What the process says, until it is free again; the caller answers Staged by `take_off` or `decline`.
 
         Raises VehicleError when the process dies.
         """
         try:
             self._send(orders)
-            while not isinstance(said := self._pipe.recv(), Free):
+            while not isinstance(said := self._pipe.recv(), FlightFinished):
                 yield said
         except (EOFError, OSError) as error:
             self._process.join(ENDS_WITHIN_S)
-            raise died(self._process.exitcode) from error
+            raise process_died_error(self._process.exitcode) from error
 
     @property
     def alive(self) -> bool:
         return self._process.is_alive()
 
     def take_off(self) -> None:
-        self._tell(TakeOff())
+        self._tell(TakeOffCommand())
 
     def decline(self) -> None:
-        self._tell(Decline())
+        self._tell(CancelTakeOff())
 
     def stand_down(self, trial_id: int, reason: str) -> None:
-        self._tell(StandDown(trial_id, reason))
+        self._tell(CancelFlight(trial_id, reason))
 
     def close(self) -> None:
         """Let the process end; it is killed when it does not."""
@@ -86,28 +86,28 @@ class Cockpit:
             self._process.kill()
             self._process.join()
 
-    def _tell(self, message: TakeOff | Decline | StandDown) -> None:
+    def _tell(self, message: TakeOffCommand | CancelTakeOff | CancelFlight) -> None:
         with suppress(OSError):  # it is dead, which whoever listens to `fly` learns
             self._send(message)
 
-    def _send(self, message: Orders | TakeOff | Decline | StandDown) -> None:
+    def _send(self, message: FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight) -> None:
         with self._sending:
             self._pipe.send(message)
 
 
-class Hangar:
+class FlightProcessPool:
     """Cockpits in waiting, so that a flight finds one with everything loaded. Thread-safe."""
 
     def __init__(self, *, spare: int = 1) -> None:
         self._spare = spare
         self._lock = threading.Lock()
-        self._waiting = [Cockpit() for _ in range(spare)]
+        self._waiting = [FlightProcess() for _ in range(spare)]
 
-    def take(self) -> Cockpit:
+    def take(self) -> FlightProcess:
         with self._lock:
-            return self._waiting.pop() if self._waiting else Cockpit()
+            return self._waiting.pop() if self._waiting else FlightProcess()
 
-    def give_back(self, cockpit: Cockpit) -> None:
+    def give_back(self, cockpit: FlightProcess) -> None:
         """One that is free again; of too many, one is closed."""
         with self._lock:
             if len(self._waiting) < self._spare:
@@ -132,66 +132,66 @@ def _work(pipe: Connection) -> None:
             with suppress(GainlineError, ImportError):  # a flight that needs it says so
                 prepare()
         while True:
-            if isinstance(orders := pipe.recv(), Orders):
+            if isinstance(orders := pipe.recv(), FlightRequest):
                 _fly(pipe, orders)
-                pipe.send(Free())
+                pipe.send(FlightFinished())
     except (EOFError, OSError):
         os._exit(0)
 
 
-def _fly(pipe: Connection, orders: Orders) -> None:
+def _fly(pipe: Connection, orders: FlightRequest) -> None:
     try:
         with (
-            in_control(orders.lock, within_s=CONTROL_WITHIN_S, clock=orders.flight.clock),
+            hold_vehicle_lock(orders.lock, within_s=CONTROL_WITHIN_S, clock=orders.flight.clock),
             open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
         ):
-            pipe.send(Staged(vehicle.stage(orders.gains)))
+            pipe.send(GainsStaged(vehicle.stage(orders.gains)))
             standing_down: str | None = None
-            while not isinstance(answer := pipe.recv(), TakeOff | Decline):
-                if isinstance(answer, StandDown) and answer.trial_id == orders.trial_id:
+            while not isinstance(answer := pipe.recv(), TakeOffCommand | CancelTakeOff):
+                if isinstance(answer, CancelFlight) and answer.trial_id == orders.trial_id:
                     standing_down = answer.reason
-            if isinstance(answer, TakeOff):
-                pipe.send(Landed(_take_off(pipe, orders, vehicle, standing_down)))
+            if isinstance(answer, TakeOffCommand):
+                pipe.send(FlightLanded(_take_off(pipe, orders, vehicle, standing_down)))
     except GainlineError as error:
-        pipe.send(trouble(error))
+        pipe.send(failure_from(error))
     except (EOFError, OSError):
         raise
     except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
-        pipe.send(mistake(error))
+        pipe.send(internal_error(error))
 
 
-def _take_off(pipe: Connection, orders: Orders, vehicle: Vehicle, standing_down: str | None) -> FlightRecord:
+def _take_off(pipe: Connection, orders: FlightRequest, vehicle: Vehicle, standing_down: str | None) -> FlightRecord:
     experiment = get_experiment(orders.experiment)
-    monitor = Monitor(orders.campaign_id, orders.trial_id, experiment, pipe.send, orders.flight.clock)
+    monitor = FlightMonitor(orders.campaign_id, orders.trial_id, experiment, pipe.send, orders.flight.clock)
     monitor.phase("flying")
     asked: set[str] = set()
     listener = _listener(pipe, orders.trial_id, standing_down, asked)
     record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=listener)
     monitor.flush()
     monitor.phase("landed")
-    return as_asked(record, asked)
+    return mark_if_requested(record, asked)
 
 
 def _listener(pipe: Connection, trial_id: int, standing_down: str | None, asked: set[str]) -> ShouldStop:
     """Looks into the pipe, which takes microseconds, unless the flight is standing down already; why it is to end goes
     into `asked`."""
 
-    def should_stop() -> Stop | None:
+    def should_stop() -> StopRequest | None:
         stop = heard()
         if stop is not None:
             asked.add(stop.reason)
         return stop
 
-    def heard() -> Stop | None:
+    def heard() -> StopRequest | None:
         if standing_down is not None:
-            return Stop(standing_down)
+            return StopRequest(standing_down)
         try:
             while pipe.poll():
                 message = pipe.recv()
-                if isinstance(message, StandDown) and message.trial_id == trial_id:
-                    return Stop(message.reason)
+                if isinstance(message, CancelFlight) and message.trial_id == trial_id:
+                    return StopRequest(message.reason)
         except (EOFError, OSError):
-            return Stop("the worker is gone")
+            return StopRequest("the worker is gone")
         return None
 
     return should_stop

@@ -8,14 +8,14 @@ from typing import Final, Literal
 from app.core.definition import Flight
 from app.core.experiments.base import Scatter
 from app.core.policy import Gains
-from app.core.statistics import Group, Pooled, compare, groups_of, pooled
+from app.core.statistics import Group, PooledScatter, compare, groups_of, pool_scatter
 from app.db.models import TrialRow
 from app.trials.schemas import TrialComparison
 
 CONFIDENCE: Final = 0.9
 
 
-class Field:
+class ReferenceFlights:
     """The valid flights that a campaign's trials are held against, each found without a search however many there are.
 
     `valid` holds them in their order, `prior` is the experiment's scatter.
@@ -28,7 +28,7 @@ class Field:
         self._best_so_far = list(accumulate(scored, min))
         self._by_number: Mapping[int, Group] = {number: group for group in groups for number in group.numbers}
         self._by_gains: Mapping[object, Group] = {_key(group.gains): group for group in groups}
-        self.scatter: Final[Pooled | None] = pooled(groups, prior) if groups else None
+        self.scatter: Final[PooledScatter | None] = pool_scatter(groups, prior) if groups else None
 
     def best_before(self, number: int) -> tuple[float, int] | None:
         """Error and number of the best flight before that one."""
@@ -48,7 +48,7 @@ class Field:
         return self._by_gains.get(_key(gains))
 
 
-def comparisons(row: TrialRow, field: Field) -> list[TrialComparison]:
+def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
     """Against the best flight before it, then against the first; without those of the same gains. Each side counts with
     all its flights."""
     own = field.group_of(row.number)
@@ -73,7 +73,7 @@ def comparisons(row: TrialRow, field: Field) -> list[TrialComparison]:
     return found
 
 
-def _others(row: TrialRow, field: Field) -> Iterator[tuple[Literal["best before", "first"], int]]:
+def _others(row: TrialRow, field: ReferenceFlights) -> Iterator[tuple[Literal["best before", "first"], int]]:
     best, first = field.best_before(row.number), field.first_before(row.number)
     if best is None or first is None:
         return

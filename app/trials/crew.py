@@ -16,12 +16,12 @@ from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import LockedError, exclusive
-from app.vehicles.base import MOTORS_OFF_ASKED, FlightOrder, FlightRecord, OptionValue
+from app.vehicles.base import MOTORS_OFF_ASKED, FlightOptions, FlightRecord, OptionValue
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Orders:
+class FlightRequest:
     """Everything the process needs to know of one flight. `lock` is held while it has the vehicle; a vehicle that can
     keeps a log of its link in `tlog`."""
 
@@ -32,30 +32,30 @@ class Orders:
     vehicle_options: Mapping[str, OptionValue]
     safe_gains: Mapping[str, float]
     gains: Mapping[str, float]
-    flight: FlightOrder
+    flight: FlightOptions
     lock: Path
     tlog: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Staged:
+class GainsStaged:
     """Said by the process, which then waits for TakeOff or Decline."""
 
     read_back: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class TakeOff:
+class TakeOffCommand:
     """Said to the process: the gains are right and the lift-off is recorded."""
 
 
 @dataclass(frozen=True, slots=True)
-class Decline:
+class CancelTakeOff:
     """Said to the process: this flight does not take place."""
 
 
 @dataclass(frozen=True, slots=True)
-class StandDown:
+class CancelFlight:
     """Said to the process at any moment: end this flight now. One that was to take off ends on the ground."""
 
     trial_id: int
@@ -63,21 +63,21 @@ class StandDown:
 
 
 @dataclass(frozen=True, slots=True)
-class Landed:
+class FlightLanded:
     """Said by the process: the flight's record."""
 
     record: FlightRecord
 
 
 @dataclass(frozen=True, slots=True)
-class Restored:
+class SafeGainsRestored:
     """Said by the process, however the flight ended: the vehicle was given its safe gains and holds these."""
 
     held: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
+class FlightFailure:
     """Said by the process: what went wrong; `unsafe` when the safe gains could not be verified afterwards, `not_flown`
     when the vehicle was never told to take off."""
 
@@ -87,20 +87,22 @@ class Trouble:
 
 
 @dataclass(frozen=True, slots=True)
-class Free:
+class FlightFinished:
     """Said by the process: this flight is over, the next one may come."""
 
 
-Said = Staged | Telemetry | FlightPhase | Landed | Restored | Trouble | Free
+FlightMessage = (
+    GainsStaged | Telemetry | FlightPhase | FlightLanded | SafeGainsRestored | FlightFailure | FlightFinished
+)
 
 
-class Crew(Protocol):
+class FlightBackend(Protocol):
     """The worker's handle of a process that flies. Everything but `fly` may be called from any thread."""
 
     @property
     def alive(self) -> bool: ...
 
-    def fly(self, orders: Orders) -> Iterator[Said]:
+    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
         """What the process says, until it is free again; the caller answers Staged by `take_off` or `decline`.
 
         Raises VehicleError when the process dies.
@@ -115,7 +117,7 @@ class Crew(Protocol):
         ...
 
 
-def as_asked(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
+def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
     """The record; it says so where the flight was broken off for one of these reasons that were given from here, and
     not for a limit."""
     said = record.reason.removeprefix(MOTORS_OFF_ASKED)
@@ -123,18 +125,18 @@ def as_asked(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
     return replace(record, on_request=asked)
 
 
-def died(exit_code: int | None) -> VehicleError:
+def process_died_error(exit_code: int | None) -> VehicleError:
     return VehicleError(
         f"The process that flew died (exit code {exit_code}).",
         hint="Look at the vehicle. The worker's log may say more; then fly again.",
     )
 
 
-def trouble(error: GainlineError) -> Trouble:
+def failure_from(error: GainlineError) -> FlightFailure:
     """What went wrong, as the error tells it; first why it was not flown, where the error followed upon that."""
     refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
     what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
-    return Trouble(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
+    return FlightFailure(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
@@ -144,13 +146,13 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__context__
 
 
-def mistake(error: Exception) -> Trouble:
+def internal_error(error: Exception) -> FlightFailure:
     """What the program did wrong, for a truthful end of the trial."""
-    return Trouble(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False)
+    return FlightFailure(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False)
 
 
 @contextmanager
-def in_control(
+def hold_vehicle_lock(
     lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True, clock: Clock = REAL_TIME
 ) -> Iterator[None]:
     """The vehicle is this process's alone; one whose worker was killed may still be landing it, and is waited for while

@@ -29,7 +29,7 @@ from app.fleet import service as fleet
 from app.fleet.states import VehicleState
 from app.trials import repository
 from app.trials.capture import capture
-from app.trials.lifecycle import move_flight, move_trial
+from app.trials.lifecycle import set_flight_state, set_trial_state
 from app.trials.states import FlightMode, FlightState, TrialState
 from app.vehicles.base import FlightRecord, OptionValue
 
@@ -81,11 +81,13 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
 
 
 def _withdraw(flight: FlightRow, reason: str) -> None:
-    move_flight(flight, FlightState.CANCELLED, problem=f"It was not flown: {reason}. Ask again if it is still wanted.")
+    set_flight_state(
+        flight, FlightState.CANCELLED, problem=f"It was not flown: {reason}. Ask again if it is still wanted."
+    )
 
 
 def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightTask:
-    move_flight(flight, FlightState.RUNNING)
+    set_flight_state(flight, FlightState.RUNNING)
     flight.worker, flight.claimed_at = worker, utc_now()
     trial, campaign = flight.trial, campaigns.get_row(session, flight.campaign_id)
     flight.safe_gains = dict(flight.vehicle.safe_gains)
@@ -110,8 +112,8 @@ def record_staged(session: Session, flight_id: int, read_back: dict[str, float])
     flight = _running(session, flight_id)
     flight.read_back = flight.trial.read_back = read_back
     fleet.hold_gains(flight.vehicle, read_back)
-    move_trial(flight.trial, TrialState.STAGED)
-    fleet.move_vehicle(flight.vehicle, VehicleState.STAGED)
+    set_trial_state(flight.trial, TrialState.STAGED)
+    fleet.set_vehicle_state(flight.vehicle, VehicleState.STAGED)
 
 
 def take_off_wanted(session: Session, flight_id: int) -> bool:
@@ -160,10 +162,10 @@ def record_lift_off(session: Session, flight_id: int) -> None:
             f"Trial {trial.number} must not fly: the vehicle holds {trial.read_back}.",
             hint="Stage it again; if it happens again, look at the vehicle's link.",
         )
-    move_trial(trial, TrialState.FLYING, reason="")
+    set_trial_state(trial, TrialState.FLYING, reason="")
     trial.flown_at = utc_now()
-    fleet.move_vehicle(flight.vehicle, VehicleState.FLYING)
-    campaigns.begin_flying(campaigns.get_row(session, trial.campaign_id))
+    fleet.set_vehicle_state(flight.vehicle, VehicleState.FLYING)
+    campaigns.start_flying(campaigns.get_row(session, trial.campaign_id))
 
 
 def record_landing(session: Session, flight_id: int, record: FlightRecord) -> None:
@@ -178,7 +180,7 @@ def record_landing(session: Session, flight_id: int, record: FlightRecord) -> No
     _capture(session, campaign, flight, record)
     aborted = record.ending == "aborted"
     _end(flight, FlightState.ABORTED if aborted else FlightState.LANDED, problem=record.reason)
-    campaigns.end_flying(session, campaign)
+    campaigns.finish_flying(session, campaign)
 
 
 def record_loss(session: Session, flight_id: int, problem: str) -> None:
@@ -186,10 +188,10 @@ def record_loss(session: Session, flight_id: int, problem: str) -> None:
     flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
-    move_trial(flight.trial, TrialState.LOST, reason=problem)
+    set_trial_state(flight.trial, TrialState.LOST, reason=problem)
     _end(flight, FlightState.LOST, problem=problem)
     doubt_vehicle(session, flight_id)
-    campaigns.end_flying(session, campaigns.get_row(session, flight.campaign_id))
+    campaigns.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
 def record_failure(session: Session, flight_id: int, problem: str) -> None:
@@ -205,7 +207,7 @@ def record_withdrawal(session: Session, flight_id: int, reason: str) -> None:
 
 def quarantine_vehicle(session: Session, flight_id: int, concern: str) -> None:
     """After a flight whose safe gains could not be verified. The vehicle flies nothing until a person releases it."""
-    fleet.settle_vehicle(repository.get_flight(session, flight_id).vehicle, concern=concern)
+    fleet.set_state_after_flight(repository.get_flight(session, flight_id).vehicle, concern=concern)
 
 
 def doubt_vehicle(session: Session, flight_id: int) -> None:
@@ -283,13 +285,13 @@ def _not_flown(session: Session, flight_id: int, state: FlightState, problem: st
         return
     was_flying = flight.trial.state == TrialState.FLYING
     if flight.trial.state in {TrialState.STAGED, TrialState.FLYING}:
-        move_trial(flight.trial, TrialState.PLANNED, reason=problem)
+        set_trial_state(flight.trial, TrialState.PLANNED, reason=problem)
         flight.trial.flown_at = None
     _end(flight, state, problem=problem)
     if was_flying:
-        campaigns.end_flying(session, campaigns.get_row(session, flight.campaign_id))
+        campaigns.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
 def _end(flight: FlightRow, state: FlightState, *, problem: str = "") -> None:
-    move_flight(flight, state, problem=problem)
-    fleet.settle_vehicle(flight.vehicle)
+    set_flight_state(flight, state, problem=problem)
+    fleet.set_state_after_flight(flight.vehicle)

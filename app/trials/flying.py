@@ -7,12 +7,12 @@ import numpy as np
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
-from app.live.messages import FlightPhase, Phase, Shown, Telemetry
+from app.live.messages import FlightPhase, Phase, PublishedMessage, Telemetry
 from app.vehicles.base import Sample
 
 MESSAGES_PER_S: Final = 25
 
-Publish = Callable[[Shown], None]
+Publish = Callable[[PublishedMessage], None]
 
 
 class AbortFlag:
@@ -35,7 +35,7 @@ class AbortFlag:
             tell(self.reason)
 
 
-class Airspace:
+class AbortRegistry:
     """The flights of this process, by trial. Safe from any thread and from signal handlers: it takes no lock."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class Airspace:
         return sorted(self._flags)
 
 
-class Monitor:
+class FlightMonitor:
     """Gathers one flight's samples and publishes them in at most 25 messages a second, with the error so far.
 
     The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral

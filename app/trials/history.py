@@ -35,7 +35,7 @@ def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
     return repository.of_campaigns(session, campaign_ids)
 
 
-def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
+def list_gate_results(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
     """Of each trial its number, its state, and whether the gate passed its gains; by number."""
     return repository.gated(session, campaign_id)
 
@@ -47,7 +47,7 @@ def curves_of(session: Session, trials: Sequence[TrialRow]) -> Mapping[int, list
 
 def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The valid and aborted flights with their trajectories as stored."""
-    rows = counted(trials_of(session, campaign_id))
+    rows = in_history(trials_of(session, campaign_id))
     records = repository.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
     return tuple(
         _flight(row, _NOTHING if row.trajectory_id is None else _recorded(row, records[row.trajectory_id]))
@@ -68,7 +68,7 @@ def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight |
 
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
     """The same flights with nothing in their trajectories, for checks that look at gains only."""
-    return tuple(_flight(row, _NOTHING) for row in counted(trials))
+    return tuple(_flight(row, _NOTHING) for row in in_history(trials))
 
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
@@ -79,7 +79,7 @@ def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     )
 
 
-def counted(trials: Sequence[TrialRow]) -> list[TrialRow]:
+def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
     """The trials that are history: valid and aborted."""
     return [row for row in trials if row.state in HISTORY]
 
@@ -109,7 +109,7 @@ def history_digest(session: Session, campaign_id: int, definition: Definition, t
             row.predicted_interval,
             *(() if _is_against_gains(row) else ("not against the gains",)),
         ]
-        for row in counted(trials)
+        for row in in_history(trials)
     ]
     battery = [] if definition.stop.min_battery_v is None else [last_battery_v(trials)]
     content = json.dumps([definition.digest(), flights, *battery], sort_keys=True, separators=(",", ":"))
@@ -142,7 +142,7 @@ def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
     return min(valid, key=lambda found: found[:2])[2] if valid else None
 
 
-def unclassed(trials: Sequence[TrialRow]) -> TrialRow | None:
+def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:
     """The captured flight that waits for its class, which blocks the next proposal."""
     return next((row for row in trials if row.state == TrialState.CAPTURED), None)
 

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import proposing
 from app.campaigns.definitions import definition_of
 from app.core.experiments import experiment_of
-from app.core.gate import Gate, check_policy, require_flyable
+from app.core.gate import GateResult, check_policy, require_flyable
 from app.core.policy import Gains
 from app.db.models import CampaignRow, JsonObject, ProposalRow
 from app.fleet import service as fleet
@@ -16,7 +16,7 @@ from app.vehicles.open import get_kind
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class GateDecision:
     """Gains, complete and in order, that may fly: the gate's answer as it is stored, and why it was overruled, empty
     where it let them pass."""
 
@@ -25,7 +25,9 @@ class Judged:
     overrule_reason: str
 
 
-def judge_gains(session: Session, campaign: CampaignRow, asked: Gains, *, overrule: str | None = None) -> Judged:
+def check_own_gains(
+    session: Session, campaign: CampaignRow, asked: Gains, *, overrule: str | None = None
+) -> GateDecision:
     """Gains of one's own, judged over what was known of the vehicle when the latest proposal was computed.
 
     Takes a tenth of a second. Raises GainsError naming what is refused, with what would pass.
@@ -34,16 +36,16 @@ def judge_gains(session: Session, campaign: CampaignRow, asked: Gains, *, overru
     return _judged(campaign, gains, gate, overrule)
 
 
-def judge_flown(session: Session, campaign: CampaignRow, flown: Gains) -> Judged:
+def check_flown_gains(session: Session, campaign: CampaignRow, flown: Gains) -> GateDecision:
     """Gains that have flown elsewhere: what the gate says of them, whether or not it would have let them fly.
 
     Raises GainsError when they are none of the campaign's.
     """
     gains, gate = _asked(session, campaign, flown)
-    return Judged(gains, proposing.gate_json(gate), "")
+    return GateDecision(gains, proposing.gate_json(gate), "")
 
 
-def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], Gate]:
+def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
     """The gains, complete and in order, and the gate's answer."""
     definition = definition_of(campaign)
     experiment, space = experiment_of(definition), proposing.space_of(definition)
@@ -57,18 +59,18 @@ def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[
         gains,
         flown,
         start=proposing.stored_start(session, campaign) if searched else None,
-        spread=proposing.stored_spread(session, campaign, experiment),
+        spread=proposing.stored_distribution(session, campaign, experiment),
     )
     return gains, gate
 
 
-def judge_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> Judged:
+def check_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> GateDecision:
     """A proposal that still holds: it was judged on this very history. Raises GainsError as `judge_gains` does."""
     return _judged(campaign, proposal.gains, proposing.gate_of(proposal.gate), overrule)
 
 
-def _judged(campaign: CampaignRow, gains: dict[str, float], gate: Gate, overrule: str | None) -> Judged:
+def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, overrule: str | None) -> GateDecision:
     reason = require_flyable(gate, overrule=overrule or "", is_real=campaign.vehicle.is_real)
     if reason:
         get_kind(campaign.vehicle.kind).check_gains(fleet.options_of(campaign), gains)
-    return Judged(gains, proposing.gate_json(gate), reason)
+    return GateDecision(gains, proposing.gate_json(gate), reason)

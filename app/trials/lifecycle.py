@@ -4,22 +4,22 @@ from collections.abc import Iterable
 
 from app.db.models import FlightRow, TrialRow
 from app.db.types import utc_now
-from app.moves import check_move
-from app.trials.states import FLIGHT_MOVES, MOVES, UNDER_WAY, UNFLOWN, FlightState, TrialState
+from app.moves import check_transition
+from app.trials.states import ACTIVE_STATES, FLIGHT_TRANSITIONS, MOVES, UNFLOWN, FlightState, TrialState
 
 
-def move_trial(row: TrialRow, to: TrialState, *, reason: str | None = None) -> None:
+def set_trial_state(row: TrialRow, to: TrialState, *, reason: str | None = None) -> None:
     """Raises ConflictError when the states' table does not lead there. A reason replaces the one before."""
-    row.state = check_move(MOVES, row.state, to, f"Trial {row.number}")
+    row.state = check_transition(MOVES, row.state, to, f"Trial {row.number}")
     if reason is not None:
         row.reason = reason
 
 
-def move_flight(row: FlightRow, to: FlightState, *, problem: str = "") -> None:
+def set_flight_state(row: FlightRow, to: FlightState, *, problem: str = "") -> None:
     """Raises ConflictError when the states' table does not lead there."""
-    row.state = check_move(FLIGHT_MOVES, row.state, to, f"Flight {row.id}")
+    row.state = check_transition(FLIGHT_TRANSITIONS, row.state, to, f"Flight {row.id}")
     row.problem = problem
-    if to not in UNDER_WAY:
+    if to not in ACTIVE_STATES:
         row.finished_at = utc_now()
 
 
@@ -30,6 +30,6 @@ def cancel_unflown(trials: Iterable[TrialRow], flight: FlightRow | None, reason:
     """
     for row in trials:
         if row.state in UNFLOWN:
-            move_trial(row, TrialState.CANCELLED, reason=reason)
+            set_trial_state(row, TrialState.CANCELLED, reason=reason)
             if flight is not None and flight.trial_id == row.id and flight.state == FlightState.REQUESTED:
-                move_flight(flight, FlightState.CANCELLED, problem=reason)
+                set_flight_state(flight, FlightState.CANCELLED, problem=reason)

@@ -15,46 +15,48 @@ from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
 from app.errors import ConflictError, NotAllowedError
 from app.fleet import service as fleet
-from app.fleet.control import Asker, require_control, require_may_command, require_no_other
+from app.fleet.control import RequestContext, require_control, require_may_command, require_not_controlled_by_other
 from app.moves import check_action
 from app.trials import history, repository
-from app.trials.judging import judge_gains
-from app.trials.lifecycle import move_flight, move_trial
+from app.trials.judging import check_own_gains
+from app.trials.lifecycle import set_flight_state, set_trial_state
 from app.trials.schemas import AbortAnswer, FlightOrder, Trial
 from app.trials.states import ACTIONS, HISTORY, FlightMode, FlightState, TrialState
 from app.trials.views import trial_view
 
 
-def judge_ahead(session: Session, trial_id: int) -> None:
+def warm_gate_cache(session: Session, trial_id: int) -> None:
     """Let the gate simulate before `fly_trial` and `stage_trial` ask it within their transaction."""
     with suppress(GainlineError):
         row = repository.get_one(session, trial_id)
-        judge_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
+        check_own_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
 
 
-def fly_trial(session: Session, trial_id: int, order: FlightOrder, asker: Asker) -> Trial:
+def fly_trial(session: Session, trial_id: int, order: FlightOrder, asker: RequestContext) -> Trial:
     """Ask for the flight of a planned trial in one go; the worker carries it out.
 
     Raises ConflictError for an unclassed flight, a spent budget, a campaign that is over or not ready, a vehicle that
     is not ready or in somebody else's control; GainsError naming what the gate refuses, unless that was overruled;
     BusyError when the vehicle has a flight already; NotAllowedError for a real vehicle.
     """
-    return _asked_for(session, trial_id, "fly", order.speed, asker)
+    return _request_trial_flight(session, trial_id, "fly", order.speed, asker)
 
 
-def stage_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
+def stage_trial(session: Session, trial_id: int, asker: RequestContext) -> Trial:
     """Have a registered vehicle take the gains of a planned trial, and wait with them for its operator's word.
 
     Raises as `fly_trial` does; NotAllowedError for who may not command the vehicle."""
-    return _asked_for(session, trial_id, "stage", None, asker)
+    return _request_trial_flight(session, trial_id, "stage", None, asker)
 
 
-def _asked_for(session: Session, trial_id: int, mode: FlightMode, speed: float | None, asker: Asker) -> Trial:
+def _request_trial_flight(
+    session: Session, trial_id: int, mode: FlightMode, speed: float | None, asker: RequestContext
+) -> Trial:
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, mode, row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     require_open(session, campaign, HISTORY)
-    judged = judge_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
+    judged = check_own_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
     request_flight(session, campaign, row, asker, mode=mode, speed=speed)
     return trial_view(session, campaign, row)
@@ -64,7 +66,7 @@ def request_flight(
     session: Session,
     campaign: CampaignRow,
     row: TrialRow,
-    asker: Asker,
+    asker: RequestContext,
     *,
     mode: FlightMode = "fly",
     speed: float | None = None,
@@ -81,7 +83,7 @@ def request_flight(
         )
     rehearsals.require_rehearsed(session, campaign)
     fleet.require_ready(session, vehicle, mode)
-    require_no_other(vehicle, asker)
+    require_not_controlled_by_other(vehicle, asker)
     now = utc_now()
     session.add(
         FlightRow(
@@ -100,7 +102,7 @@ def request_flight(
     session.flush()
 
 
-def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
+def take_off_trial(session: Session, trial_id: int, asker: RequestContext) -> Trial:
     """The operator's own act, after which a staged vehicle takes off. For a real one it has to come from a page of
     ours in an unlocked browser on this computer, with the token of who is in control.
 
@@ -118,7 +120,7 @@ def take_off_trial(session: Session, trial_id: int, asker: Asker) -> Trial:
         rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may have been found bad while staged
     else:
         require_may_command(vehicle, asker)
-        require_no_other(vehicle, asker)
+        require_not_controlled_by_other(vehicle, asker)
     flight.take_off_at = utc_now()
     return trial_view(session, campaign, row)
 
@@ -149,7 +151,7 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
     row = repository.get_one(session, trial_id)
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        move_flight(flight, FlightState.CANCELLED, problem=reason)
+        set_flight_state(flight, FlightState.CANCELLED, problem=reason)
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(
@@ -170,8 +172,8 @@ def cancel_trial(session: Session, trial_id: int) -> Trial:
     check_action(ACTIONS, "cancel", row.state, f"Trial {row.number}")
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
-        move_flight(flight, FlightState.CANCELLED, problem="the trial was cancelled")
-    move_trial(row, TrialState.CANCELLED, reason="cancelled by the operator")
+        set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")
+    set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
 
@@ -185,7 +187,7 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
             f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
             hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
         )
-    if (waiting := history.unclassed(trials)) is not None:
+    if (waiting := history.find_unreviewed(trials)) is not None:
         raise ConflictError(
             f"Flight {waiting.number} waits for its class.",
             hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",

@@ -10,7 +10,7 @@ from app.core.policy import Gains
 from app.db.models import CampaignRow, TrialRow
 from app.errors import Problem, UnconfirmedError
 from app.logs.takeoffs import Takeoff
-from app.trials.judging import judge_flown
+from app.trials.judging import check_flown_gains
 
 _SINGLE_PRECISION: Final = 1e-6
 """Logs carry gains as single-precision numbers."""
@@ -37,7 +37,7 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         )
     row.read_back = dict(flown.gains)
     if _alike(row.gains, flown.gains):
-        judged = judge_flown(session, campaign, flown.gains)
+        judged = check_flown_gains(session, campaign, flown.gains)
         row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
         row.predicted_error = row.predicted_interval = None
 

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session, defer, joinedload, undefer
 
 from app.db.models import CampaignRow, FlightRow, GainsJson, TrajectoryRow, TrialPhotoRow, TrialRow
 from app.errors import NotFoundError
-from app.trials.states import UNDER_WAY, FlightState, TrialState
+from app.trials.states import ACTIVE_STATES, FlightState, TrialState
 
 BEST_ERROR: Final = (
     select(func.min(TrialRow.error))
@@ -136,7 +136,7 @@ def get_flight(session: Session, flight_id: int) -> FlightRow:
 def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRow | None:
     return session.scalar(
         select(FlightRow)
-        .where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(UNDER_WAY))
+        .where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(ACTIVE_STATES))
         .order_by(FlightRow.id)
         .limit(1)
     )
@@ -144,7 +144,7 @@ def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRo
 
 def first_under_way(session: Session) -> FlightRow | None:
     """Of whatever vehicle."""
-    return session.scalar(select(FlightRow).where(FlightRow.state.in_(UNDER_WAY)).order_by(FlightRow.id).limit(1))
+    return session.scalar(select(FlightRow).where(FlightRow.state.in_(ACTIVE_STATES)).order_by(FlightRow.id).limit(1))
 
 
 def first_requested(session: Session) -> FlightRow | None:

@@ -7,15 +7,15 @@ from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from app.api.deps import (
-    Act,
-    Asking,
     CurrentDatabase,
     CurrentSettings,
     CursorText,
     Id,
+    IdempotentPost,
     Limit,
     Live,
     Reader,
+    RequestContextDep,
     Writer,
     json_only,
 )
@@ -45,12 +45,12 @@ def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: Cur
 
 
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
-def create_trial(act: Act, asking: Asking, campaign_id: Id, body: NewTrial) -> Trial:
+def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: NewTrial) -> Trial:
     """Plan a trial of the proposal or of gains of one's own, and fly it at once if asked to."""
     return act(
         Trial,
         lambda session: service.create_trial(session, campaign_id, body, asking),
-        ahead=lambda session: service.judge_new_ahead(session, campaign_id, body),
+        ahead=lambda session: service.warm_gate_cache_for_new(session, campaign_id, body),
     )
 
 
@@ -66,34 +66,34 @@ def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
 
 
 @router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
-def fly_trial(act: Act, asking: Asking, trial_id: Id, body: FlightOrder | None = None) -> Trial:
+def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: FlightOrder | None = None) -> Trial:
     """Ask for the flight of a planned trial in one go. A vehicle that has a flight already refuses a second one, and a
     real one refuses every one: it is staged."""
     return act(
         Trial,
         lambda session: orders.fly_trial(session, trial_id, body or FlightOrder(), asking),
-        ahead=lambda session: orders.judge_ahead(session, trial_id),
+        ahead=lambda session: orders.warm_gate_cache(session, trial_id),
     )
 
 
 @router.post("/trials/{trial_id}/stage", status_code=status.HTTP_202_ACCEPTED)
-def stage_trial(act: Act, asking: Asking, trial_id: Id) -> Trial:
+def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """Have a registered vehicle take the gains of a planned trial, read them back, and wait for its operator."""
     return act(
         Trial,
         lambda session: orders.stage_trial(session, trial_id, asking),
-        ahead=lambda session: orders.judge_ahead(session, trial_id),
+        ahead=lambda session: orders.warm_gate_cache(session, trial_id),
     )
 
 
 @router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
-def unstage_trial(act: Act, trial_id: Id) -> Trial:
+def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
     """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
     return act(Trial, lambda session: orders.unstage_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
-def take_off_trial(act: Act, asking: Asking, trial_id: Id) -> Trial:
+def take_off_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """The operator's own act: a staged vehicle takes off. For a real one it is taken only from the dashboard's own
     page, on this computer, with the token of who is in control."""
     return act(Trial, lambda session: orders.take_off_trial(session, trial_id, asking))
@@ -116,19 +116,19 @@ def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAns
 
 
 @router.post("/trials/{trial_id}/cancel")
-def cancel_trial(act: Act, trial_id: Id) -> Trial:
+def cancel_trial(act: IdempotentPost, trial_id: Id) -> Trial:
     """Give up a trial that has not flown."""
     return act(Trial, lambda session: orders.cancel_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/classify")
-def classify_trial(act: Act, asking: Asking, trial_id: Id, body: Classification) -> Trial:
+def classify_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: Classification) -> Trial:
     """Say what a finished flight is worth; whatever was computed from it is computed again."""
     return act(Trial, lambda session: service.classify_trial(session, trial_id, body, asking))
 
 
 @router.post("/trials/{trial_id}/judge-abort")
-def judge_abort(act: Act, trial_id: Id, body: AbortJudgement) -> Trial:
+def judge_abort(act: IdempotentPost, trial_id: Id, body: AbortJudgement) -> Trial:
     """Say why the operator broke a flight off. It counts against its gains only if the vehicle behaved badly; whatever
     was computed from it is computed again."""
     return act(Trial, lambda session: service.judge_abort(session, trial_id, body))

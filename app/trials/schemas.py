@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.core.statistics import Word
+from app.core.statistics import Verdict
 from app.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
 from app.trials.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 
@@ -128,7 +128,7 @@ class TrialComparison(BaseModel):
 
     against: Literal["best before", "first"]
     trial_number: int
-    verdict: Word
+    verdict: Verdict
     confidence: float | None
     difference: float
     standard_error: float | None

@@ -5,7 +5,7 @@ from typing import Final
 
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
-from app.core.thinning import kept
+from app.core.thinning import select_samples
 from app.core.trajectory import Trajectory
 
 CURVE_POINTS: Final = 48
@@ -51,5 +51,6 @@ def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:
     flown = trajectory.time_s >= 0.0
     time_s, values = trajectory.time_s[flown], trajectory[experiment.output][flown]
     return [
-        [round(float(time_s[index]), 3), round(float(values[index]), 4)] for index in kept(time_s, values, CURVE_POINTS)
+        [round(float(time_s[index]), 3), round(float(values[index]), 4)]
+        for index in select_samples(time_s, values, CURVE_POINTS)
     ]

@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.access import Act
+from app.access import Permission
 from app.campaigns import proposing
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
@@ -22,21 +22,21 @@ from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.errors import ConflictError, NotFoundError
 from app.fleet import service as fleet
-from app.fleet.control import NOBODY, Asker, require_may
+from app.fleet.control import LOCAL_CLI, RequestContext, require_may
 from app.limited import FILE, run_limited
 from app.logs.takeoffs import Takeoff
-from app.moves import check_action, check_move, check_version
+from app.moves import check_action, check_transition, check_version
 from app.schemas import Page
 from app.trials import history, repository
 from app.trials.capture import capture
-from app.trials.judging import Judged, judge_gains, judge_proposal
-from app.trials.lifecycle import move_trial
+from app.trials.judging import GateDecision, check_own_gains, check_proposal
+from app.trials.lifecycle import set_trial_state
 from app.trials.orders import request_flight, require_open
 from app.trials.records import settle_gains
 from app.trials.schemas import AbortJudgement, Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
-from app.trials.states import ACTIONS, HISTORY, IN_BUDGET, MOVES, TrialKind, TrialState
+from app.trials.states import ACTIONS, BUDGETED_STATES, HISTORY, MOVES, TrialKind, TrialState
 from app.trials.telemetry_logs import log_of_trial, telemetry_log
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
@@ -56,7 +56,7 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return _seen(session, repository.get_one(session, trial_id))
 
 
-def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Asker = NOBODY) -> Trial:
+def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: RequestContext = LOCAL_CLI) -> Trial:
     """Plan a trial and, with `fly`, ask for its flight.
 
     Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
@@ -64,8 +64,8 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Asker
     real vehicle; and what `fly_trial` raises.
     """
     campaign = campaigns.get_row(session, campaign_id)
-    require_may(Act.REVIEW, campaign.vehicle, asker)
-    require_open(session, campaign, IN_BUDGET)
+    require_may(Permission.REVIEW, campaign.vehicle, asker)
+    require_open(session, campaign, BUDGETED_STATES)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
     number = repository.next_number(session, campaign_id)
@@ -90,7 +90,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Asker
     return trial_view(session, campaign, row)
 
 
-def judge_new_ahead(session: Session, campaign_id: int, new: NewTrial) -> None:
+def warm_gate_cache_for_new(session: Session, campaign_id: int, new: NewTrial) -> None:
     """Let the gate simulate before `create_trial` asks it within its transaction: it remembers what it found. What is
     wrong with the trial is said there."""
     with suppress(GainlineError):
@@ -106,14 +106,14 @@ def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     return _seen(session, row)
 
 
-def classify_trial(session: Session, trial_id: int, said: Classification, asker: Asker = NOBODY) -> Trial:
+def classify_trial(session: Session, trial_id: int, said: Classification, asker: RequestContext = LOCAL_CLI) -> Trial:
     """A person's word on a flight; the next gains are computed again from what counts now.
 
     Raises ConflictError when the states' table does not lead there or somebody else was faster, InputError when a
     flight without a usable record is to count, NotAllowedError for who may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
-    require_may(Act.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, asker)
+    require_may(Permission.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, asker)
     outcome = TrialState(said.outcome)
     check_version(
         said.version,
@@ -122,11 +122,11 @@ def classify_trial(session: Session, trial_id: int, said: Classification, asker:
         {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)},
     )
     check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
-    check_move(MOVES, row.state, outcome, f"Trial {row.number}")
+    check_transition(MOVES, row.state, outcome, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
-    move_trial(row, outcome, reason=said.reason)
+    set_trial_state(row, outcome, reason=said.reason)
     row.version += 1
     campaigns.history_changed(session, campaign)
     return trial_view(session, campaign, row)
@@ -193,10 +193,10 @@ def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed:
         )
     require_open(session, campaign, HISTORY)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
-    campaigns.begin_flying(campaign)
+    campaigns.start_flying(campaign)
     row.flown_at = utc_now()
     capture(session, campaign, row, flown.trajectory)
-    campaigns.end_flying(session, campaign)
+    campaigns.finish_flying(session, campaign)
     return trial_view(session, campaign, row)
 
 
@@ -208,7 +208,7 @@ def import_into_campaign(
 
     Raises NotFoundError, InputError when several campaigns or trials are meant, and what `import_record` raises.
     """
-    campaign_id = campaigns.identify(session, campaign)
+    campaign_id = campaigns.find_by_id_or_name(session, campaign)
     row = campaigns.get_row(session, campaign_id)
     trials = history.trials_of(session, campaign_id)
     if number is not None:
@@ -226,7 +226,7 @@ def import_into_campaign(
         )
     if chosen:
         return import_record(session, chosen[0].id, flown, confirmed=confirmed)
-    proposal = proposing.latest_fresh(session, row)
+    proposal = proposing.require_fresh_proposal(session, row)
     planned = create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
     return import_record(session, planned.id, flown, confirmed=confirmed)
 
@@ -283,7 +283,7 @@ def _seen(session: Session, row: TrialRow) -> Trial:
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
 
-def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[Judged, ProposalRow | None]:
+def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[GateDecision, ProposalRow | None]:
     """Gains that may fly, and the proposal that they are from, if they are from one."""
     if sum(given is not None for given in (new.proposal_id, new.gains, new.variant)) != 1:
         raise InputError(
@@ -294,15 +294,15 @@ def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[Jud
     if new.proposal_id is None:
         asked = new.gains if new.variant is None else gains_of(session, campaign, new.variant)
         assert asked is not None
-        return judge_gains(session, campaign, asked, overrule=new.overrule), None
+        return check_own_gains(session, campaign, asked, overrule=new.overrule), None
     proposal = proposing.fresh_proposal(session, campaign, new.proposal_id)
-    return judge_proposal(campaign, proposal, overrule=new.overrule), proposal
+    return check_proposal(campaign, proposal, overrule=new.overrule), proposal
 
 
 def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None) -> TrialKind:
     if proposal is not None and proposal.kind != "none":
         return proposal.kind
-    flown = history.counted(history.trials_of(session, campaign.id))
+    flown = history.in_history(history.trials_of(session, campaign.id))
     return "repeat" if any(row.gains == gains for row in flown) else "manual"
 
 

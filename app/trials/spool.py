@@ -18,14 +18,14 @@ from app.core.trajectory import Trajectory
 from app.errors import StorageError
 from app.vehicles.base import Ending, FlightRecord, OptionValue
 
-ROOM_BYTES: Final = 4 * 2**20
+RESERVED_BYTES: Final = 4 * 2**20
 """Claimed before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
 _UNFINISHED: Final = ".claimed"
 _FINISHED: Final = ".flight"
 
 
 @dataclass(frozen=True, slots=True)
-class Spooled:
+class SpooledRecord:
     """A flight record as the spool keeps it, and which flight row it belongs to."""
 
     flight_id: int
@@ -44,13 +44,13 @@ class Spool:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             with path.open("wb") as file:
-                os.posix_fallocate(file.fileno(), 0, ROOM_BYTES)
+                os.posix_fallocate(file.fileno(), 0, RESERVED_BYTES)
         except OSError as error:
             with suppress(OSError):
                 path.unlink(missing_ok=True)
             raise StorageError(
                 f"There is no room for the flight's record in {self._folder}: {error.strerror}.",
-                hint=f"Free at least {2 * ROOM_BYTES // 2**20} MB there, then fly again; nothing has moved.",
+                hint=f"Free at least {2 * RESERVED_BYTES // 2**20} MB there, then fly again; nothing has moved.",
             ) from error
 
     def keep(self, flight_id: int, record: FlightRecord) -> None:
@@ -58,7 +58,7 @@ class Spool:
         path = self._path(flight_id, _UNFINISHED)
         try:
             with path.open("r+b") as file:
-                file.write(_pack(Spooled(flight_id, record)))
+                file.write(_pack(SpooledRecord(flight_id, record)))
                 file.truncate()
                 os.fsync(file.fileno())
             path.replace(self._path(flight_id, _FINISHED))
@@ -73,7 +73,7 @@ class Spool:
         """The flights whose records wait here."""
         return sorted(int(path.stem) for path in self._folder.glob(f"*{_FINISHED}"))
 
-    def read(self, flight_id: int) -> Spooled:
+    def read(self, flight_id: int) -> SpooledRecord:
         """Raises StorageError when the file is damaged."""
         path = self._path(flight_id, _FINISHED)
         try:
@@ -109,7 +109,7 @@ class Spool:
         return self._folder / f"{flight_id}{suffix}"
 
 
-def _pack(spooled: Spooled) -> bytes:
+def _pack(spooled: SpooledRecord) -> bytes:
     record = spooled.record
     trajectory = record.trajectory
     header = {
@@ -128,7 +128,7 @@ def _pack(spooled: Spooled) -> bytes:
     return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
 
 
-def _unpack(content: bytes) -> Spooled:
+def _unpack(content: bytes) -> SpooledRecord:
     digest, _, body = content.partition(b"\n")
     if hashlib.sha256(body).hexdigest().encode() != digest:
         raise ValueError("its checksum is wrong")
@@ -138,7 +138,7 @@ def _unpack(content: bytes) -> Spooled:
     channels = dict(zip(header["channels"], values, strict=True))
     ending: Ending = header["ending"]
     settings: dict[str, OptionValue] = header["settings"]
-    return Spooled(
+    return SpooledRecord(
         header["flight_id"],
         FlightRecord(
             trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),

@@ -67,7 +67,7 @@ HISTORY: Final = frozenset({TrialState.VALID, TrialState.ABORTED})
 UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED})
 """Trials that may still fly, or be given up."""
 
-IN_BUDGET: Final = HISTORY | UNFLOWN | {TrialState.FLYING, TrialState.CAPTURED}
+BUDGETED_STATES: Final = HISTORY | UNFLOWN | {TrialState.FLYING, TrialState.CAPTURED}
 """Trials that have used up, or may yet use up, a flight of the budget."""
 
 ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
@@ -103,10 +103,10 @@ class FlightState(StrEnum):
     CANCELLED = "cancelled"
 
 
-UNDER_WAY: Final = frozenset({FlightState.REQUESTED, FlightState.RUNNING})
+ACTIVE_STATES: Final = frozenset({FlightState.REQUESTED, FlightState.RUNNING})
 """A vehicle has at most one flight in these states."""
 
-FLIGHT_MOVES: Final[Mapping[FlightState, frozenset[FlightState]]] = {
+FLIGHT_TRANSITIONS: Final[Mapping[FlightState, frozenset[FlightState]]] = {
     FlightState.REQUESTED: frozenset({FlightState.RUNNING, FlightState.CANCELLED}),
     FlightState.RUNNING: frozenset(
         {FlightState.LANDED, FlightState.ABORTED, FlightState.FAILED, FlightState.LOST, FlightState.CANCELLED}

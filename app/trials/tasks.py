@@ -19,13 +19,13 @@ from app.db.session import Database
 from app.errors import GainlineError, StorageError
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.trials import flights
-from app.trials.cockpit import Cockpit, Hangar
-from app.trials.crew import Crew, Landed, Orders, Restored, Staged, Trouble
+from app.trials.cockpit import FlightProcess, FlightProcessPool
+from app.trials.crew import FlightBackend, FlightFailure, FlightLanded, FlightRequest, GainsStaged, SafeGainsRestored
 from app.trials.flights import FlightTask
-from app.trials.flying import AbortFlag, Airspace, Publish
+from app.trials.flying import AbortFlag, AbortRegistry, Publish
 from app.trials.spool import Spool
 from app.trials.telemetry_logs import telemetry_log
-from app.vehicles.base import FlightOrder, FlightRecord
+from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import get_kind
 
@@ -38,7 +38,7 @@ _log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ended:
+class FlightOutcome:
     """How a flight ended, so far as this process knows.
 
     With a `record` it took place. Without one, `lifted_off` says whether the vehicle had been told to take off, and
@@ -55,11 +55,11 @@ class Ended:
     restored: dict[str, float] | None = None
 
 
-def _no_session(_vehicle_id: int) -> Crew:
+def _refuse_session(_vehicle_id: int) -> FlightBackend:
     raise VehicleError("There is no link to the vehicle.", hint="Connect it, then ask again.")
 
 
-class FlightDeck:
+class FlightRunner:
     """Claims flights and carries them out. `closing` ends the waiting for a database that takes nothing.
 
     `session(vehicle_id)` gives whoever has the link to a vehicle that keeps one between flights; others are opened for
@@ -70,12 +70,12 @@ class FlightDeck:
         self,
         database: Database,
         data_dir: Path,
-        airspace: Airspace,
+        airspace: AbortRegistry,
         publish: Publish,
         *,
         worker: str,
         closing: threading.Event,
-        session: Callable[[int], Crew] = _no_session,
+        session: Callable[[int], FlightBackend] = _refuse_session,
         clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
@@ -87,7 +87,7 @@ class FlightDeck:
         self._worker = worker
         self._closing = closing
         self._clock = clock
-        self._hangar = Hangar()
+        self._hangar = FlightProcessPool()
 
     def close(self) -> None:
         """When nothing flies any more."""
@@ -127,29 +127,29 @@ class FlightDeck:
             finally:
                 self._airspace.leave(task.trial_id)
 
-    def _fly(self, task: FlightTask, flag: AbortFlag) -> Ended:
+    def _fly(self, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
         if flag.reason is not None:
-            return Ended(withdrawn=True, problem=flag.reason)
+            return FlightOutcome(withdrawn=True, problem=flag.reason)
         try:
             self._spool.claim(task.flight_id)
             telemetry_log(self._data_dir, task.flight_id).parent.mkdir(exist_ok=True)
             crew = self._crew(task)
         except (GainlineError, OSError) as error:
-            return Ended(problem=f"It was not begun: {error}")
+            return FlightOutcome(problem=f"It was not begun: {error}")
         try:
             return self._fly_with(crew, task, flag)
         finally:
             flag.tell(lambda _reason: None)
 
-    def _crew(self, task: FlightTask) -> Crew:
+    def _crew(self, task: FlightTask) -> FlightBackend:
         """Raises VehicleError when the vehicle keeps a link, and there is none."""
         if get_kind(task.vehicle_kind).connect is not None:
             return self._session(task.vehicle_id)
         return self._hangar.take()
 
-    def _fly_with(self, crew: Crew, task: FlightTask, flag: AbortFlag) -> Ended:
+    def _fly_with(self, crew: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
         """The part that the vehicle takes part in; whatever happens, its process is let go, and there is an end."""
-        ended = Ended()
+        ended = FlightOutcome()
         try:
             self._phase(task, "staging")
             flag.tell(lambda reason: crew.stand_down(task.trial_id, reason))
@@ -157,13 +157,13 @@ class FlightDeck:
                 match said:
                     case Telemetry() | FlightPhase():
                         self._publish(said)
-                    case Staged(read_back):
+                    case GainsStaged(read_back):
                         ended = self._staged(task, flag, crew, read_back)
-                    case Landed(record):
-                        ended = Ended(record=record, lifted_off=True)
-                    case Restored(held):
+                    case FlightLanded(record):
+                        ended = FlightOutcome(record=record, lifted_off=True)
+                    case SafeGainsRestored(held):
                         ended = replace(ended, restored=held)
-                    case Trouble(what, unsafe, not_flown):
+                    case FlightFailure(what, unsafe, not_flown):
                         ended = replace(
                             ended,
                             problem=ended.problem or what,
@@ -172,31 +172,33 @@ class FlightDeck:
                         )
         except Exception as error:  # noqa: BLE001 - a mistake of the program must not leave the trial without an end
             crew.close()
-            return replace(ended, problem=_spoken(error), unheard=True)
-        if isinstance(crew, Cockpit):
+            return replace(ended, problem=_describe_error(error), unheard=True)
+        if isinstance(crew, FlightProcess):
             self._hangar.give_back(crew)
         return ended
 
-    def _staged(self, task: FlightTask, flag: AbortFlag, crew: Crew, read_back: dict[str, float]) -> Ended:
+    def _staged(
+        self, task: FlightTask, flag: AbortFlag, crew: FlightBackend, read_back: dict[str, float]
+    ) -> FlightOutcome:
         """Take off if the vehicle holds what it was given and the database has taken note; else stand down."""
-        ended = Ended(lifted_off=True)
+        ended = FlightOutcome(lifted_off=True)
         try:
             self._store(lambda session: flights.record_staged(session, task.flight_id, read_back))
-            if (problem := mismatch(task.gains, read_back)) is not None:
-                ended = Ended(problem=problem)
+            if (problem := describe_mismatch(task.gains, read_back)) is not None:
+                ended = FlightOutcome(problem=problem)
             elif (withdrawn := self._word(task, flag, crew)) is not None:
-                ended = Ended(withdrawn=True, problem=withdrawn)
+                ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
                 self._store(lambda session: flights.record_lift_off(session, task.flight_id))
         except GainlineError as error:
-            ended = Ended(problem=f"It was not flown, because that could not be recorded: {error}")
+            ended = FlightOutcome(problem=f"It was not flown, because that could not be recorded: {error}")
         if ended.lifted_off:
             crew.take_off()
         else:
             crew.decline()
         return ended
 
-    def _word(self, task: FlightTask, flag: AbortFlag, crew: Crew) -> str | None:
+    def _word(self, task: FlightTask, flag: AbortFlag, crew: FlightBackend) -> str | None:
         """None when the vehicle may take off, at once or at its operator's word; else why it is not to."""
         if task.mode == "fly":
             return flag.reason
@@ -219,8 +221,8 @@ class FlightDeck:
             self._clock.wait_s(LOOK_EVERY_S)
         return f"nobody asked for its take-off within {STAGED_FOR_S / 60:g} minutes"
 
-    def _orders(self, task: FlightTask) -> Orders:
-        return Orders(
+    def _orders(self, task: FlightTask) -> FlightRequest:
+        return FlightRequest(
             campaign_id=task.campaign_id,
             trial_id=task.trial_id,
             experiment=task.experiment,
@@ -228,7 +230,7 @@ class FlightDeck:
             vehicle_options=task.vehicle_options,
             safe_gains=task.safe_gains,
             gains=task.gains,
-            flight=FlightOrder(seed=task.seed, speed=task.speed, clock=self._clock),
+            flight=FlightOptions(seed=task.seed, speed=task.speed, clock=self._clock),
             lock=self._data_dir / f"vehicle-{task.vehicle_kind}.lock",
             tlog=telemetry_log(self._data_dir, task.flight_id),
         )
@@ -236,7 +238,7 @@ class FlightDeck:
     def _phase(self, task: FlightTask, phase: Phase, note: str = "") -> None:
         self._publish(FlightPhase(campaign_id=task.campaign_id, trial_id=task.trial_id, phase=phase, note=note))
 
-    def _report(self, task: FlightTask, ended: Ended) -> None:
+    def _report(self, task: FlightTask, ended: FlightOutcome) -> None:
         """Store the outcome. What the database refuses is put aside, and the flight is given up in its place: nothing
         but a worker's end leaves a flight running."""
         _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
@@ -251,8 +253,8 @@ class FlightDeck:
             self._spool.drop(task.flight_id)
             self._phase(task, "ended")
 
-    def _refused(self, task: FlightTask, ended: Ended, error: Exception) -> str:
-        why = f"Its outcome cannot be stored: {_spoken(error)}"
+    def _refused(self, task: FlightTask, ended: FlightOutcome, error: Exception) -> str:
+        why = f"Its outcome cannot be stored: {_describe_error(error)}"
         if ended.record is None:
             return why
         kept_as = self._spool.set_aside(task.flight_id)
@@ -303,7 +305,7 @@ class FlightDeck:
         _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
 
 
-def mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None:
+def describe_mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None:
     """What differs between the gains sent and those read back, or None."""
     wrong = [
         f"{name} is {read_back.get(name, 'missing')} instead of {value:g}"
@@ -313,7 +315,7 @@ def mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None
     return f"The vehicle did not take the gains: {'; '.join(wrong)}. It was not flown." if wrong else None
 
 
-def _spoken(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     """What went wrong, in words for the operator; what the program did wrong goes to the log in full."""
     if isinstance(error, GainlineError):
         return str(error)
@@ -321,7 +323,7 @@ def _spoken(error: Exception) -> str:
     return f"The program made a mistake ({type(error).__name__}); see the worker's log."
 
 
-def _record(session: Session, task: FlightTask, ended: Ended) -> None:
+def _record(session: Session, task: FlightTask, ended: FlightOutcome) -> None:
     if ended.record is not None:
         flights.record_landing(session, task.flight_id, ended.record)
     elif ended.lifted_off:
@@ -335,12 +337,12 @@ def _record(session: Session, task: FlightTask, ended: Ended) -> None:
     _record_doubts(session, task, ended)
 
 
-def _give_up(session: Session, task: FlightTask, ended: Ended, problem: str) -> None:
+def _give_up(session: Session, task: FlightTask, ended: FlightOutcome, problem: str) -> None:
     flights.give_up_flight(session, task.flight_id, problem)
     _record_doubts(session, task, ended)
 
 
-def _record_doubts(session: Session, task: FlightTask, ended: Ended) -> None:
+def _record_doubts(session: Session, task: FlightTask, ended: FlightOutcome) -> None:
     if ended.concern:
         flights.quarantine_vehicle(session, task.flight_id, ended.concern)
     elif ended.unheard:

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import proposing
 from app.campaigns.definitions import definition_of
-from app.campaigns.statistics import contest_of
+from app.campaigns.statistics import standing_within_bounds_of
 from app.db.models import CampaignRow
 from app.errors import ConflictError
 from app.trials import history
@@ -23,7 +23,7 @@ def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[
 
     Raises ConflictError before the first valid flight inside them, and where half a step is none.
     """
-    now = contest_of(campaign, history.trials_of(session, campaign.id))
+    now = standing_within_bounds_of(campaign, history.trials_of(session, campaign.id))
     if now is None:
         raise ConflictError(
             f"Campaign {campaign.id} has no valid flight inside its bounds yet for a {variant} to be measured from.",
@@ -35,7 +35,7 @@ def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[
     if variant == "repeat":
         return best
     space = proposing.space_of(definition_of(campaign))
-    proposed = space.vector(proposing.latest_fresh(session, campaign).gains)
+    proposed = space.vector(proposing.require_fresh_proposal(session, campaign).gains)
     half = space.mapping(space.nearest((space.vector(best) + proposed) / 2.0))
     if half == best or np.array_equal(space.vector(half), proposed):
         raise ConflictError(

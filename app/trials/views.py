@@ -4,10 +4,10 @@ from collections.abc import Iterable, Sequence
 
 from sqlalchemy.orm import Session
 
-from app.campaigns.rehearsals import is_free_to_fly, rehearsal_of
+from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.core.experiments import get_experiment
-from app.core.thinning import kept
+from app.core.thinning import select_samples
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.wording import percent
 from app.db.models import CampaignRow, FlightRow, TrialRow
@@ -15,10 +15,10 @@ from app.fleet import service as fleet
 from app.moves import allowed
 from app.schemas import Gate, Interval
 from app.trials import history, repository
-from app.trials.comparisons import Field, comparisons
+from app.trials.comparisons import ReferenceFlights, comparisons
 from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
-from app.trials.states import ACTIONS, UNDER_WAY, FlightState, TrialState
+from app.trials.states import ACTIONS, ACTIVE_STATES, FlightState, TrialState
 
 
 def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
@@ -30,8 +30,8 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     """Some trials of a campaign."""
     session.flush()
     flights = repository.latest_flights(session, [row.id for row in rows])
-    field = Field(history.valid_flights(session, campaign.id), get_experiment(campaign.experiment).scatter)
-    rehearsed = is_free_to_fly(rehearsal_of(session, campaign))
+    field = ReferenceFlights(history.valid_flights(session, campaign.id), get_experiment(campaign.experiment).scatter)
+    rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
     return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
 
 
@@ -40,7 +40,7 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
     assert row.trajectory is not None
     output = get_experiment(campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
-    chosen = kept(trajectory.time_s, leading, points)
+    chosen = select_samples(trajectory.time_s, leading, points)
     return TrajectoryOut(
         trial_id=row.id,
         source=trajectory.source,
@@ -56,7 +56,7 @@ def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory
 def _view(
     campaign: CampaignRow,
     row: TrialRow,
-    field: Field,
+    field: ReferenceFlights,
     flight: FlightRow | None,
     rehearsed: bool,
 ) -> Trial:
@@ -103,14 +103,14 @@ def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
     return interval.lower <= row.error <= interval.upper
 
 
-def _group(row: TrialRow, field: Field) -> GroupBrief | None:
+def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
     same = field.group_with(row.gains)
     if same is None or field.scatter is None:
         return None
     return GroupBrief(mean=same.mean, standard_error=same.known_error(field.scatter), n=same.size)
 
 
-def _flown_before(row: TrialRow, field: Field) -> list[int]:
+def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
     """The earlier flights of a trial that repeats their gains on purpose; none for any other trial."""
     same = field.group_with(row.gains)
     if same is None or row.kind not in {"baseline", "repeat"}:
@@ -118,7 +118,7 @@ def _flown_before(row: TrialRow, field: Field) -> list[int]:
     return [number for number in same.numbers if number < row.number]
 
 
-def verdict(row: TrialRow, field: Field, unit: str, again: Sequence[int] = ()) -> str:
+def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
     """The flight against the best before it and against its prediction, in a sentence. One that repeats the gains of
     the flights `again` was not to be better than any, so it is not held against the best."""
     match row.state:
@@ -207,7 +207,7 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, reh
     """The states' table, narrowed by what the vehicle can do, by a flight that is under way, and by a rehearsal that a
     real vehicle lacks."""
     vehicle = campaign.vehicle
-    under_way = flight is not None and flight.state in UNDER_WAY
+    under_way = flight is not None and flight.state in ACTIVE_STATES
     impossible = set()
     if under_way or not fleet.can_fly(vehicle):
         impossible |= {"fly", "stage"}

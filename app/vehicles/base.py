@@ -39,7 +39,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlightOrder:
+class FlightOptions:
     """What one flight is to do.
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
@@ -53,14 +53,14 @@ class FlightOrder:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class StopRequest:
     """What ends a flight early. `motors_off` stops the motors at once, at any height; without it the vehicle lands."""
 
     reason: str
     motors_off: bool = False
 
 
-ShouldStop = Callable[[], Stop | None]
+ShouldStop = Callable[[], StopRequest | None]
 MOTORS_OFF_ASKED: Final = "Motors off was asked for: "
 
 
@@ -100,7 +100,9 @@ class Vehicle(Protocol):
         """What the vehicle holds now."""
         ...
 
-    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> FlightRecord:
+    def fly(
+        self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> FlightRecord:
         """Take off with the staged gains and record until the manoeuvre is over.
 
         `on_sample` gets telemetry at 50 Hz of vehicle time while it happens; `should_stop` is asked at least as often

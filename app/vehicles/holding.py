@@ -6,7 +6,7 @@ from app.core.errors import GainsError, Problem
 from app.core.policy import Gains
 
 
-def held(
+def accept_gains(
     gains: Gains, names: Sequence[str], refusal: Callable[[float], str | None], *, kind: type[float], numbers: str
 ) -> dict[str, float]:
     """The gains, complete and in order, each as `kind`. Raises GainsError naming every unknown or missing gain and each

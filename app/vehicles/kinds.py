@@ -16,7 +16,7 @@ Hosts = frozenset[str]
 HERE: Final[Hosts] = frozenset()
 
 
-def _nothing(_options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
+def _no_conflicts(_options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
     return ()
 
 
@@ -24,7 +24,7 @@ def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
     return False
 
 
-def _take_any(_options: Options, _gains: Gains) -> None:
+def _accept_any_gains(_options: Options, _gains: Gains) -> None:
     """A simulation flies whatever its controller can hold."""
 
 
@@ -53,10 +53,10 @@ class VehicleKind:
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains], Vehicle]
     connect: Callable[[Options, Gains, Identity | None, Path], ConnectedVehicle] | None = None
-    conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _nothing
+    conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
     simulates: Callable[[Options, Hosts], bool] = _never
     suits: Callable[[Options], tuple[str, ...]] | None = None
-    check_gains: Callable[[Options, Gains], None] = _take_any
+    check_gains: Callable[[Options, Gains], None] = _accept_any_gains
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""

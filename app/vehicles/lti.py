@@ -23,9 +23,18 @@ from app.core.plants.pitch import (
 )
 from app.core.policy import Gains, is_finite, shortened
 from app.core.trajectory import Samples, Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, ShouldStop, Stop, Vehicle, VehicleOption
+from app.vehicles.base import (
+    FlightOptions,
+    FlightRecord,
+    OptionValue,
+    Sample,
+    ShouldStop,
+    StopRequest,
+    Vehicle,
+    VehicleOption,
+)
 from app.vehicles.errors import VehicleError
-from app.vehicles.holding import held
+from app.vehicles.holding import accept_gains
 from app.vehicles.kinds import Options, VehicleKind
 from app.vehicles.pacing import Pacer
 
@@ -65,7 +74,9 @@ class LinearAircraft:
         """What the aircraft holds now."""
         return dict(self._held)
 
-    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> FlightRecord:
+    def fly(
+        self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> FlightRecord:
         """Track the reference for a minute with the staged gains, holding simulated time back to the order's speed.
 
         `should_stop` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. A stop sets the
@@ -77,14 +88,14 @@ class LinearAircraft:
                 "No gains were staged for this flight, so it was not started.",
                 hint="Stage the gains, compare what is read back, then fly.",
             )
-        tracking, noise = _Leg(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
+        tracking, noise = _TrackingRun(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
         try:
             detail = _flown(noise, tracking)
             told, stop = _tell(detail, Pacer(order.speed, order.clock), on_sample, should_stop)
         finally:
             self._restore()
         if stop is not None:
-            returning = _Leg(self.safe_gains, 0.0, _RECOVERY_STEPS if told else 1)
+            returning = _TrackingRun(self.safe_gains, 0.0, _RECOVERY_STEPS if told else 1)
             detail = _flown(noise, replace(tracking, steps=told), returning)
         return FlightRecord(
             trajectory=_trajectory(detail),
@@ -103,11 +114,11 @@ class LinearAircraft:
 
 def whole_flight(gains: Gains, *, log_noise: float, seed: int) -> Trajectory:
     """The record of one whole flight, the same as through the vehicle seam, in one call: 1 ms instead of 40."""
-    return _trajectory(_flown(_noise(log_noise, seed), _Leg(_numbers(gains), AMPLITUDE_RAD, _STEPS)))
+    return _trajectory(_flown(_noise(log_noise, seed), _TrackingRun(_numbers(gains), AMPLITUDE_RAD, _STEPS)))
 
 
 @dataclass(frozen=True, slots=True)
-class _Leg:
+class _TrackingRun:
     """So many steps on a reference of `amplitude_rad`."""
 
     gains: Gains
@@ -120,7 +131,7 @@ def _noise(log_noise: float, seed: int) -> Samples:
     return log_noise * LOG_NOISE * np.random.default_rng(seed).standard_normal((_STEPS + _RECOVERY_STEPS, STATES))
 
 
-def _flown(noise: Samples, *legs: _Leg) -> Samples:
+def _flown(noise: Samples, *legs: _TrackingRun) -> Samples:
     """The legs flown one after the other from trim, as they are recorded: shape (n, 8)."""
     memory, motion = np.zeros(MEMORY_SIZE), transitions(SYSTEM)
     detail, first = np.empty((sum(leg.steps for leg in legs), DETAIL)), 0
@@ -134,7 +145,7 @@ def _flown(noise: Samples, *legs: _Leg) -> Samples:
 
 def _tell(
     detail: Samples, pacer: Pacer, on_sample: Callable[[Sample], None], should_stop: ShouldStop
-) -> tuple[int, Stop | None]:
+) -> tuple[int, StopRequest | None]:
     """Tell a flight step by step as its time comes; how many steps were told, and what ended it early or None."""
     for i, row in enumerate(detail):
         if (stop := pacer.wait_until(i * STEP_S, should_stop)) is not None:
@@ -159,7 +170,7 @@ def _sample(step: int, row: Samples) -> Sample:
 
 
 def _numbers(gains: Gains) -> dict[str, float]:
-    return held(gains, GAIN_NAMES, _refusal, kind=float, numbers="finite numbers")
+    return accept_gains(gains, GAIN_NAMES, _refusal, kind=float, numbers="finite numbers")
 
 
 def _refusal(value: float) -> str | None:

@@ -5,7 +5,7 @@ from typing import Final
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import InputError, Problem
-from app.vehicles.base import ShouldStop, Stop
+from app.vehicles.base import ShouldStop, StopRequest
 
 LISTEN_EVERY_S: Final = 0.02
 """The longest that a flight held back is deaf to an abort."""
@@ -29,7 +29,7 @@ class Pacer:
         self._clock = clock
         self._start_s = clock.now_s()
 
-    def wait_until(self, vehicle_time_s: float, should_stop: ShouldStop) -> Stop | None:
+    def wait_until(self, vehicle_time_s: float, should_stop: ShouldStop) -> StopRequest | None:
         """Return None once `vehicle_time_s` seconds of the flight may have passed, or at once what ends it early.
 
         `should_stop` is asked at least once, every 20 ms of the clock, and last when the time has come.

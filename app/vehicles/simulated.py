@@ -9,9 +9,9 @@ from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
 from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S, THROTTLE
 from app.core.policy import Gains, shortened
 from app.core.trajectory import Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, ShouldStop, Stop
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest
 from app.vehicles.errors import VehicleError
-from app.vehicles.holding import held
+from app.vehicles.holding import accept_gains
 from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, SET_POINT, TARGET, Integers, Rows
 from app.vehicles.pacing import Pacer
 
@@ -54,7 +54,7 @@ class SimulatedVehicle:
         kind: str,
         safe_gains: Gains,
         settings: Mapping[str, OptionValue],
-        launch: Callable[[FlightOrder], Simulation],
+        launch: Callable[[FlightOptions], Simulation],
     ) -> None:
         self.kind: Final = kind
         self.safe_gains: Final[Gains] = _counts(safe_gains)
@@ -74,7 +74,9 @@ class SimulatedVehicle:
         """What the vehicle holds now."""
         return dict(self._held)
 
-    def fly(self, order: FlightOrder, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> FlightRecord:
+    def fly(
+        self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> FlightRecord:
         """Take off to 3 m with the staged gains, holding simulated time back to the order's speed.
 
         `should_stop` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
@@ -117,7 +119,7 @@ class SimulatedVehicle:
         pacer: Pacer,
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
-    ) -> Stop | None:
+    ) -> StopRequest | None:
         """Fill `rows` until the manoeuvre is over; what ended it early, or None."""
         command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
         for first, last in _slices():
@@ -175,7 +177,7 @@ def _sample(step: int, row: Rows) -> Sample:
 
 
 def _counts(gains: Gains) -> dict[str, float]:
-    return held(gains, GAIN_NAMES, _refusal, kind=int, numbers="whole numbers of counts")
+    return accept_gains(gains, GAIN_NAMES, _refusal, kind=int, numbers="whole numbers of counts")
 
 
 def _refusal(value: float) -> str | None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from app.vehicles.base import FlightOrder, Sample
+from app.vehicles.base import FlightOptions, Sample
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
@@ -103,7 +103,7 @@ def _staged_and_flown(rig: Rig, vehicle: MavlinkVehicle) -> tuple[str, str]:
     if held != rig.case.gains:
         return "refused", f"it holds {held}"
     rig.wait_s(rig.case.waits_s)
-    record = vehicle.fly(FlightOrder(seed=1), on_sample=_unwatched, should_stop=lambda: rig.wanted)
+    record = vehicle.fly(FlightOptions(seed=1), on_sample=_unwatched, should_stop=lambda: rig.wanted)
     return record.ending, record.reason
 
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from app.core.trajectory import Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, Sample
+from app.vehicles.base import FlightOptions, FlightRecord, Sample
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from bench.hazards.cases import ABORT, SAFE, Case, Mishap, tuned_gains
@@ -119,7 +119,7 @@ def _flown(rig: HostileRig, vehicle: MavlinkVehicle) -> Ended:
         held = vehicle.stage(rig.case.gains)
         if held != rig.case.gains:
             raise VehicleError(f"it holds {held}", hint="")
-        record = vehicle.fly(FlightOrder(seed=1), on_sample=_unwatched, should_stop=lambda: rig.wanted)
+        record = vehicle.fly(FlightOptions(seed=1), on_sample=_unwatched, should_stop=lambda: rig.wanted)
         outcome, reason = str(record.ending), record.reason
     except VehicleError as error:
         reason = str(error)

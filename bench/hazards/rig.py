@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.base import OptionValue, Stop
+from app.vehicles.base import OptionValue, StopRequest
 from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.simdrone.autopilots.registry import get_autopilot
 from app.vehicles.simdrone.body import new_body
-from app.vehicles.simdrone.cameras import OwnLink
+from app.vehicles.simdrone.cameras import VehicleLinkOutput
 from app.vehicles.simdrone.drone import BOOT_S, Drone
 from app.vehicles.simdrone.lockstep import Lockstep
 from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case, Mishap
@@ -66,11 +66,11 @@ class Rig(Lockstep):
         self.heard: int = 0
         self.flew_on: Mapping[str, float] | None = None
         self.impact_m_s = 0.0
-        self.wanted: Stop | None = None
+        self.wanted: StopRequest | None = None
         self._waiting = list(case.mishaps)
         self._kind = get_autopilot(case.autopilot)
         body = new_body("twin", {}, seed=case.seed % 100_000)
-        outlet = OwnLink() if case.has_second_source else None
+        outlet = VehicleLinkOutput() if case.has_second_source else None
         super().__init__(Drone(body, lambda fresh: self._kind.set_up(fresh, self._kind.system), outlet=outlet))
         self._codec = DIALECTS[case.autopilot].codec(system=1, component=1)
         self._other = DIALECTS[case.autopilot].codec(system=_OTHER_STATION, component=1)
@@ -144,7 +144,7 @@ class Rig(Lockstep):
         self.struck.append(Struck(mishap.kind, stage, now_s, now_s + lasts_s))
         match mishap.kind:
             case str(kind) if kind in (ABORT, MOTORS_OFF):
-                self.wanted = Stop(f"the operator's {kind}", motors_off=kind == MOTORS_OFF or self._is_stopping)
+                self.wanted = StopRequest(f"the operator's {kind}", motors_off=kind == MOTORS_OFF or self._is_stopping)
             case str(kind) if kind in (OTHER_MODE, OTHER_LANDING):
                 self._interfere(_INTERFERENCE[kind, self.case.autopilot])
             case str(kind) if kind != WILD_GAINS:

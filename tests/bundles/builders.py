@@ -20,7 +20,7 @@ from tests.unlocking import client_here
 
 
 @contextmanager
-def another_installation(folder: Path, migrated_file: Path) -> Iterator[tuple[TestClient, Database]]:
+def second_installation(folder: Path, migrated_file: Path) -> Iterator[tuple[TestClient, Database]]:
     settings = Settings(data_dir=folder / "data", ui_dir=folder / "ui", port=0)
     settings.data_dir.mkdir(parents=True)
     shutil.copyfile(migrated_file, settings.database_file)
@@ -29,7 +29,7 @@ def another_installation(folder: Path, migrated_file: Path) -> Iterator[tuple[Te
         yield client, application.state.database
 
 
-def take(client: httpx2.Client, campaign_id: int) -> bytes:
+def download_bundle(client: httpx2.Client, campaign_id: int) -> bytes:
     """The campaign as one file."""
     answer = client.get(f"/api/campaigns/{campaign_id}/bundle")
     assert answer.status_code == 200, answer.text
@@ -37,7 +37,7 @@ def take(client: httpx2.Client, campaign_id: int) -> bytes:
     return answer.content
 
 
-def bring(client: httpx2.Client, bundle: bytes) -> httpx2.Response:
+def import_bundle(client: httpx2.Client, bundle: bytes) -> httpx2.Response:
     return client.post("/api/bundles", files={"file": ("bundle.zip", bundle, "application/zip")})
 
 

@@ -17,7 +17,7 @@ from app.bundles import reading
 from app.db.models import CampaignRow, TrajectoryRow
 from app.db.session import Database
 from tests.builders import create_flown_trial, create_ready_campaign, problems_of
-from tests.bundles.builders import another_installation, bring, parts_of, sealed, take, zipped
+from tests.bundles.builders import download_bundle, import_bundle, parts_of, sealed, second_installation, zipped
 
 Parts = dict[str, bytes]
 Change = Callable[[Any], object]
@@ -26,17 +26,17 @@ Change = Callable[[Any], object]
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory: pytest.TempPathFactory, migrated_file: Path) -> Parts:
     """Of a campaign with one flight, made elsewhere."""
-    with another_installation(tmp_path_factory.mktemp("elsewhere"), migrated_file) as (client, database):
+    with second_installation(tmp_path_factory.mktemp("elsewhere"), migrated_file) as (client, database):
         campaign = create_ready_campaign(client, database)
         create_flown_trial(client, database, campaign["id"])
-        return parts_of(take(client, campaign["id"]))
+        return parts_of(download_bundle(client, campaign["id"]))
 
 
 def refused(client: TestClient, database: Database, bundle: bytes) -> dict[str, str]:
     """The problems of the refusal; that nothing was stored is seen to."""
     with database.read() as session:
         before = session.query(CampaignRow).count(), session.query(TrajectoryRow).count()
-    answer = bring(client, bundle)
+    answer = import_bundle(client, bundle)
     assert answer.status_code == 422, answer.text
     assert answer.json()["hint"]
     with database.read() as session:

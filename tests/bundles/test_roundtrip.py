@@ -15,7 +15,7 @@ from app.db.session import Database
 from app.settings import Settings
 from app.trials.telemetry_logs import telemetry_log
 from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
-from tests.bundles.builders import another_installation, bring, parts_of, sealed, take
+from tests.bundles.builders import download_bundle, import_bundle, parts_of, sealed, second_installation
 from tests.campaigns.test_recomputing import told
 from tests.campaigns.test_statistics import modelled
 
@@ -25,7 +25,7 @@ NAMED_ANEW = {"id", "campaign_id", "proposal_id", "created_at", "updated_at", "v
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, migrated_file: Path) -> Iterator[tuple[TestClient, Database]]:
-    with another_installation(tmp_path / "elsewhere", migrated_file) as both:
+    with second_installation(tmp_path / "elsewhere", migrated_file) as both:
         yield both
 
 
@@ -57,7 +57,7 @@ def fly(client: TestClient, database: Database, campaign_id: int) -> Json:
 
 
 def brought(client: TestClient, bundle: bytes) -> Json:
-    answer = bring(client, bundle)
+    answer = import_bundle(client, bundle)
     assert answer.status_code == 201, answer.text
     arrived: Json = answer.json()
     return arrived
@@ -71,7 +71,7 @@ def test_every_number_and_every_sample_arrives_as_it_was(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
     there, their_database = elsewhere
-    arrived = brought(there, take(client, campaign["id"]))
+    arrived = brought(there, download_bundle(client, campaign["id"]))
     for name in ("name", "state", "outcome", "stop_reason", "definition", "definition_digest", "created_at", "trials"):
         assert arrived[name] == campaign[name], name
     ours = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
@@ -95,7 +95,7 @@ def test_the_next_gains_are_computed_again_to_the_last_bit(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
     there, their_database = elsewhere
-    arrived = brought(there, take(client, campaign["id"]))
+    arrived = brought(there, download_bundle(client, campaign["id"]))
     assert told(their_database, arrived["id"]) == told(database, campaign["id"])
     ours = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
     theirs = get(there, f"/api/campaigns/{arrived['id']}/proposal")["proposal"]
@@ -107,12 +107,12 @@ def test_a_warm_start_brings_the_campaign_that_it_came_from(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
     there, their_database = elsewhere
-    brought(there, take(client, campaign["id"]))  # ids are others there
+    brought(there, download_bundle(client, campaign["id"]))  # ids are others there
     answer = client.post(f"/api/campaigns/{campaign['id']}/clone", json={"warm_start": True})
     warm = answer.json()
     run_jobs(database)
     fly(client, database, warm["id"])
-    arrived = brought(there, take(client, warm["id"]))
+    arrived = brought(there, download_bundle(client, warm["id"]))
     run_jobs(their_database)
     donor = arrived["definition"]["start"]["donor"]
     assert donor["campaign_id"] != warm["definition"]["start"]["donor"]["campaign_id"]
@@ -127,7 +127,7 @@ def test_a_simulated_campaign_flies_on_where_it_arrives(
     client: TestClient, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
     there, their_database = elsewhere
-    arrived = brought(there, take(client, campaign["id"]))
+    arrived = brought(there, download_bundle(client, campaign["id"]))
     assert fly(there, their_database, arrived["id"])["number"] == 4
 
 
@@ -148,7 +148,7 @@ def test_what_a_registered_vehicle_flew_is_history_where_it_arrives(
     log.parent.mkdir(exist_ok=True)
     log.write_bytes(b"telemetry" * 1000)
     there, their_database = elsewhere
-    arrived = brought(there, take(client, campaign["id"]))
+    arrived = brought(there, download_bundle(client, campaign["id"]))
     vehicle = arrived["vehicle"]
     assert (vehicle["name"], vehicle["is_real"], vehicle["can_fly"]) == ("Blue (elsewhere)", True, False)
     trials = get(there, f"/api/campaigns/{arrived['id']}/trials")["items"]
@@ -159,7 +159,7 @@ def test_what_a_registered_vehicle_flew_is_history_where_it_arrives(
         f"/api/campaigns/{arrived['id']}/trials", json={"gains": trials[0]["gains"], "fly": {"speed": None}}
     )
     assert refused.status_code == 409, refused.text
-    again = brought(there, take(there, arrived["id"]))
+    again = brought(there, download_bundle(there, arrived["id"]))
     assert again["vehicle"]["id"] == vehicle["id"]
     shared = there.post("/api/campaigns", json={"name": "Own", "vehicle": {"kind": "import"}}).json()
     assert shared["vehicle"]["id"] != vehicle["id"]
@@ -168,7 +168,7 @@ def test_what_a_registered_vehicle_flew_is_history_where_it_arrives(
 
 
 def test_the_same_campaign_makes_the_same_parts(client: TestClient, campaign: Json) -> None:
-    first, second = (parts_of(take(client, campaign["id"])) for _ in range(2))
+    first, second = (parts_of(download_bundle(client, campaign["id"])) for _ in range(2))
     assert {**first, "manifest.json": b""} == {**second, "manifest.json": b""}
 
 
@@ -184,11 +184,11 @@ def test_a_campaign_in_the_air_stays_with_its_vehicle(client: TestClient, databa
 def test_nothing_is_brought_in_while_anything_is_staged_or_flies(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
-    bundle = take(client, campaign["id"])
+    bundle = download_bundle(client, campaign["id"])
     ready = create_ready_campaign(client, database)
     create_trial(client, ready["id"], fly={"speed": None})
     task = lift_off(database)
-    refused = bring(client, bundle)
+    refused = import_bundle(client, bundle)
     assert refused.status_code == 409, refused.text
     assert f"Campaign {ready['id']} has a flight" in refused.json()["detail"]
     land(database, task, modelled(task.gains))
@@ -199,7 +199,7 @@ def test_a_bundle_is_unpacked_and_hashed_before_the_transaction_that_stores_it(
     client: TestClient, database: Database, campaign: Json, settings: Settings
 ) -> None:
     """A writer is let in until the very moment of storing; from then on the zip is not touched any more."""
-    with Bundle(BytesIO(take(client, campaign["id"]))) as bundle:
+    with Bundle(BytesIO(download_bundle(client, campaign["id"]))) as bundle:
         bundle.check()
         bundle._zip.close()
         with database.write() as session:
@@ -240,7 +240,7 @@ def test_what_a_bundle_cannot_hold_is_refused_in_words(client: TestClient, datab
 
 
 def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestClient, campaign: Json) -> None:
-    bundle = take(client, campaign["id"])
+    bundle = download_bundle(client, campaign["id"])
     sent = [
         client.post(
             "/api/bundles",
@@ -256,10 +256,10 @@ def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestCli
 def test_nothing_is_left_of_a_bundle_whose_storing_fails(
     client: TestClient, database: Database, campaign: Json, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bundle = take(client, campaign["id"])
+    bundle = download_bundle(client, campaign["id"])
     monkeypatch.setattr("app.bundles.storing.request_proposal", lambda *_: (_ for _ in ()).throw(OSError("disk")))
     monkeypatch.setattr("app.bundles.storing.is_stale", lambda *_: True)
-    assert bring(client, bundle).status_code >= 500
+    assert import_bundle(client, bundle).status_code >= 500
     with database.read() as session:
         assert session.query(CampaignRow).count() == 1
         assert session.query(TrialRow).count() == 3
@@ -272,7 +272,7 @@ def test_why_a_flight_was_broken_off_goes_along_and_bundles_from_before_it_was_r
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     land(database, lift_off(database), create_record(ending="aborted", reason="enough", on_request=True))
     run_jobs(database)
-    bundle = take(client, campaign["id"])
+    bundle = download_bundle(client, campaign["id"])
 
     def causes(arrived: Json) -> list[str | None]:
         return [each["abort_cause"] for each in get(there, f"/api/campaigns/{arrived['id']}/trials")["items"]]

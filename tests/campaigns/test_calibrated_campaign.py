@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.campaigns.headless import HeadlessTrial, Watcher, fly_campaign
+from app.campaigns.headless import CampaignListener, HeadlessTrial, fly_campaign
 from app.core.definition import Definition, StopRule
 from app.studies.vehicles import noise_free_error, population
 from tests.core.flying import compiled_only
@@ -12,7 +12,7 @@ pytestmark = compiled_only
 
 def two_flights(vehicle: str, seed: int) -> tuple[HeadlessTrial, ...]:
     definition = Definition(strategy="calibrated", stop=StopRule(kind="budget", max_flights=2), seed=seed)
-    return tuple(fly_campaign(definition, vehicle, {}, Watcher()).trials)
+    return tuple(fly_campaign(definition, vehicle, {}, CampaignListener()).trials)
 
 
 def test_the_second_flight_of_the_simulated_ardrone_is_at_its_optimum() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from app.campaigns import headless
-from app.campaigns.headless import Watcher, fly_campaign
+from app.campaigns.headless import CampaignListener, fly_campaign
 from app.core.definition import Definition, StopRule
 from app.core.experiments.base import Experiment
 from app.core.glitches import Glitch
@@ -20,6 +20,6 @@ def test_a_low_battery_ends_a_campaign_whose_flights_do_not_count(monkeypatch: p
 
     monkeypatch.setattr(headless, "find_glitches", always_one)
     definition = Definition(stop=StopRule(kind="budget", max_flights=3, min_battery_v=11.5))
-    flown = fly_campaign(definition, "twin", {}, Watcher())
+    flown = fly_campaign(definition, "twin", {}, CampaignListener())
     assert [trial.outcome for trial in flown.trials] == ["invalid"]
     assert flown.stopped_because.startswith("The last flight ended at 11.10 V; 11.5 V is the least.")

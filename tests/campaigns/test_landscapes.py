@@ -6,12 +6,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns import landscapes
-from app.campaigns.tasks import Surveyor
-from app.core.landscape import foreseen, plan_survey
+from app.campaigns.tasks import LandscapeJob
+from app.core.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.jobs.tasks import Desk
-from app.pool import Pool
+from app.jobs.tasks import JobRunner
+from app.pool import ComputePool
 from tests.builders import WORKER, create_flown_trial, create_ready_campaign, get
 
 Json = dict[str, Any]
@@ -39,9 +39,9 @@ def run_landscapes(database: Database) -> int:
         assert campaign_id is not None
         with database.read() as session:
             plan = landscapes.read_plan(session, campaign_id, order)
-        survey = plan_survey(plan)
+        survey = plan_grid(plan)
         assert survey is not None
-        landscape = survey.landscape(foreseen(survey.foresee, survey.points()))
+        landscape = survey.landscape(predict_points(survey.foresee, survey.points()))
         with database.write() as session:
             jobs.finish_job(session, job_id, worker=WORKER, result=landscapes.as_json(landscape, order))
         count += 1
@@ -113,8 +113,8 @@ def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_
 ) -> None:
     card_of(client, campaign_id)
     classify(client, campaign_id, "invalid")
-    with Pool(1, prepare=int) as pool:
-        desk = Desk(database, landscapes.LANDSCAPE_JOB, Surveyor(database, pool, worker=WORKER),
+    with ComputePool(1, prepare=int) as pool:
+        desk = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER),
                     room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
         claimed = desk.claim()
         assert claimed is not None

@@ -4,7 +4,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns.definitions import definition_of
-from app.campaigns.rehearsals import Rehearsed, judge, rehearsal_of
+from app.campaigns.rehearsals import RehearsalTrial, rehearsal_of, rehearsal_result
 from app.campaigns.service import get_row
 from app.campaigns.states import Outcome
 from app.db import outbox
@@ -47,13 +47,13 @@ VALID, ABORTED, INVALID, LOST = TrialState.VALID, TrialState.ABORTED, TrialState
 def test_it_is_passed_by_three_valid_flights_or_its_own_stop_and_nothing_spoilt(
     states: list[TrialState], outcome: Outcome | None, expected: str
 ) -> None:
-    flown = [Rehearsed(number, state, gate_passed=True) for number, state in enumerate(states, start=1)]
-    assert judge(flown, outcome)[0] == expected
+    flown = [RehearsalTrial(number, state, gate_passed=True) for number, state in enumerate(states, start=1)]
+    assert rehearsal_result(flown, outcome)[0] == expected
 
 
 def test_gains_that_the_gate_refused_spoil_it() -> None:
-    flown = [Rehearsed(number, VALID, gate_passed=number != 2) for number in (1, 2, 3)]
-    assert judge(flown, None) == ("failed", "the gate refused the gains of flight 2, and was overruled")
+    flown = [RehearsalTrial(number, VALID, gate_passed=number != 2) for number in (1, 2, 3)]
+    assert rehearsal_result(flown, None) == ("failed", "the gate refused the gains of flight 2, and was overruled")
 
 
 @pytest.fixture

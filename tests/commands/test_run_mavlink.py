@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli import app
-from app.vehicles.base import FlightOrder, FlightRecord
+from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
@@ -67,7 +67,7 @@ def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains
     flown = MavlinkVehicle.fly
     flights: list[int] = []
 
-    def fly_once(vehicle: MavlinkVehicle, order: FlightOrder, **watched: Any) -> FlightRecord:
+    def fly_once(vehicle: MavlinkVehicle, order: FlightOptions, **watched: Any) -> FlightRecord:
         flights.append(1)
         if len(flights) > 1:
             raise VehicleError("The battery is below 10.2 V.", hint="Charge it.")
@@ -91,7 +91,7 @@ def test_when_the_safe_gains_could_not_be_verified_it_says_that_nobody_knows_wha
     rig = LockstepRig()
     rig.take_the_place_of_every_vehicle(monkeypatch)
 
-    def forget(_vehicle: MavlinkVehicle, _order: FlightOrder, **_watched: Any) -> FlightRecord:
+    def forget(_vehicle: MavlinkVehicle, _order: FlightOptions, **_watched: Any) -> FlightRecord:
         raise SafeGainsError("The vehicle does not answer.", hint="Look at it.")
 
     monkeypatch.setattr(MavlinkVehicle, "fly", forget)

@@ -10,13 +10,13 @@ from app.core.definition import Flight, OptionValue
 from app.core.experiments.base import Matrix, ModelParameter, Scatter, SimplexSearch, informed_parameters
 from app.core.options import Option
 from app.core.policy import Gain, Gains, PolicySpace, Vector
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.trajectory import Samples, Trajectory
 
 OFFSET: Final = ModelParameter("offset", "Offset", "m", 0.0, -1.0, 1.0, prior_sd=0.1, known_within=0.5)
 
 
-class Bowl:
+class QuadraticExperiment:
     """Real gain `a` and whole gain `b` in 0 … 100, of scale 10 and 5; the lowest error is at a = 30, b = 40."""
 
     name: Final = "bowl"
@@ -69,7 +69,7 @@ class Bowl:
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
         raise NotImplementedError
 
-    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         return ()
 
     def errors(self, outputs: Matrix) -> Vector:
@@ -82,5 +82,11 @@ class Bowl:
 def fly(number: int, a: float, b: float, offset: float = 0.25) -> Flight:
     """A flight of the bowl that is `offset` deeper than its model."""
     gains: Gains = {"a": a, "b": b}
-    trajectory = Bowl().simulate(Bowl.space.vector(gains), np.array([offset])).as_stored()
-    return Flight(number=number, gains=gains, trajectory=trajectory, error=Bowl().error(trajectory), outcome="valid")
+    trajectory = QuadraticExperiment().simulate(QuadraticExperiment.space.vector(gains), np.array([offset])).as_stored()
+    return Flight(
+        number=number,
+        gains=gains,
+        trajectory=trajectory,
+        error=QuadraticExperiment().error(trajectory),
+        outcome="valid",
+    )

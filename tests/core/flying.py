@@ -10,7 +10,7 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains
 from app.core.proposing import next_proposal
-from app.core.stopping import verdict
+from app.core.stopping import decide_stop
 from app.core.strategies.base import Proposal
 
 TAKEOFF = Takeoff()
@@ -36,7 +36,7 @@ def campaign(definition: Definition, model: Sequence[float] = TWIN) -> tuple[lis
     """Fly every proposal until the stop rule ends it; the last proposal is the one that was not flown."""
     flights: list[Flight] = []
     proposals = [next_proposal(definition, flights)]
-    while not verdict(definition.stop, [flight.error for flight in flights], proposals[-1].kind).stop:
+    while not decide_stop(definition.stop, [flight.error for flight in flights], proposals[-1].kind).stop:
         flights.append(fly(len(flights) + 1, proposals[-1].gains, model))
         proposals.append(next_proposal(definition, flights))
     return flights, proposals

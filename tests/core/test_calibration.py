@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.calibration import MOST_FLIGHTS, calibrate, known
+from app.core.calibration import MOST_FLIGHTS, calibrate, known_distribution
 from app.core.definition import Flight
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.spread import before_flight
+from app.core.spread import prior_distribution
 from app.core.trajectory import Trajectory
 from tests.core.flying import TAKEOFF, compiled_only, fly
 
@@ -110,10 +110,10 @@ def test_fitted_parameters_come_with_their_standard_errors_and_what_was_known() 
 
 def test_before_a_flight_the_data_sheet_is_what_is_known_afterwards_the_fit() -> None:
     aborted = replace(fly(1, DEFAULT), outcome="aborted", error=None)
-    assert known(TAKEOFF, []) == known(TAKEOFF, [aborted]) == before_flight(TAKEOFF)
-    assert known(PitchTracking(), []) == before_flight(PitchTracking())
+    assert known_distribution(TAKEOFF, []) == known_distribution(TAKEOFF, [aborted]) == prior_distribution(TAKEOFF)
+    assert known_distribution(PitchTracking(), []) == prior_distribution(PitchTracking())
     flight = gusty(fly(2, DEFAULT), 7)
-    spread = known(TAKEOFF, [aborted, flight])
+    spread = known_distribution(TAKEOFF, [aborted, flight])
     assert spread.origin == "the calibration on 1 flight"
     assert spread.mean[0] == pytest.approx(0.61, abs=0.01)
     floor = 0.05 * TAKEOFF.model_parameters[0].prior_sd

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from app.core.advice import advise
-from app.core.confirming import confirm, contest, standing, verdict_sentence
+from app.core.confirming import compare_winner, confirm, standing_within_bounds, verdict_sentence
 from app.core.definition import Definition, Flight, StopRule
-from app.core.stopping import judge
+from app.core.stopping import evaluate_stop_rule
 from app.core.strategies.base import Explanation, Kind, Proposal
-from tests.core.bowl import Bowl, fly
+from tests.core.bowl import QuadraticExperiment, fly
 
 NOISE = Definition(stop=StopRule(kind="noise", max_flights=12))
 PAPER = Definition(stop=StopRule(max_flights=12))
-SIGMA = Bowl.scatter.sd
+SIGMA = QuadraticExperiment.scatter.sd
 
 
 def flown(*runs: tuple[float, float]) -> list[Flight]:
@@ -42,21 +42,21 @@ def proposed(kind: Kind = "step", error: float | None = 0.1, a: float = 99.0) ->
 
 
 def phase(flights: list[Flight], proposal: Proposal, definition: Definition = NOISE) -> str:
-    return confirm(definition, Bowl(), flights, proposal).phase
+    return confirm(definition, QuadraticExperiment(), flights, proposal).phase
 
 
 def test_a_step_that_promises_more_than_noise_is_flown() -> None:
-    found = confirm(NOISE, Bowl(), flown((1, 0.5)), proposed(error=0.3))
+    found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.3))
     assert found.phase == "step"
     assert "promises 0.200 m less, at least the" in found.why
 
 
 def test_a_step_that_promises_less_than_noise_ends_a_campaign_without_a_winner() -> None:
-    found = confirm(NOISE, Bowl(), flown((1, 0.5)), proposed(error=0.499))
+    found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.499))
     assert found.phase == "decided"
     assert "promises 0.0010 m less, below the" in found.why
     assert "No other set was flown." in found.why
-    tried = confirm(NOISE, Bowl(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
+    tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
     assert tried.phase == "decided"
     assert "None of the other sets flown, 1, is better. The strategy offers nothing more." in tried.why
 
@@ -67,7 +67,7 @@ def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided
     flights = flown((1, 0.5), (2, 0.2), (2, 0.21))
     assert phase(flights, proposed(error=0.0)) == "baseline"
     flights = flown((1, 0.5), (2, 0.2), (2, 0.21), (1, 0.49))
-    found = confirm(NOISE, Bowl(), flights, proposed(error=0.0))
+    found = confirm(NOISE, QuadraticExperiment(), flights, proposed(error=0.0))
     assert found.phase == "decided"
     assert found.why.startswith(
         "Better with more than 99.9\u00a0% confidence: a 2, b 40 against the first flight's a 1, b 40"
@@ -76,7 +76,7 @@ def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided
 
 def test_an_undecided_comparison_goes_on_until_the_budget_ends_and_says_what_would_decide() -> None:
     runs = [(1, 0.200), (2, 0.195), (2, 0.197), (1, 0.199)]
-    found = confirm(NOISE, Bowl(), flown(*runs), proposed("none"))
+    found = confirm(NOISE, QuadraticExperiment(), flown(*runs), proposed("none"))
     assert found.phase == "repeat"
     assert "Unresolved" in found.why
     assert "would decide it" in found.why
@@ -111,30 +111,36 @@ def test_only_gains_inside_the_bounds_are_confirmed(
     """Those outside were flown over a refusal and would be refused again."""
     definition = replace(NOISE, bounds={"a": bounds})
     flights = flown((1, 0.5), (2, 0.4), (3, 0.2), (4, 0.3))
-    now = contest(definition, Bowl(), flights)
+    now = standing_within_bounds(definition, QuadraticExperiment(), flights)
     assert now is not None
     assert (now.winner.gains["a"], now.baseline.gains["a"]) == (winner, baseline)
-    why = confirm(definition, Bowl(), flights, proposed("none", 0.2)).why
+    why = confirm(definition, QuadraticExperiment(), flights, proposed("none", 0.2)).why
     assert why.endswith(left_out)
     assert ("outside the bounds" in why) == bool(left_out)
 
 
 def test_with_every_flight_outside_the_bounds_nothing_is_confirmed() -> None:
     definition = replace(NOISE, bounds={"a": (50.0, 100.0)})
-    assert contest(definition, Bowl(), flown((1, 0.5), (2, 0.2))) is None
-    advice = advise(definition, Bowl(), flown((1, 0.5)), proposed(), judge(definition, flown((1, 0.5)), proposed()))
+    assert standing_within_bounds(definition, QuadraticExperiment(), flown((1, 0.5), (2, 0.2))) is None
+    advice = advise(
+        definition,
+        QuadraticExperiment(),
+        flown((1, 0.5)),
+        proposed(),
+        evaluate_stop_rule(definition, flown((1, 0.5)), proposed()),
+    )
     assert (advice.kind, advice.gains["a"]) == ("step", 99.0)
 
 
 def test_a_difference_that_nothing_would_decide_is_said_to_be_one() -> None:
-    now = standing(NOISE, Bowl(), flown((1, 0.2), (2, 0.2), (2, 0.1999999)))
+    now = compare_winner(NOISE, QuadraticExperiment(), flown((1, 0.2), (2, 0.2), (2, 0.1999999)))
     assert now is not None
     assert now.comparison is not None
-    assert "Not even 100 further flights" in verdict_sentence(Bowl(), now)
+    assert "Not even 100 further flights" in verdict_sentence(QuadraticExperiment(), now)
 
 
 def test_before_the_first_flight_nothing_stands() -> None:
-    assert standing(NOISE, Bowl(), []) is None
+    assert compare_winner(NOISE, QuadraticExperiment(), []) is None
 
 
 def test_equal_policies_are_rarely_called_better() -> None:
@@ -145,11 +151,11 @@ def test_equal_policies_are_rarely_called_better() -> None:
     for _ in range(400):
         runs = [(float(a), 0.2 + SIGMA * rng.standard_normal()) for a in range(4)]
         while (now := phase(flown(*runs), proposed("none"))) in {"repeat", "baseline"}:
-            found = standing(NOISE, Bowl(), flown(*runs))
+            found = compare_winner(NOISE, QuadraticExperiment(), flown(*runs))
             assert found is not None
             again = found.winner if now == "repeat" else found.baseline
             runs.append((again.gains["a"], 0.2 + SIGMA * rng.standard_normal()))
-        last = standing(NOISE, Bowl(), flown(*runs))
+        last = compare_winner(NOISE, QuadraticExperiment(), flown(*runs))
         better += last is not None and last.comparison is not None and last.comparison.verdict == "better"
     assert better / 400 <= 0.1
 
@@ -162,7 +168,7 @@ def test_a_real_improvement_of_five_standard_deviations_is_nearly_always_found()
         while (now := phase(flown(*runs), proposed("none"))) in {"repeat", "baseline"}:
             a, true = (1.0, 0.15) if now == "repeat" else (0.0, 0.2)
             runs.append((a, true + SIGMA * rng.standard_normal()))
-        last = standing(NOISE, Bowl(), flown(*runs))
+        last = compare_winner(NOISE, QuadraticExperiment(), flown(*runs))
         better += last is not None and last.comparison is not None and last.comparison.verdict == "better"
         flights += len(runs)
     assert better / 200 >= 0.97
@@ -184,7 +190,9 @@ def test_under_the_budget_rule_advice_is_given_beside_the_proposal(
 ) -> None:
     definition = Definition(stop=StopRule(kind="budget", max_flights=12))
     flights = flown(*runs)
-    advice = advise(definition, Bowl(), flights, proposal, judge(definition, flights, proposal))
+    advice = advise(
+        definition, QuadraticExperiment(), flights, proposal, evaluate_stop_rule(definition, flights, proposal)
+    )
     assert (advice.kind, advice.gains["a"]) == (kind, a)
     assert advice.why
 
@@ -192,7 +200,7 @@ def test_under_the_budget_rule_advice_is_given_beside_the_proposal(
 def test_when_the_rule_says_stop_the_advice_is_to_stop_with_the_best() -> None:
     flights = flown((1, 0.5), (2, 0.49), (3, 0.495))
     proposal = proposed(error=0.1)
-    advice = advise(PAPER, Bowl(), flights, proposal, judge(PAPER, flights, proposal))
+    advice = advise(PAPER, QuadraticExperiment(), flights, proposal, evaluate_stop_rule(PAPER, flights, proposal))
     assert (advice.kind, advice.gains["a"]) == ("stop", 2)
     assert "did not improve" in advice.why
 
@@ -200,5 +208,7 @@ def test_when_the_rule_says_stop_the_advice_is_to_stop_with_the_best() -> None:
 def test_under_the_rule_noise_the_advice_is_the_proposal() -> None:
     flights = flown((1, 0.5), (2, 0.2))
     for kind in ("repeat", "baseline", "step"):
-        advice = advise(NOISE, Bowl(), flights, proposed(kind), judge(NOISE, flights, proposed(kind)))
+        advice = advise(
+            NOISE, QuadraticExperiment(), flights, proposed(kind), evaluate_stop_rule(NOISE, flights, proposed(kind))
+        )
         assert (advice.kind, advice.gains["a"]) == (kind, 99.0)

@@ -10,7 +10,7 @@ from app.core.definition import Definition, Start
 from app.core.errors import GainsError
 from app.core.gate import check_policy, require_flyable
 from app.core.gate.bounds import check_step
-from app.core.spread import Spread, before_flight
+from app.core.spread import ParameterDistribution, prior_distribution
 from tests.core.flying import TAKEOFF, compiled_only, fly
 
 SPACE = TAKEOFF.space
@@ -130,7 +130,7 @@ def test_a_refusal_is_overruled_on_a_simulated_vehicle_and_on_a_real_one_by_nobo
 
 def test_random_models_are_of_the_distribution_that_the_gate_samples() -> None:
     """Half as much again as known lies outside of both: they end at two standard deviations, and at zero."""
-    spread = before_flight(TAKEOFF)
+    spread = prior_distribution(TAKEOFF)
     for models in (spread.samples(TAKEOFF, 200), spread.draws(TAKEOFF, 200, seed=1)):
         for values, parameter in zip(models.T, TAKEOFF.model_parameters, strict=True):
             assert values.min() >= max(parameter.nominal - parameter.known_within - 1e-12, parameter.lower)
@@ -162,7 +162,9 @@ def test_gains_that_have_flown_may_fly_again_although_simulated_takeoffs_go_astr
     """A light vehicle; without damping some models rise too high. What can wrap stays refused."""
     light = (0.496, 0.25, 0.0975, 0.284, 0.66, 0.16, 0.035, 0.002)
     flown = [fly(1, DEFAULT, light)]
-    far = Spread(mean=light, covariance=tuple(tuple(row) for row in np.diag([4e-4] + [0.0] * 7).tolist()), origin="it")
+    far = ParameterDistribution(
+        mean=light, covariance=tuple(tuple(row) for row in np.diag([4e-4] + [0.0] * 7).tolist()), origin="it"
+    )
     kp_only: dict[str, float] = {"kp": 283, "ki": 13, "kd": 0}
     fresh = check_policy(Definition(), TAKEOFF, SPACE, kp_only, flown, spread=far)
     again = check_policy(Definition(), TAKEOFF, SPACE, kp_only, [*flown, fly(2, kp_only, light)], spread=far)

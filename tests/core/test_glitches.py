@@ -10,7 +10,7 @@ from app.core.glitches import find_glitches, repaired
 from app.core.policy import Gains
 from app.core.trajectory import Samples, Trajectory
 from app.logs.takeoff_csv import read_takeoff_csv
-from app.vehicles.base import FlightOrder, OptionValue, Stop
+from app.vehicles.base import FlightOptions, OptionValue, StopRequest
 from app.vehicles.open import open_vehicle
 from tests.core.flying import TAKEOFF, compiled_only
 
@@ -24,12 +24,12 @@ def flown(kind: str, options: dict[str, OptionValue], gains: Gains, *, abort_aft
     """As stored; `abort_after` so many questions, one every 20 ms."""
     asked = iter(range(10**6))
 
-    def should_stop() -> Stop | None:
-        return Stop("that is enough") if abort_after is not None and next(asked) >= abort_after else None
+    def should_stop() -> StopRequest | None:
+        return StopRequest("that is enough") if abort_after is not None and next(asked) >= abort_after else None
 
     with open_vehicle(kind, options, safe_gains=DEFAULT) as vehicle:
         vehicle.stage(gains)
-        record = vehicle.fly(FlightOrder(seed=3), on_sample=lambda _: None, should_stop=should_stop)
+        record = vehicle.fly(FlightOptions(seed=3), on_sample=lambda _: None, should_stop=should_stop)
     return record.trajectory.as_stored()
 
 

@@ -9,10 +9,10 @@ from app.core.calibration import calibrate
 from app.core.definition import Definition, Donor, Flight, Start
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
-from app.core.landscape import Landscape, Plan, foreseen, plan_survey
+from app.core.landscape import Landscape, LandscapePlan, plan_grid, predict_points
 from app.core.policy import Gains
 from app.core.proposing import next_proposal
-from app.core.strategies.foretelling import foretell
+from app.core.strategies.foretelling import predict_flight
 from tests.core.flying import compiled_only
 
 START: Gains = {"kp": 283, "ki": 13, "kd": 82}
@@ -28,9 +28,11 @@ def flight(number: int = 1, gains: Gains = START, hover: float = 0.6) -> Flight:
 
 
 def surveyed(definition: Definition, flights: Sequence[Flight], centre: Gains, *marks: Gains) -> Landscape:
-    survey = plan_survey(Plan(definition=definition, flights=tuple(flights), donor=None, centre=centre, marks=marks))
+    survey = plan_grid(
+        LandscapePlan(definition=definition, flights=tuple(flights), donor=None, centre=centre, marks=marks)
+    )
     assert survey is not None
-    return survey.landscape(foreseen(survey.foresee, survey.points()))
+    return survey.landscape(predict_points(survey.foresee, survey.points()))
 
 
 def error_by_hand(gains: Gains, by: Flight) -> float:
@@ -81,7 +83,7 @@ def test_the_grid_holds_what_the_calibrated_model_foretells() -> None:
     fitted = calibrate(Takeoff(), flights)
     for i, j in ((2, 13), (15, 4)):
         gains = Takeoff().space.vector({**centre, "kp": one.x_values[j], "ki": one.y_values[i]})
-        assert one.errors[i][j] == pytest.approx(foretell(fitted, flights[1], gains).error, abs=1e-9)
+        assert one.errors[i][j] == pytest.approx(predict_flight(fitted, flights[1], gains).error, abs=1e-9)
 
 
 @compiled_only
@@ -102,9 +104,9 @@ def test_a_warm_start_s_landscape_is_that_of_the_vehicle_it_starts_from() -> Non
     definition = Definition(
         start=Start(kind="campaign", gains=dict(tuned), donor=Donor(campaign_id=1, trial_number=5, checksum="0"))
     )
-    survey = plan_survey(Plan(definition=definition, flights=(), donor=donor, centre=tuned, marks=()))
+    survey = plan_grid(LandscapePlan(definition=definition, flights=(), donor=donor, centre=tuned, marks=()))
     assert survey is not None
-    assert foreseen(survey.foresee, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
+    assert predict_points(survey.foresee, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
 
 
 @compiled_only
@@ -130,5 +132,5 @@ def test_of_six_gains_those_are_varied_that_the_error_hangs_on() -> None:
 
 
 def test_without_a_model_there_is_no_landscape() -> None:
-    plan = Plan(definition=Definition(experiment="takeoff-px4"), flights=(), donor=None, centre={}, marks=())
-    assert plan_survey(plan) is None
+    plan = LandscapePlan(definition=Definition(experiment="takeoff-px4"), flights=(), donor=None, centre={}, marks=())
+    assert plan_grid(plan) is None

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from app.core.errors import GainsError
 from app.core.experiments.takeoff import Takeoff
-from tests.core.bowl import Bowl
+from tests.core.bowl import QuadraticExperiment
 
 SPACE = Takeoff().space
 GOOD = {"kp": 283, "ki": 13, "kd": 82}
@@ -69,7 +69,7 @@ def test_what_is_reachable_lies_within_the_fraction_and_holds_the_base(kp: int, 
 
 
 def test_real_valued_gains_are_neither_rounded_nor_made_whole() -> None:
-    space = Bowl.space
+    space = QuadraticExperiment.space
     assert space.mapping(space.nearest(np.array([2.25, 39.6]))) == {"a": 2.25, "b": 40}
     low, high = space.reachable(np.array([50.0, 50.0]), 0.125)
     assert low == pytest.approx([37.5, 38.0])

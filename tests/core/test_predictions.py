@@ -7,13 +7,13 @@ import pytest
 from scipy import stats
 
 from app.core.definition import Flight, Prediction
-from app.core.predictions import expected, expected_again, experience, prediction_of, track_record
-from app.core.statistics import Pooled, groups_of
+from app.core.predictions import interval_scale, prediction_of, repeat_proposal, track_record, with_interval
+from app.core.statistics import PooledScatter, groups_of
 from app.core.strategies.base import Explanation, Proposal
-from app.core.strategies.bias import corrected_by, nominal
-from tests.core.bowl import OFFSET, Bowl, fly
+from app.core.strategies.bias import correct_by_bias, uncorrected_model
+from tests.core.bowl import OFFSET, QuadraticExperiment, fly
 
-SCATTER = Pooled(sigma=0.01, degrees_of_freedom=4.0)
+SCATTER = PooledScatter(sigma=0.01, degrees_of_freedom=4.0)
 T = float(stats.t.ppf(0.95, 4))
 WHY = Explanation(summary="Because.")
 
@@ -24,15 +24,17 @@ def told(flight: Flight, error: float, half: float | None = None) -> Flight:
 
 
 def proposal(a: float, b: float, base: Flight | None = None) -> Proposal:
-    model = nominal(Bowl()) if base is None else corrected_by(Bowl(), base)
-    predicted, error = model.predict(Bowl.space.vector({"a": a, "b": b}))
+    model = uncorrected_model(QuadraticExperiment()) if base is None else correct_by_bias(QuadraticExperiment(), base)
+    predicted, error = model.predict(QuadraticExperiment.space.vector({"a": a, "b": b}))
     return Proposal(kind="step", gains={"a": a, "b": b}, predicted=predicted, predicted_error=error, explanation=WHY)
 
 
 def test_a_model_whose_bias_takes_everything_away_leaves_the_scatter_of_two_flights() -> None:
     """The bowl's only parameter is an offset, which the bias of the base flight holds whatever it is."""
     base = fly(1, 50, 50)
-    found = expected(Bowl(), Bowl.space, [base], proposal(30, 40, base), SCATTER, base=base)
+    found = with_interval(
+        QuadraticExperiment(), QuadraticExperiment.space, [base], proposal(30, 40, base), SCATTER, base=base
+    )
     assert found.interval is not None
     assert found.predicted is not None
     half = T * 0.01 * np.sqrt(2.0)
@@ -45,14 +47,21 @@ def test_a_model_whose_bias_takes_everything_away_leaves_the_scatter_of_two_flig
 
 def test_repeats_of_the_base_narrow_the_interval() -> None:
     flights = [fly(1, 50, 50), fly(2, 50, 50), fly(3, 50, 50)]
-    found = expected(Bowl(), Bowl.space, flights, proposal(30, 40, flights[0]), SCATTER, base=flights[0])
+    found = with_interval(
+        QuadraticExperiment(),
+        QuadraticExperiment.space,
+        flights,
+        proposal(30, 40, flights[0]),
+        SCATTER,
+        base=flights[0],
+    )
     assert found.interval is not None
     assert found.interval.upper - found.interval.lower == pytest.approx(2.0 * T * 0.01 * np.sqrt(4.0 / 3.0), rel=1e-6)
 
 
 def test_before_the_first_flight_the_interval_is_what_a_fit_would_take_for_likely() -> None:
     """The offset has a standard deviation of 0.1; it is the error's own."""
-    found = expected(Bowl(), Bowl.space, [], proposal(60, 60), SCATTER, base=None)
+    found = with_interval(QuadraticExperiment(), QuadraticExperiment.space, [], proposal(60, 60), SCATTER, base=None)
     assert found.interval is not None
     half = (found.interval.upper - found.interval.lower) / 2
     assert half == pytest.approx(T * 0.1, rel=0.25)
@@ -60,8 +69,8 @@ def test_before_the_first_flight_the_interval_is_what_a_fit_would_take_for_likel
 
 def test_an_interval_is_where_the_likely_models_are_and_holds_the_prediction() -> None:
     """The data sheet says offset 0, experience 0.8."""
-    bowl = Bowl((replace(OFFSET, expected=0.8, prior_sd=0.05),))
-    found = expected(bowl, Bowl.space, [], proposal(30, 40), SCATTER, base=None)
+    bowl = QuadraticExperiment((replace(OFFSET, expected=0.8, prior_sd=0.05),))
+    found = with_interval(bowl, QuadraticExperiment.space, [], proposal(30, 40), SCATTER, base=None)
     assert found.interval is not None
     assert found.predicted is not None
     assert found.predicted_error == pytest.approx(1.0)
@@ -73,16 +82,18 @@ def test_an_interval_is_where_the_likely_models_are_and_holds_the_prediction() -
 def test_what_has_an_interval_or_predicts_nothing_stays_as_it_is() -> None:
     base = fly(1, 50, 50)
     mute = replace(proposal(30, 40), predicted=None, predicted_error=None)
-    assert expected(Bowl(), Bowl.space, [base], mute, SCATTER, base=base) is mute
+    assert with_interval(QuadraticExperiment(), QuadraticExperiment.space, [base], mute, SCATTER, base=base) is mute
     assert prediction_of(mute) is None
-    done = expected(Bowl(), Bowl.space, [base], proposal(30, 40, base), SCATTER, base=base)
-    assert expected(Bowl(), Bowl.space, [base], done, SCATTER, base=base) is done
+    done = with_interval(
+        QuadraticExperiment(), QuadraticExperiment.space, [base], proposal(30, 40, base), SCATTER, base=base
+    )
+    assert with_interval(QuadraticExperiment(), QuadraticExperiment.space, [base], done, SCATTER, base=base) is done
 
 
 def test_a_flight_carries_its_prediction() -> None:
     bare = proposal(30, 40)
     assert prediction_of(bare) == Prediction(error=1.0)
-    done = expected(Bowl(), Bowl.space, [], bare, SCATTER, base=None)
+    done = with_interval(QuadraticExperiment(), QuadraticExperiment.space, [], bare, SCATTER, base=None)
     assert done.interval is not None
     assert prediction_of(done) == Prediction(error=1.0, lower=done.interval.lower, upper=done.interval.upper)
 
@@ -90,7 +101,7 @@ def test_a_flight_carries_its_prediction() -> None:
 def test_another_flight_of_a_policy_is_expected_at_the_mean_of_its_flights() -> None:
     flights = [fly(1, 50, 50, 0.2), fly(2, 30, 40), fly(3, 50, 50, 0.3)]
     group = groups_of(flights)[0]
-    again = expected_again(Bowl(), flights, group, SCATTER, "repeat", WHY)
+    again = repeat_proposal(QuadraticExperiment(), flights, group, SCATTER, "repeat", WHY)
     assert again.predicted is not None
     assert again.interval is not None
     assert (again.kind, again.gains) == ("repeat", {"a": 50, "b": 50})
@@ -103,10 +114,10 @@ def test_misses_widen_the_next_interval_and_hits_narrow_it() -> None:
     """f² = (4 + Σz²)/(4 + k), z in standard deviations of the interval."""
     z = float(stats.norm.ppf(0.95))
     exact = replace(fly(1, 50, 50), error=1.0)
-    assert experience([exact]) == 1.0
-    assert experience([told(exact, 1.0, 0.1)]) == pytest.approx(np.sqrt(4 / 5))
-    assert experience([told(exact, 1.2, 0.1)]) == pytest.approx(np.sqrt((4 + (2 * z) ** 2) / 5))
-    assert experience([told(exact, 1.2)]) == 1.0
+    assert interval_scale([exact]) == 1.0
+    assert interval_scale([told(exact, 1.0, 0.1)]) == pytest.approx(np.sqrt(4 / 5))
+    assert interval_scale([told(exact, 1.2, 0.1)]) == pytest.approx(np.sqrt((4 + (2 * z) ** 2) / 5))
+    assert interval_scale([told(exact, 1.2)]) == 1.0
 
 
 def flights_of(*errors: float, predicted: float) -> list[Flight]:

@@ -12,7 +12,7 @@ from app.core.checking import problems_of
 from app.core.definition import Definition, Flight, Start, StopRule
 from app.core.gate import check_policy
 from app.core.proposing import next_proposal
-from app.core.stopping import judge
+from app.core.stopping import evaluate_stop_rule
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Proposal
 from tests.core.flying import ARDRONE, TAKEOFF, TWIN, campaign, compiled_only, errors, fly
@@ -145,7 +145,7 @@ def test_under_the_rule_noise_gains_outside_the_bounds_are_not_flown_again(strat
         flights.append(fly(len(flights) + 1, proposal.gains))
     assert space.check(proposal.gains) == proposal.gains
     assert "Flight 2 lies outside the bounds and takes no part." in proposal.explanation.summary
-    assert judge(definition, flights, proposal).reason == "told from noise"
+    assert evaluate_stop_rule(definition, flights, proposal).reason == "told from noise"
 
 
 def test_under_the_rule_noise_after_flights_outside_the_bounds_alone_the_strategy_goes_on() -> None:

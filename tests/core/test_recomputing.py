@@ -14,7 +14,7 @@ from app.core.checking import problems_of
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.predictions import prediction_of
 from app.core.proposing import next_proposal
-from app.core.stopping import judge
+from app.core.stopping import evaluate_stop_rule
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Proposal
 from tests.core.flying import TAKEOFF, TWIN, compiled_only, fly
@@ -78,11 +78,11 @@ def recompute(definition: Definition, flying: Flying) -> None:
     flights: list[Flight] = []
     for number, flown in enumerate(flying, start=1):
         proposal = next_proposal(definition, flights, donor)
-        verdict = judge(definition, flights, proposal)
+        verdict = evaluate_stop_rule(definition, flights, proposal)
         advice = advise(definition, TAKEOFF, flights, proposal, verdict)
         again = next_proposal(copy.deepcopy(definition), copy.deepcopy(flights), copy.deepcopy(donor))
         assert content(again) == content(proposal)
-        assert judge(definition, flights, again) == verdict
+        assert evaluate_stop_rule(definition, flights, again) == verdict
         assert advise(definition, TAKEOFF, copy.deepcopy(flights), again, verdict) == advice
         assert proposal.interval is not None
         assert proposal.predicted_error is not None

@@ -12,21 +12,21 @@ from app.core.experiments.takeoff_copters import TAKEOFF_PX4
 from app.core.statistics import (
     FlightsToDecide,
     Group,
-    Pooled,
+    PooledScatter,
     compare,
     drift_of,
     groups_of,
     optimism,
-    pooled,
+    pool_scatter,
+    select_winner,
     smallest_difference,
     trend_of,
-    winner_of,
 )
 from tests.core.bowl import fly
 
 PAPER_SIGMA = 0.0141
 """Fig. 12, default gains."""
-KNOWN = Pooled(sigma=PAPER_SIGMA, degrees_of_freedom=1e6)
+KNOWN = PooledScatter(sigma=PAPER_SIGMA, degrees_of_freedom=1e6)
 ERRORS = st.lists(st.floats(0.05, 1.0), min_size=2, max_size=6)
 
 
@@ -54,7 +54,7 @@ def test_the_papers_run_3_beats_run_2_by_1_4_standard_errors_only() -> None:
 def test_without_a_prior_the_comparison_is_the_pooled_t_test() -> None:
     first, second = (0.21, 0.24, 0.22), (0.26, 0.25, 0.28, 0.27)
     groups = (group(*first), group(*second, a=2.0))
-    said = compare(*groups, pooled(groups, Scatter(sd=0.0, degrees_of_freedom=0.0)), 0.9)
+    said = compare(*groups, pool_scatter(groups, Scatter(sd=0.0, degrees_of_freedom=0.0)), 0.9)
     expected = stats.ttest_ind(first, second, alternative="less")
     assert said.confidence == pytest.approx(1.0 - expected.pvalue, abs=1e-12)
     assert said.difference / known(said.standard_error) == pytest.approx(expected.statistic, abs=1e-12)
@@ -64,7 +64,7 @@ def test_without_a_prior_the_comparison_is_the_pooled_t_test() -> None:
 @given(ERRORS, ERRORS)
 def test_pooling_and_comparing_agree_with_scipy(first: list[float], second: list[float]) -> None:
     groups = (group(*first), group(*second, a=2.0))
-    scatter = pooled(groups, Scatter(sd=0.01, degrees_of_freedom=4.0))
+    scatter = pool_scatter(groups, Scatter(sd=0.01, degrees_of_freedom=4.0))
     squares = 4.0 * 0.01**2 + np.var(first) * len(first) + np.var(second) * len(second)
     freedom = 4 + len(first) + len(second) - 2
     assert scatter.degrees_of_freedom == freedom
@@ -93,23 +93,23 @@ def test_the_best_of_many_gets_no_credit_for_having_been_chosen() -> None:
 
 
 def test_the_flights_said_to_decide_do_decide_if_the_difference_stays() -> None:
-    scatter = Pooled(sigma=0.01, degrees_of_freedom=6.0)
+    scatter = PooledScatter(sigma=0.01, degrees_of_freedom=6.0)
     said = compare(group(0.195), group(0.205), scatter, 0.9)
     assert said.verdict == "unresolved"
     assert said.further is not None
     more = said.further
     assert abs(more.first - more.second) <= 1
-    known = Pooled(sigma=0.01, degrees_of_freedom=6.0 + more.total)
+    known = PooledScatter(sigma=0.01, degrees_of_freedom=6.0 + more.total)
     after = compare(group(*[0.195] * (1 + more.first)), group(*[0.205] * (1 + more.second)), known, 0.9)
     assert after.verdict == "better"
-    fewer = Pooled(sigma=0.01, degrees_of_freedom=6.0 + more.total - 1)
+    fewer = PooledScatter(sigma=0.01, degrees_of_freedom=6.0 + more.total - 1)
     sizes = (more.first, 1 + more.second) if more.first > more.second else (1 + more.first, more.second)
     before = compare(group(*[0.195] * sizes[0]), group(*[0.205] * sizes[1]), fewer, 0.9)
     assert before.verdict == "unresolved"
 
 
 def test_the_policy_with_fewer_flights_is_flown_first() -> None:
-    said = compare(group(0.192, 0.192, 0.192), group(0.205), Pooled(sigma=0.01, degrees_of_freedom=8.0), 0.9)
+    said = compare(group(0.192, 0.192, 0.192), group(0.205), PooledScatter(sigma=0.01, degrees_of_freedom=8.0), 0.9)
     assert said.further == FlightsToDecide(first=0, second=1)
 
 
@@ -118,7 +118,7 @@ def test_what_a_hundred_flights_would_not_decide_is_not_promised() -> None:
 
 
 def test_without_any_scatter_every_difference_is_real() -> None:
-    exact = Pooled(sigma=0.0, degrees_of_freedom=4.0)
+    exact = PooledScatter(sigma=0.0, degrees_of_freedom=4.0)
     assert compare(group(0.2), group(0.2001), exact, 0.99).verdict == "better"
     assert compare(group(0.2), group(0.2), exact, 0.99).confidence == 0.0
     assert optimism([0.2, 0.3], [0.0, 0.0]) == 0.0
@@ -151,11 +151,11 @@ def test_groups_are_the_valid_flights_of_one_policy_in_their_order() -> None:
 
 
 def test_a_single_lucky_flight_does_not_overtake_what_was_shown_twice() -> None:
-    scatter = Pooled(sigma=0.01, degrees_of_freedom=8.0)
+    scatter = PooledScatter(sigma=0.01, degrees_of_freedom=8.0)
     proven, lucky = group(0.200, 0.202), group(0.199, a=2.0, first=3)
-    assert winner_of((proven, lucky), scatter) is proven
+    assert select_winner((proven, lucky), scatter) is proven
     clearly = group(0.190, a=2.0, first=3)
-    assert winner_of((proven, clearly), scatter) is clearly
+    assert select_winner((proven, clearly), scatter) is clearly
 
 
 def test_drift_is_the_last_flight_of_a_policy_against_its_first() -> None:
@@ -198,7 +198,7 @@ def test_a_trend_needs_three_points_that_differ() -> None:
 
 
 def test_the_smallest_difference_shrinks_with_the_flights_that_are_left() -> None:
-    scatter = Pooled(sigma=0.01, degrees_of_freedom=4.0)
+    scatter = PooledScatter(sigma=0.01, degrees_of_freedom=4.0)
     told = [smallest_difference(scatter, 1, left, 0.9) for left in range(5)]
     assert told[0] == np.inf
     assert told[1] == pytest.approx(stats.t.ppf(0.9, 4) * 0.01 * np.sqrt(2.0))
@@ -206,7 +206,7 @@ def test_the_smallest_difference_shrinks_with_the_flights_that_are_left() -> Non
 
 
 def test_an_interval_of_a_number_is_students() -> None:
-    half = Pooled(sigma=0.01, degrees_of_freedom=4.0).half_width(2.0, 0.9)
+    half = PooledScatter(sigma=0.01, degrees_of_freedom=4.0).half_width(2.0, 0.9)
     assert half == pytest.approx(stats.t.ppf(0.95, 4) * 0.01 * np.sqrt(2.0))
 
 
@@ -218,12 +218,14 @@ def test_a_pair_that_another_drones_scatter_would_tell_apart_is_not_known_yet_un
     """Two flights under PX4, which scatter by 0.032 m, were "better, 93.9 %" by the 0.0105 m of the paper's drone."""
     first, second = group(0.541), group(0.6175)
     by_another = Scatter(sd=0.0105, degrees_of_freedom=1.0)
-    assert compare(first, second, pooled((first, second), by_another), 0.9).confidence == pytest.approx(0.939, abs=1e-3)
-    said = compare(first, second, pooled((first, second), TAKEOFF_PX4.scatter), 0.9)
+    assert compare(first, second, pool_scatter((first, second), by_another), 0.9).confidence == pytest.approx(
+        0.939, abs=1e-3
+    )
+    said = compare(first, second, pool_scatter((first, second), TAKEOFF_PX4.scatter), 0.9)
     assert (said.verdict, said.confidence, said.standard_error, said.further) == ("not known yet", None, None, None)
-    assert first.known_error(pooled((first,), TAKEOFF_PX4.scatter)) is None
+    assert first.known_error(pool_scatter((first,), TAKEOFF_PX4.scatter)) is None
     again = group(0.541, 0.541 + 0.032 * 2**0.5)
-    own = pooled((again, second), TAKEOFF_PX4.scatter)
+    own = pool_scatter((again, second), TAKEOFF_PX4.scatter)
     assert (own.known, own.degrees_of_freedom) == (True, 1.0)
     assert own.sigma == pytest.approx(0.032)
     assert compare(again, second, own, 0.9).verdict == "unresolved"

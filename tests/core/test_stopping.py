@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, StopRule
-from app.core.stopping import judge, landing_battery_v, starting_battery_v, verdict
+from app.core.stopping import decide_stop, evaluate_stop_rule, landing_battery_v, starting_battery_v
 from app.core.strategies.base import Explanation, Proposal
 from tests.core.bowl import fly
 
@@ -27,67 +27,67 @@ PAPER = StopRule()
     ],
 )
 def test_the_papers_rule_on_the_papers_series(errors: list[float], stop: bool, reason: str | None) -> None:
-    judged = verdict(PAPER, errors)
+    judged = decide_stop(PAPER, errors)
     assert (judged.stop, judged.reason) == (stop, reason)
 
 
 def test_an_improvement_of_exactly_the_fraction_is_not_more_than_it() -> None:
     rule = StopRule(improvement=0.5)
-    assert verdict(rule, [0.5, 0.25]).failures == 1
-    assert verdict(rule, [0.5, 0.2499]).failures == 0
+    assert decide_stop(rule, [0.5, 0.25]).failures == 1
+    assert decide_stop(rule, [0.5, 0.2499]).failures == 0
 
 
 def test_small_gains_that_add_up_do_not_count() -> None:
     """Each flight is held against the best so far, not against the last that counted."""
-    assert verdict(PAPER, [1.0, 0.96, 0.93]).stop
+    assert decide_stop(PAPER, [1.0, 0.96, 0.93]).stop
 
 
 def test_one_success_between_failures_resets_the_count() -> None:
-    judged = verdict(PAPER, [1.0, 1.1, 0.9, 1.2])
+    judged = decide_stop(PAPER, [1.0, 1.1, 0.9, 1.2])
     assert (judged.stop, judged.failures) == (False, 1)
     assert judged.threshold == pytest.approx(0.855)
     assert "one more such flight" in judged.why
 
 
 def test_an_aborted_flight_neither_improves_nor_fails_but_uses_up_budget() -> None:
-    assert verdict(PAPER, [0.5, None, None]).reason is None
-    assert verdict(PAPER, [0.5, 0.49, None, 0.48]).reason == "not improving"
-    assert verdict(PAPER, [None, 0.5]).failures == 0
-    assert verdict(PAPER, [None]).threshold is None
-    assert verdict(PAPER, [None] * 7).reason == "flight budget"
+    assert decide_stop(PAPER, [0.5, None, None]).reason is None
+    assert decide_stop(PAPER, [0.5, 0.49, None, 0.48]).reason == "not improving"
+    assert decide_stop(PAPER, [None, 0.5]).failures == 0
+    assert decide_stop(PAPER, [None]).threshold is None
+    assert decide_stop(PAPER, [None] * 7).reason == "flight budget"
 
 
 def test_a_line_without_anything_better_ends_the_paper_rule_only() -> None:
-    assert verdict(PAPER, [0.5], "none").reason == "nothing better"
-    assert verdict(PAPER, [0.5], "manual").reason is None
-    assert verdict(StopRule(kind="budget"), [0.5], "none").reason is None
+    assert decide_stop(PAPER, [0.5], "none").reason == "nothing better"
+    assert decide_stop(PAPER, [0.5], "manual").reason is None
+    assert decide_stop(StopRule(kind="budget"), [0.5], "none").reason is None
 
 
 def test_the_budget_rule_counts_flights_only() -> None:
     rule = StopRule(kind="budget", max_flights=4)
-    assert not verdict(rule, [0.5, 0.5, 0.5]).stop
-    assert verdict(rule, [0.5, 0.5, 0.5]).why == "1 of 4 flights are left."
-    assert verdict(rule, [0.5] * 4).reason == "flight budget"
-    assert "All 4 flights" in verdict(rule, [0.5] * 4).why
+    assert not decide_stop(rule, [0.5, 0.5, 0.5]).stop
+    assert decide_stop(rule, [0.5, 0.5, 0.5]).why == "1 of 4 flights are left."
+    assert decide_stop(rule, [0.5] * 4).reason == "flight budget"
+    assert "All 4 flights" in decide_stop(rule, [0.5] * 4).why
 
 
 def test_the_noise_rule_never_stops_on_errors_but_when_nothing_is_left_to_tell() -> None:
     rule = StopRule(kind="noise", max_flights=4)
     same = [0.5, 0.5, 0.5]
-    assert verdict(rule, same, "step").reason is None
-    assert verdict(rule, same, "step").threshold is None
-    judged = verdict(rule, same, "none", because="Better.")
+    assert decide_stop(rule, same, "step").reason is None
+    assert decide_stop(rule, same, "step").threshold is None
+    judged = decide_stop(rule, same, "none", because="Better.")
     assert (judged.reason, judged.why) == ("told from noise", "Better.")
-    spent = verdict(rule, [*same, 0.5], "none", because="Unresolved.")
+    spent = decide_stop(rule, [*same, 0.5], "none", because="Unresolved.")
     assert (spent.reason, spent.why) == ("flight budget", "All 4 flights of the budget are flown. Unresolved.")
 
 
 @pytest.mark.parametrize("kind", ["paper", "noise", "budget"])
 def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "noise", "budget"]) -> None:
     rule = StopRule(kind=kind, min_battery_v=10.5)
-    assert verdict(rule, [0.5], "step", battery_v=10.5).reason is None
-    assert verdict(rule, [0.5], "step").reason is None
-    low = verdict(rule, [0.5], "step", battery_v=10.42, because="A step.")
+    assert decide_stop(rule, [0.5], "step", battery_v=10.5).reason is None
+    assert decide_stop(rule, [0.5], "step").reason is None
+    low = decide_stop(rule, [0.5], "step", battery_v=10.42, because="A step.")
     assert low.reason == "battery low"
     assert low.why.startswith("The last flight ended at 10.42 V; 10.5 V is the least.")
 
@@ -107,6 +107,6 @@ def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
     )
     definition = Definition(stop=StopRule(min_battery_v=10.5))
     for flights in ([], [fly(1, 30, 40)]):
-        assert judge(definition, flights, proposal).reason is None
-        assert judge(definition, flights, proposal, battery_v=10.6).reason is None
-        assert judge(definition, flights, proposal, battery_v=10.4).reason == "battery low"
+        assert evaluate_stop_rule(definition, flights, proposal).reason is None
+        assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.6).reason is None
+        assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.4).reason == "battery low"

@@ -81,13 +81,13 @@ def test_an_unlike_vehicle_takes_nothing_over() -> None:
 def test_before_the_first_valid_flight_nothing_is_decided() -> None:
     flight = bowl.fly(1, 50, 50)
     aborted = Flight(number=1, gains=flight.gains, trajectory=flight.trajectory, error=None, outcome="aborted")
-    found = transfer(WARM, bowl.Bowl(), [aborted], flight)
+    found = transfer(WARM, bowl.QuadraticExperiment(), [aborted], flight)
     assert (found.agreement, found.sentence, found.step_fraction) == (None, "", WARM.step_fraction)
 
 
 def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_explains() -> None:
     """Offsets 0.4 (A) and 0.5 (B), scatter 0.01: 1 − (0.1² − 2·0.01²)/0.5²."""
-    found = transfer(WARM, bowl.Bowl(), [bowl.fly(1, 50, 50, 0.5)], bowl.fly(3, 50, 50, 0.4))
+    found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, 0.5)], bowl.fly(3, 50, 50, 0.4))
     assert found.agreement == pytest.approx(1.0 - (0.01 - 0.0002) / 0.25, abs=1e-5)
     assert "The other vehicle's best gains are taken over" in found.sentence
 
@@ -96,5 +96,5 @@ def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_expl
 def test_scatter_is_no_disagreement_and_the_opposite_is_none_of_an_agreement(
     theirs: float, ours: float, agreement: float
 ) -> None:
-    found = transfer(WARM, bowl.Bowl(), [bowl.fly(1, 50, 50, ours)], bowl.fly(3, 50, 50, theirs))
+    found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, ours)], bowl.fly(3, 50, 50, theirs))
     assert found.agreement == pytest.approx(agreement)

@@ -45,7 +45,7 @@ DATA_DIRS: dict[str, Path] = {}
 T = TypeVar("T")
 
 
-class Started:
+class SharedResources:
     """What browser tests share: begun when the first of them asks for it, ended when this process goes on to a test of
     another kind. Playwright's event loop, while it runs, would be in the way of other tests' asyncio.run."""
 
@@ -69,7 +69,7 @@ class Started:
         self._stack.close()
 
 
-STARTED = Started()
+STARTED = SharedResources()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -211,7 +211,7 @@ def own_server(tmp_path: Path) -> Iterator[Server]:
 Opener = Callable[..., Dashboard]
 
 
-class Tabs:
+class TabPool:
     """The tabs that tests take turns in. One that has shown the program before has it compiled already, and shows it in
     a third of the time that a new one takes."""
 
@@ -263,12 +263,12 @@ def new_context(browser: Browser, url: str, *, unlocked: bool = True) -> Browser
 
 
 @pytest.fixture(scope="module")
-def tabs(browser: Browser) -> Tabs:
-    return STARTED.get("tabs", Tabs, lambda: nullcontext(Tabs(browser)))
+def tabs(browser: Browser) -> TabPool:
+    return STARTED.get("tabs", TabPool, lambda: nullcontext(TabPool(browser)))
 
 
 @pytest.fixture
-def open_dashboard(browser: Browser, tabs: Tabs) -> Iterator[Opener]:
+def open_dashboard(browser: Browser, tabs: TabPool) -> Iterator[Opener]:
     """Opens a dashboard in a tab whose store is empty; afterwards nothing must have gone wrong in any of them.
 
     Without `unlocked` nobody has opened a link of `gainline unlock` in it. With `alone` the tab has a browser profile

@@ -20,12 +20,12 @@ from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
 from app.controller_checks import service as controller_checks
-from app.core.landscape import foreseen, plan_survey
+from app.core.landscape import plan_grid, predict_points
 from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.errors import StorageError
 from app.fleet import registering
-from app.fleet.control import NOBODY
+from app.fleet.control import LOCAL_CLI
 from app.fleet.schemas import NewVehicle
 from app.jobs import service as jobs
 from app.settings import Settings
@@ -33,9 +33,9 @@ from app.studies import service as studies
 from app.studies.reproductions import get_reproduction
 from app.trials import flights, photos
 from app.trials import service as trials
-from app.trials.crew import as_asked
+from app.trials.crew import mark_if_requested
 from app.trials.schemas import Classification, NewTrial
-from app.vehicles.base import FlightOrder, Stop
+from app.vehicles.base import FlightOptions, StopRequest
 from app.vehicles.open import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
 
@@ -96,7 +96,7 @@ class States:
 
     def abort(self, campaign_id: int) -> int:
         """The next proposal, whose flight its operator breaks off in the air; the trial's id."""
-        return self._fly(campaign_id, None, stop=Stop("aborted by the operator"))
+        return self._fly(campaign_id, None, stop=StopRequest("aborted by the operator"))
 
     def repeat(self, campaign_id: int) -> int:
         """Fly the best gains again; the trial's id."""
@@ -145,9 +145,9 @@ class States:
         with self._database.read() as session:
             order: Json = {"name": f"campaign {campaign_id}", "proposal_id": _proposed(session, campaign_id).id}
             plan = landscapes.read_plan(session, campaign_id, order)
-        survey = plan_survey(plan)
+        survey = plan_grid(plan)
         assert survey is not None, "there is nothing to draw"
-        found = survey.landscape(foreseen(survey.foresee, survey.points()))
+        found = survey.landscape(predict_points(survey.foresee, survey.points()))
 
         def store(session: Session) -> None:
             landscapes.request_landscape(session, campaign_id)
@@ -160,7 +160,7 @@ class States:
     def vehicle(self, name: str, **fields: object) -> int:
         """A registered vehicle that nobody has connected yet."""
         new = NewVehicle.model_validate({"name": name, "kind": "mavlink", **fields})
-        return self._write(lambda session: registering.register_vehicle(session, new, NOBODY).id)
+        return self._write(lambda session: registering.register_vehicle(session, new, LOCAL_CLI).id)
 
     def vehicle_of(self, campaign_id: int) -> int:
         with self._database.read() as session:
@@ -210,7 +210,7 @@ class States:
                 return work(session)
         raise AssertionError("the database was busy for too long")
 
-    def _fly(self, campaign_id: int, chosen: Json | None, *, stop: Stop | None = None) -> int:
+    def _fly(self, campaign_id: int, chosen: Json | None, *, stop: StopRequest | None = None) -> int:
         def fly(session: Session) -> int:
             what = {"proposal_id": _proposed(session, campaign_id).id} if chosen is None else chosen
             new = NewTrial.model_validate({**what, "fly": {"speed": None}})
@@ -234,10 +234,10 @@ def _rehearsal(session: Session, campaign_id: int) -> int:
 
 def _proposed(session: Session, campaign_id: int) -> ProposalRow:
     """The proposal that holds now."""
-    return proposing.latest_fresh(session, campaigns.get_row(session, campaign_id))
+    return proposing.require_fresh_proposal(session, campaigns.get_row(session, campaign_id))
 
 
-def _carry_out(session: Session, trial_id: int, stop: Stop | None) -> None:
+def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> None:
     """What a worker does with the flight that was asked for, which `stop` ends after two seconds."""
     task = flights.claim_flight(session, WORKER)
     assert task is not None
@@ -245,12 +245,12 @@ def _carry_out(session: Session, trial_id: int, stop: Stop | None) -> None:
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
         flights.record_staged(session, task.flight_id, vehicle.stage(task.gains))
         flights.record_lift_off(session, task.flight_id)
-        order = FlightOrder(seed=task.seed)
+        order = FlightOptions(seed=task.seed)
         seen = count()
         record = vehicle.fly(
             order, on_sample=lambda _sample: None, should_stop=lambda: stop if next(seen) > _ASKED_IN_2_S else None
         )
-        record = as_asked(record, set() if stop is None else {stop.reason})
+        record = mark_if_requested(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
     flights.record_landing(session, task.flight_id, record)
     flights.record_restored(session, task.flight_id, restored)
@@ -276,4 +276,4 @@ def _finish(session: Session, kind: str, campaign_id: int | None, result: Json |
         others.append(job.id)
     assert job is not None, f"no {kind} job of campaign {campaign_id} waits"
     for other in others:
-        jobs.put_back_job(session, other, worker=WORKER)
+        jobs.requeue_job(session, other, worker=WORKER)

@@ -11,7 +11,7 @@ from playwright.sync_api import Locator, Request, Route, expect
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
-from tests.e2e.wifi import Wifi
+from tests.e2e.wifi import InterruptibleProxy
 
 LOST_MS = 40_000
 """A line that looks open counts as dead after eight seconds of silence."""
@@ -141,7 +141,7 @@ def test_a_killed_worker_is_told_until_it_is_back(dashboard: Dashboard, shared_s
 
 def test_after_a_lost_wifi_the_page_catches_up(open_dashboard: Opener, shared_server: Server) -> None:
     ashore = open_dashboard(shared_server.url)
-    with Wifi(shared_server.url) as wifi:
+    with InterruptibleProxy(shared_server.url) as wifi:
         dashboard = open_dashboard(wifi.url)
         campaign_id = new_campaign(ashore, "At the field")
         dashboard.open(f"/campaigns/{campaign_id}")

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 CHUNK_BYTES = 65_536
 
 
-class Wifi:
+class InterruptibleProxy:
     """Forwards connections on `url` to the server; while lost, what is sent waits, as under TCP's repetitions."""
 
     def __init__(self, server_url: str) -> None:

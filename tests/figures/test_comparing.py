@@ -5,14 +5,14 @@ import itertools
 import numpy as np
 
 from app.figures.base import card_of
-from app.figures.comparing import ComparedCurve, ComparingData, ComparingFigure, pen
+from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure, line_style
 from app.figures.history import Curve
 from app.figures.theme import PALETTES
 from tests.figures.builders import SET_POINT, TIME_S, climb, layout, trace, traces
 
 
-def compared(*curves: Curve | None, first: str = "flight 0") -> ComparingData:
-    return ComparingData(
+def compared(*curves: Curve | None, first: str = "flight 0") -> ComparisonData:
+    return ComparisonData(
         output_title="Altitude",
         output_unit="m",
         error_unit="m",
@@ -32,7 +32,7 @@ def compared(*curves: Curve | None, first: str = "flight 0") -> ComparingData:
 
 def test_twenty_flights_are_told_apart_by_colour_and_dash_together() -> None:
     for palette in PALETTES.values():
-        pens = [pen(palette, index) for index in range(20)]
+        pens = [line_style(palette, index) for index in range(20)]
         assert len(set(pens)) == 20
         assert all(one[0] != other[0] and one[1] != other[1] for one, other in itertools.pairwise(pens)), (
             "neighbours differ in both"
@@ -41,7 +41,7 @@ def test_twenty_flights_are_told_apart_by_colour_and_dash_together() -> None:
 
 def test_below_each_flight_stands_against_the_first_as_far_as_both_were_recorded() -> None:
     short = Curve(TIME_S[:1001], climb(0.5).values[:1001])
-    card = card_of(ComparingFigure(compared(climb(0.2), climb(0.3), short)))
+    card = card_of(ComparisonFigure(compared(climb(0.2), climb(0.3), short)))
     assert card.state == "ready", card.reason
     for trial, overshoot_m in ((11, 0.1), (12, 0.3)):
         drawn = trace(card, "difference", trial=trial)
@@ -58,14 +58,14 @@ def test_below_each_flight_stands_against_the_first_as_far_as_both_were_recorded
 
 
 def test_a_wild_flight_is_marked_and_does_not_flatten_the_others() -> None:
-    card = card_of(ComparingFigure(compared(climb(0.2), climb(0.3), climb(0.25), climb(40.0))))
+    card = card_of(ComparisonFigure(compared(climb(0.2), climb(0.3), climb(0.25), climb(40.0))))
     assert layout(card)["yaxis"]["range"][1] < 5.0
     assert trace(card, "off scale", trial=13)["text"] == ["D ↑ 43.0"]
     assert "1 off the scale" in card.summary
 
 
 def test_what_a_campaign_is_called_is_drawn_as_it_is_written() -> None:
-    card = card_of(ComparingFigure(compared(climb(0.2), climb(0.3), first="%{x} <b>& co</b>")))
+    card = card_of(ComparisonFigure(compared(climb(0.2), climb(0.3), first="%{x} <b>& co</b>")))
     drawn = trace(card, "flight", trial=10)
     assert drawn["name"] == "A · %&#123;x} &lt;b&gt;&amp; co&lt;/b&gt;"
     assert drawn["hovertemplate"].startswith(f"<b>{drawn['name']}</b><br>%{{x:.2f}} s")
@@ -75,7 +75,7 @@ def test_what_a_campaign_is_called_is_drawn_as_it_is_written() -> None:
 
 
 def test_without_any_record_it_says_so() -> None:
-    card = card_of(ComparingFigure(compared(None, None)))
+    card = card_of(ComparisonFigure(compared(None, None)))
     assert (card.state, card.reason) == ("waiting", "None of these flights left a record.")
-    alone = card_of(ComparingFigure(compared(None, climb(0.2))))
+    alone = card_of(ComparisonFigure(compared(None, climb(0.2))))
     assert [one["meta"]["role"] for one in traces(alone)] == ["set point", "flight"]

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.figures.crowd import APART, MANY, apart, envelope_of
+from app.figures.crowd import MANY, MAX_INDIVIDUAL_FLIGHTS, envelope_of, select_individual_flights
 from app.figures.errors import ErrorsFigure
 from app.figures.gains import GainsFigure
 from app.figures.history import Curve, FlightData, Range
 from app.figures.scale import thinned
-from app.figures.takeoffs import TakeoffsFigure
+from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import TIME_S, climb, flight, history, trace, traces
 
 FLIGHTS = 200
@@ -52,11 +52,11 @@ def test_flights_that_do_not_count_are_not_in_the_envelope() -> None:
 def test_of_many_flights_the_first_the_best_the_latest_and_the_chosen_one_have_curves_of_their_own() -> None:
     past = history(*CROWD)
     best = min(CROWD, key=lambda one: (one.error, one.number))
-    emphasised = apart(past)
+    emphasised = select_individual_flights(past)
     assert {1, best.number, FLIGHTS} <= emphasised
     assert len(emphasised) <= 12
     chosen = next(one.number for one in CROWD if one.number not in emphasised)
-    drawn = TakeoffsFigure(replace(past, chosen=chosen)).compute()
+    drawn = TrajectoriesFigure(replace(past, chosen=chosen)).compute()
     numbers = {one["meta"]["trial"] for one in traces(drawn) if one["meta"]["role"] == "flight"}
     assert numbers == emphasised | {chosen}
     assert trace(drawn, "flight", trial=chosen)["uid"] == f"flight-{chosen}"
@@ -64,14 +64,14 @@ def test_of_many_flights_the_first_the_best_the_latest_and_the_chosen_one_have_c
 
 
 def test_a_few_flights_are_all_drawn_by_themselves() -> None:
-    few = CROWD[:APART]
-    card = TakeoffsFigure(history(*few)).compute()
+    few = CROWD[:MAX_INDIVIDUAL_FLIGHTS]
+    card = TrajectoriesFigure(history(*few)).compute()
     assert not [one for one in traces(card) if one["meta"]["role"] == "envelope"]
-    assert len([one for one in traces(card) if one["meta"]["role"] == "flight"]) == APART
+    assert len([one for one in traces(card) if one["meta"]["role"] == "flight"]) == MAX_INDIVIDUAL_FLIGHTS
 
 
 def test_the_table_gives_the_envelope_in_numbers() -> None:
-    card = TakeoffsFigure(history(*CROWD)).compute()
+    card = TrajectoriesFigure(history(*CROWD)).compute()
     assert card.table is not None
     names = [column.name for column in card.table.columns]
     at_two_seconds = dict(zip(names, next(row for row in card.table.rows if row[0] == 2.0), strict=True))
@@ -87,7 +87,8 @@ def test_a_closer_look_shows_more_of_the_record_there_and_no_less_elsewhere() ->
     past = history(replace(flight(1, 0.3), curve=record))
     window = Range(4.0, 5.0)
     whole, close = (
-        trace(TakeoffsFigure(replace(past, window=looked)).compute(), "flight", trial=1) for looked in (None, window)
+        trace(TrajectoriesFigure(replace(past, window=looked)).compute(), "flight", trial=1)
+        for looked in (None, window)
     )
     inside = [(at_s, value) for at_s, value in zip(close["x"], close["y"], strict=True) if at_s in window]
     assert len(inside) > 10 * sum(at_s in window for at_s in whole["x"])

@@ -5,19 +5,19 @@ import pytest
 
 from app.figures.history import Curve, Range
 from app.figures.scale import robust_range, thinned
-from app.figures.takeoffs import TakeoffsFigure
+from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, layout, proposal, trace, traces
 
 
 def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
-    card = TakeoffsFigure(history(proposal=proposal(1))).compute()
+    card = TrajectoriesFigure(history(proposal=proposal(1))).compute()
     assert [one["meta"]["role"] for one in traces(card)] == ["set point", "reference", "prediction", "live", "pointed"]
     assert set(trace(card, "set point")["y"]) == {3.0}
     assert trace(card, "live")["x"] == []
 
 
 def test_a_drawn_curve_follows_the_record_within_a_tenth_of_a_millimetre() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3))).compute()
     drawn = trace(card, "flight", trial=1)
     expected = np.interp(drawn["x"], TIME_S, climb(0.3).values)
     np.testing.assert_allclose(drawn["y"], expected, atol=1e-4)
@@ -25,7 +25,9 @@ def test_a_drawn_curve_follows_the_record_within_a_tenth_of_a_millimetre() -> No
 
 
 def test_the_best_flight_is_emphasised_and_drawn_above_all_others() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 0.1), flight(3, 0.2), flight(4, None, outcome="aborted")))
+    card = TrajectoriesFigure(
+        history(flight(1, 0.3), flight(2, 0.1), flight(3, 0.2), flight(4, None, outcome="aborted"))
+    )
     drawn = [one["meta"] for one in traces(card.compute()) if one["meta"]["role"] == "flight"]
     assert [(meta["trial"], meta["standing"]) for meta in drawn] == [
         (4, "invalid"),
@@ -38,7 +40,7 @@ def test_the_best_flight_is_emphasised_and_drawn_above_all_others() -> None:
 
 
 def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
-    card = TakeoffsFigure(
+    card = TrajectoriesFigure(
         history(*(flight(number, 0.4 - 0.01 * number) for number in range(1, 6)), flight(6, None, outcome="aborted"))
     ).compute()
     entries = [one["name"] for one in traces(card) if one.get("showlegend", True)]
@@ -46,7 +48,7 @@ def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
 
 
 def test_a_flight_that_nobody_has_judged_is_not_drawn_like_one_that_does_not_count() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet judged"))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet judged"))).compute()
     drawn = trace(card, "flight", trial=2)
     assert (drawn["name"], drawn["meta"]["standing"], drawn["line"]["dash"]) == (
         "Flight 2 · not yet judged", "unjudged", "longdash")  # fmt: skip
@@ -55,14 +57,14 @@ def test_a_flight_that_nobody_has_judged_is_not_drawn_like_one_that_does_not_cou
 
 
 def test_the_prediction_is_dashed_and_named_after_the_next_flight() -> None:
-    drawn = trace(TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute(), "prediction")
+    drawn = trace(TrajectoriesFigure(history(flight(1, 0.3), proposal=proposal(2))).compute(), "prediction")
     assert drawn["line"]["dash"] == "dash"
     assert drawn["name"] == "Predicted"
     assert "Flight 2, predicted" in drawn["hovertemplate"]
 
 
 def test_the_band_of_the_prediction_lies_below_every_curve() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2, band_m=0.2))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3), proposal=proposal(2, band_m=0.2))).compute()
     assert [one["meta"].get("edge") for one in traces(card)][:2] == ["lower", "upper"]
     lower, upper = trace(card, "band", edge="lower"), trace(card, "band", edge="upper")
     assert upper["fill"] == "tonexty"
@@ -74,7 +76,7 @@ def test_the_band_of_the_prediction_lies_below_every_curve() -> None:
 
 
 def test_a_glitch_is_marked_on_the_curve_where_it_happened() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3, glitches=(Range(5.0, 5.2), Range(9.0, 9.1))))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3, glitches=(Range(5.0, 5.2), Range(9.0, 9.1))))).compute()
     marked = trace(card, "glitch", trial=1)
     seconds = [value for value in marked["x"] if value is not None]
     assert (min(seconds), max(seconds)) == (pytest.approx(4.99, abs=0.011), pytest.approx(9.1, abs=0.011))
@@ -87,13 +89,13 @@ def test_an_error_around_zero_is_shown_on_both_sides() -> None:
     zero = Curve(TIME_S, np.zeros_like(TIME_S))
     first = replace(flight(1, 3.38), curve=wave)
     second = replace(flight(2, 0.2), curve=Curve(TIME_S, 0.01 * np.sin(TIME_S)))
-    card = TakeoffsFigure(replace(history(first, second), set_point=zero, reference=None)).compute()
+    card = TrajectoriesFigure(replace(history(first, second), set_point=zero, reference=None)).compute()
     low, high = layout(card)["yaxis"]["range"]
     assert (low, high) == (pytest.approx(-0.19, abs=0.03), pytest.approx(0.19, abs=0.03))
 
 
 def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3), flight(2, 2.0, overshoot_m=9.0), flight(3, 0.2))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 2.0, overshoot_m=9.0), flight(3, 0.2))).compute()
     low, high = layout(card)["yaxis"]["range"]
     assert low == pytest.approx(-0.2, abs=0.1)
     assert 3.2 < high < 4.0
@@ -102,7 +104,7 @@ def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others()
 
 
 def test_the_table_gives_the_same_curves_in_numbers() -> None:
-    card = TakeoffsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
     assert card.table is not None
     assert [column.name for column in card.table.columns] == [
         "time_s",
@@ -122,7 +124,7 @@ def test_a_record_that_ends_early_leaves_gaps_in_the_table_instead_of_inventing_
 
 
 def test_many_flights_share_the_points_so_that_the_figure_stays_small() -> None:
-    card = TakeoffsFigure(history(*(flight(number, 0.3) for number in range(1, 201)))).compute()
+    card = TrajectoriesFigure(history(*(flight(number, 0.3) for number in range(1, 201)))).compute()
     assert sum(len(one["x"]) for one in traces(card)) <= 14_000
 
 
@@ -150,6 +152,6 @@ def test_the_robust_range_leaves_out_outliers_only(peaks: list[float], outside: 
 
 
 def test_both_themes_draw_the_same_values_in_different_colours() -> None:
-    light, dark = (TakeoffsFigure(history(flight(1, 0.3)), theme).compute() for theme in ("light", "dark"))
+    light, dark = (TrajectoriesFigure(history(flight(1, 0.3)), theme).compute() for theme in ("light", "dark"))
     assert trace(light, "flight", trial=1)["y"] == trace(dark, "flight", trial=1)["y"]
     assert trace(light, "flight", trial=1)["line"]["color"] != trace(dark, "flight", trial=1)["line"]["color"]

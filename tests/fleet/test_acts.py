@@ -10,12 +10,12 @@ from app.db.models import VehicleActRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
-from app.fleet.session import Call, Connected, Session
+from app.fleet.session import ConnectionOpened, ConnectionRequest, VehicleConnection
 from app.fleet.states import ActKind, VehicleState
-from app.fleet.tasks import SessionDeck
+from app.fleet.tasks import VehicleConnectionManager
 from app.main import create_app
 from app.settings import Settings
-from app.trials.flying import Airspace
+from app.trials.flying import AbortRegistry
 from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
 from tests.fleet.vehicles import (
@@ -103,7 +103,7 @@ def test_a_connection_pins_the_identity_and_tells_the_gains(client: TestClient, 
         DEFAULT_GAINS,
     )
     with database.write() as session:
-        acts.vehicle_connected(session, vehicle["id"], Identity(system_id=9, autopilot="px4", version=""))
+        acts.record_connected(session, vehicle["id"], Identity(system_id=9, autopilot="px4", version=""))
     assert seen(client, vehicle)["identity"]["system_id"] == 1
 
 
@@ -186,7 +186,7 @@ def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: T
         assert task is not None
         assert (task.kind, task.vehicle.identity) == (ActKind.RELEASE, None), "nobody has decided about it yet"
         acts.finish_act(session, task.act_id, read_back=DEFAULT_GAINS)
-        acts.vehicle_released(session, vehicle["id"], identity=accepted)
+        acts.record_released(session, vehicle["id"], identity=accepted)
     free = seen(client, vehicle)
     assert (free["state"], free["concern"], free["identity"]["version"]) == ("ready", "", "6.0")
     act = newest(client, vehicle)
@@ -200,7 +200,7 @@ def test_a_quarantine_outlives_the_link(client: TestClient, database: Database) 
     ask(client, vehicle, "disconnect")
     finish_act(database)
     with database.write() as session:
-        acts.vehicle_gone(session, vehicle["id"])
+        acts.record_disconnected(session, vehicle["id"])
     assert seen(client, vehicle)["state"] == "disconnected"
     again = connect(client, database, vehicle)
     assert (again["state"], again["concern"]) == ("quarantined", "its gains are not verified")
@@ -256,7 +256,7 @@ def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a
         assert ask(client, vehicle, "check") == 202
         assert finish_act(database).vehicle.identity is None, "whoever connects it compares, and writes nothing"
         with database.write() as session:
-            acts.vehicle_gone(session, vehicle["id"])
+            acts.record_disconnected(session, vehicle["id"])
     connect(client, database, vehicle)
     assert ask(client, vehicle, "check") == 202
     assert finish_act(database).vehicle.identity is not None
@@ -269,22 +269,22 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     ask(client, known, "disconnect")
     finish_act(database)
     with database.write() as session:
-        acts.vehicle_gone(session, known["id"])
+        acts.record_disconnected(session, known["id"])
     assert "disconnect" not in seen(client, known)["actions"]
     for vehicle in (known, new):
         ask(client, vehicle, "connect")
         finish_act(database, problem="the port is in use by another vehicle")
     with database.read() as session:
-        assert [each.name for each in acts.wanted_links(session)] == ["A"]
+        assert [each.name for each in acts.list_vehicles_to_reconnect(session)] == ["A"]
     assert "disconnect" in seen(client, known)["actions"]
     assert "disconnect" not in seen(client, new)["actions"]
     ask(client, known, "disconnect")
     finish_act(database)
     with database.write() as session:  # found in the very moment in which it was not wanted any more
         identity = Identity(system_id=9, autopilot="paparazzi", version="")
-        assert not acts.vehicle_found(session, known["id"], identity, concern="", held=known["safe_gains"])
+        assert not acts.record_reconnected(session, known["id"], identity, concern="", held=known["safe_gains"])
     with database.read() as session:
-        assert acts.wanted_links(session) == []
+        assert acts.list_vehicles_to_reconnect(session) == []
     assert seen(client, known)["state"] == "disconnected"
 
 
@@ -293,12 +293,12 @@ def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent
 ) -> None:
     vehicle = create_connected(client, database)
     with database.write() as session:
-        acts.vehicle_gone(session, vehicle["id"])
+        acts.record_disconnected(session, vehicle["id"])
     ask(client, vehicle, "connect")
     finish_act(database, problem="nobody answers")
     with database.write() as session:
         identity = Identity(system_id=1, autopilot="paparazzi", version="")
-        assert acts.vehicle_found(session, vehicle["id"], identity, concern="It is armed.", held={})
+        assert acts.record_reconnected(session, vehicle["id"], identity, concern="It is armed.", held={})
     given = client.get(f"/api/vehicles/{vehicle['id']}/ledger").json()["items"]
     assert [(line["purpose"], line["asked"], line["read_back"]) for line in given] == [
         ("connect", DEFAULT_GAINS, DEFAULT_GAINS)
@@ -312,16 +312,16 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
     vehicle = create_connected(client, database)
     events: list[str] = []
 
-    class Found(Session):
-        def __init__(self, call: Call, *_: object, **__: object) -> None:
+    class Found(VehicleConnection):
+        def __init__(self, call: ConnectionRequest, *_: object, **__: object) -> None:
             self.call = call  # type: ignore[misc]
 
-        def connected(self) -> Connected:
+        def connected(self) -> ConnectionOpened:
             ask(client, vehicle, "disconnect")
             with database.write() as session:
                 acts.withdraw_acts(session)
             events.append("found")
-            return Connected(identity=IDENTITY, concern="", held=dict(DEFAULT_GAINS))
+            return ConnectionOpened(identity=IDENTITY, concern="", held=dict(DEFAULT_GAINS))
 
         def hang_up(self) -> None:
             pass
@@ -331,9 +331,9 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
 
     monkeypatch.setattr("app.fleet.tasks.Session", Found)
     with database.write() as session:
-        acts.vehicle_gone(session, vehicle["id"])
-    deck = SessionDeck(
-        database, settings.data_dir, Airspace(), lambda _shown: None, worker=WORKER, closing=threading.Event()
+        acts.record_disconnected(session, vehicle["id"])
+    deck = VehicleConnectionManager(
+        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
     )
     deck.tend()
     deck._seekers.shutdown()
@@ -399,10 +399,10 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
 ) -> None:
     vehicles = [create_connected(client, database, name, real=name == "Real") for name in ("Simulated", "Real")]
     before = [newest(client, vehicle)["id"] for vehicle in vehicles]
-    deck = SessionDeck(
+    deck = VehicleConnectionManager(
         database,
         settings.data_dir,
-        Airspace(),
+        AbortRegistry(),
         lambda _shown: None,
         worker=WORKER,
         closing=threading.Event(),
@@ -424,8 +424,8 @@ def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
     def connected_as(version: str, concern: str = "") -> str:
         with database.write() as session:
             identity = Identity(system_id=1, autopilot="paparazzi", version=version)
-            acts.vehicle_connected(session, vehicle["id"], identity, concern=concern)
-            acts.vehicle_gone(session, vehicle["id"])
+            acts.record_connected(session, vehicle["id"], identity, concern=concern)
+            acts.record_disconnected(session, vehicle["id"])
         return str(seen(client, vehicle)["identity"]["version"])
 
     assert [connected_as(version) for version in ("", "5.18", "", "5.20")] == ["", "5.18", "5.18", "5.18"]
@@ -434,8 +434,8 @@ def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
 def test_an_order_past_the_database_is_written_down_afterwards(client: TestClient, database: Database) -> None:
     vehicle = create_connected(client, database)
     with database.write() as session:
-        acts.record_order(session, vehicle["id"], ActKind.LAND, "it drifts")
-        acts.record_order(session, vehicle["id"], ActKind.MOTORS_OFF, "fire", problem="the link was closed")
+        acts.record_command(session, vehicle["id"], ActKind.LAND, "it drifts")
+        acts.record_command(session, vehicle["id"], ActKind.MOTORS_OFF, "fire", problem="the link was closed")
     stopped, landed = get(client, f"/api/vehicles/{vehicle['id']}/acts?limit=2")["items"]
     assert (landed["kind"], landed["state"], landed["reason"]) == ("land", "done", "it drifts")
     assert (stopped["kind"], stopped["state"], stopped["problem"]) == ("motors off", "failed", "the link was closed")

@@ -172,7 +172,7 @@ def test_the_link_changes_only_while_it_is_closed_and_pins_the_identity_anew(
     assert (edited["options"]["system_id"], edited["identity"], edited["version"]) == (5, None, 3)
     assert edited["options"]["simulated"] is True
     with database.write() as session:
-        acts.vehicle_connected(session, vehicle["id"], IDENTITY)
+        acts.record_connected(session, vehicle["id"], IDENTITY)
     assert seen(client, vehicle)["identity"]["system_id"] == 1
 
 

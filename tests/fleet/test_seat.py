@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from app.fleet import seat as seat_module
-from app.fleet.seat import Line, Seat
-from app.fleet.session import Asked, Call, Connected, FromSeat
+from app.fleet.seat import VehicleProcess, WorkerPipe
+from app.fleet.session import ConnectionOpened, ConnectionRequest, FromVehicleProcess, VehicleRequest
 from app.fleet.states import ActKind
-from app.trials.crew import Free, Orders, Restored, Staged, TakeOff, Trouble
-from app.vehicles.base import FlightOrder, Identity
+from app.trials.crew import FlightFailure, FlightFinished, FlightRequest, GainsStaged, SafeGainsRestored, TakeOffCommand
+from app.vehicles.base import FlightOptions, Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -20,21 +20,21 @@ from tests.vehicles.flying import SAFE, TUNED
 from tests.vehicles.mavlink.rigs import LockstepRig
 
 
-class Overheard(Line):
+class RecordingPipe(WorkerPipe):
     """The process's end of the pipe, and everything that it said but how the vehicle is."""
 
     def __init__(self) -> None:
         self.workers_end, theirs = Pipe()
         super().__init__(theirs)
-        self.said: list[FromSeat] = []
+        self.said: list[FromVehicleProcess] = []
         self.on_staged: Callable[[], None] = lambda: None
 
-    def say(self, message: FromSeat) -> None:
+    def say(self, message: FromVehicleProcess) -> None:
         self.said.append(message)
-        if isinstance(message, Staged):
+        if isinstance(message, GainsStaged):
             self.on_staged()
 
-    def show(self, message: FromSeat) -> None: ...
+    def show(self, message: FromVehicleProcess) -> None: ...
 
 
 @pytest.fixture
@@ -60,8 +60,8 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
         yield one
 
 
-def seated(rig: LockstepRig, line: Line, folder: Path, safe_gains: Mapping[str, float] = SAFE) -> Seat:
-    call = Call(
+def started(rig: LockstepRig, line: WorkerPipe, folder: Path, safe_gains: Mapping[str, float] = SAFE) -> VehicleProcess:
+    call = ConnectionRequest(
         vehicle_id=1,
         name="Bench drone",
         kind="mavlink",
@@ -72,11 +72,11 @@ def seated(rig: LockstepRig, line: Line, folder: Path, safe_gains: Mapping[str, 
         trial_parameters=folder / "parameters.json",
         clock=rig,
     )
-    return Seat(line, call)
+    return VehicleProcess(line, call)
 
 
-def orders(rig: LockstepRig, folder: Path) -> Orders:
-    return Orders(
+def orders(rig: LockstepRig, folder: Path) -> FlightRequest:
+    return FlightRequest(
         campaign_id=1,
         trial_id=1,
         experiment="takeoff",
@@ -84,7 +84,7 @@ def orders(rig: LockstepRig, folder: Path) -> Orders:
         vehicle_options=rig.options(),
         safe_gains=SAFE,
         gains=TUNED,
-        flight=FlightOrder(seed=1),
+        flight=FlightOptions(seed=1),
         lock=folder / "vehicle.lock",
     )
 
@@ -93,33 +93,33 @@ def orders(rig: LockstepRig, folder: Path) -> Orders:
 def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains_can_be_verified(
     rig: LockstepRig, tmp_path: Path, takes_its_safe_gains: bool
 ) -> None:
-    line = Overheard()
-    seat = seated(rig, line, tmp_path)
+    line = RecordingPipe()
+    seat = started(rig, line, tmp_path)
 
     def refuse() -> None:
         rig.drone.autopilot.refuses_arming = True
         rig.drone.autopilot.ignores_parameters = not takes_its_safe_gains
 
     line.on_staged = refuse
-    line.workers_end.send(TakeOff())
+    line.workers_end.send(TakeOffCommand())
     seat._fly(orders(rig, tmp_path))
-    [trouble] = [said for said in line.said if isinstance(said, Trouble)]
+    [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert "would not arm" in trouble.what
     assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
     assert (trouble.not_flown, trouble.unsafe) == (True, not takes_its_safe_gains)
-    assert [type(said) for said in line.said if isinstance(said, Restored | Free)] == (
-        [Restored, Free] if takes_its_safe_gains else [Free]
+    assert [type(said) for said in line.said if isinstance(said, SafeGainsRestored | FlightFinished)] == (
+        [SafeGainsRestored, FlightFinished] if takes_its_safe_gains else [FlightFinished]
     )
 
 
 def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: LockstepRig, tmp_path: Path) -> None:
-    line = Overheard()
-    seat = seated(rig, line, tmp_path)
-    assert line.said == [Connected(identity=seat._vehicle.identity, concern="", held=dict(SAFE))]
-    answered = seat._act(Asked(kind=ActKind.RESTORE, safe_gains=TUNED))
+    line = RecordingPipe()
+    seat = started(rig, line, tmp_path)
+    assert line.said == [ConnectionOpened(identity=seat._vehicle.identity, concern="", held=dict(SAFE))]
+    answered = seat._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=TUNED))
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
     seat._vehicle._observe("Somebody else armed it.")  # type: ignore[attr-defined]
-    answered = seat._act(Asked(kind=ActKind.RESTORE, safe_gains=SAFE))
+    answered = seat._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE))
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(SAFE))
 
 
@@ -127,10 +127,10 @@ def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_sa
     rig: LockstepRig, tmp_path: Path
 ) -> None:
     """Its owner's gains, met for the first time, and a slip of the hand in the safe gains named for it."""
-    seat = seated(rig, Overheard(), tmp_path, safe_gains=TUNED)
+    seat = started(rig, RecordingPipe(), tmp_path, safe_gains=TUNED)
     assert "nothing was written" in seat._vehicle.concern
     other = {**TUNED, "kp": TUNED["kp"] + 1}
-    answered = seat._act(Asked(kind=ActKind.CHECK, safe_gains=other))
+    answered = seat._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=other))
     assert "nothing was written" in answered.concern
-    answered = seat._act(Asked(kind=ActKind.CHECK, safe_gains=SAFE))
+    answered = seat._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=SAFE))
     assert (answered.concern, answered.held) == ("", dict(SAFE))

@@ -38,7 +38,7 @@ def connect(client: httpx2.Client, database: Database, vehicle: Json, *, concern
         task = acts.claim_act(session, WORKER)
         assert task is not None
         held = None if concern else task.vehicle.safe_gains
-        acts.vehicle_connected(session, vehicle["id"], IDENTITY, concern=concern)
+        acts.record_connected(session, vehicle["id"], IDENTITY, concern=concern)
         acts.finish_act(session, task.act_id, read_back=held)
     return seen(client, vehicle)
 

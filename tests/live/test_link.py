@@ -24,9 +24,9 @@ from app.live.messages import (
     AbortAnswer,
     FlightPhase,
     FromWorker,
-    Order,
     Ping,
     Telemetry,
+    VehicleCommandKind,
     VehicleOrder,
     VehicleOrderAnswer,
     VehicleStatus,
@@ -63,7 +63,7 @@ def status(altitude_m: float = 0.1) -> VehicleStatus:
 def server(
     path: Path,
     abort: Callable[[int, str], bool] = lambda _trial, _why: False,
-    order: Callable[[int, Order, str, float], bool] = lambda _vehicle, _order, _why, _by_s: False,
+    order: Callable[[int, VehicleCommandKind, str, float], bool] = lambda _vehicle, _order, _why, _by_s: False,
 ) -> LiveServer:
     return LiveServer(
         path, abort=abort, order=order, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2])
@@ -168,9 +168,9 @@ def test_an_abort_reaches_the_worker_and_its_answer_comes_back(tmp_path: Path) -
 
 
 def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_vehicle(tmp_path: Path) -> None:
-    given: list[tuple[int, Order, str]] = []
+    given: list[tuple[int, VehicleCommandKind, str]] = []
 
-    def order(vehicle_id: int, what: Order, reason: str, _by_s: float) -> bool:
+    def order(vehicle_id: int, what: VehicleCommandKind, reason: str, _by_s: float) -> bool:
         given.append((vehicle_id, what, reason))
         return vehicle_id == 5
 
@@ -195,7 +195,7 @@ def test_what_comes_after_its_time_is_not_carried_out(tmp_path: Path) -> None:
         done.append(reason)
         return True
 
-    def order(_vehicle_id: int, _order: Order, reason: str, _by_s: float) -> bool:
+    def order(_vehicle_id: int, _order: VehicleCommandKind, reason: str, _by_s: float) -> bool:
         done.append(reason)
         return True
 

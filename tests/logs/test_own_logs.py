@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.logs.readers import read_takeoff
-from app.vehicles.base import FlightOrder
+from app.vehicles.base import FlightOptions
 from tests.vehicles.flying import TAKEOFF, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 
@@ -26,7 +26,7 @@ def test_the_log_of_a_flight_is_the_flight(autopilot: str, tmp_path: Path) -> No
             rig.switch_on_failsafes()
         vehicle = rig.vehicle(log_folder=str(tmp_path))
         vehicle.stage(gains)
-        record = vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_stop=never)
+        record = vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
         vehicle.close()
     [log] = tmp_path.glob("*.tlog")
     flown = read_takeoff(io.BytesIO(log.read_bytes()))

@@ -11,7 +11,7 @@ from typing import Final
 import httpx2
 import pytest
 
-from app.connections import FOR_STOPPING, room_for_connections
+from app.connections import RESERVED_FOR_ABORTS, room_for_connections
 from tests.runtime.processes import Serving
 
 FILES: Final = 256
@@ -65,7 +65,7 @@ def test_an_abort_is_answered_while_idle_connections_fill_every_place(serving: S
             answer = operator.post(f"/api/trials/{trial_id}/abort", json={"reason": "too close"})
         assert (answer.status_code, answer.json()["accepted"]) == (202, True)
         assert open_files(serving) < FILES
-        places = room_for_connections(FILES) + FOR_STOPPING
+        places = room_for_connections(FILES) + RESERVED_FOR_ABORTS
         assert sum(not is_closed(connection) for connection in idle) <= places
     assert serving.trial(trial_id, "aborted")["reason"] == "too close"
     assert "no connection can be taken" not in serving.logged()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.pool import CrashedError, Pool
+from app.pool import ComputePool, CrashedError
 
 
 def double(number: int) -> int:
@@ -58,7 +58,7 @@ def refuse() -> None:
 
 
 def test_results_and_errors_of_the_task_come_back() -> None:
-    with Pool(1, prepare=time.time) as pool:
+    with ComputePool(1, prepare=time.time) as pool:
         assert pool.run(double, 21) == 42
         with pytest.raises(ValueError, match="not today"):
             pool.run(refuse)
@@ -66,24 +66,24 @@ def test_results_and_errors_of_the_task_come_back() -> None:
 
 
 def test_a_killed_process_is_replaced_and_the_task_tried_again(tmp_path: Path) -> None:
-    with Pool(1, prepare=time.time) as pool:
+    with ComputePool(1, prepare=time.time) as pool:
         assert pool.run(die_once, tmp_path / "flag") == 7
 
 
 def test_a_process_killed_while_it_tells_its_result_is_replaced_too(tmp_path: Path) -> None:
-    with Pool(1, prepare=time.time) as pool:
+    with ComputePool(1, prepare=time.time) as pool:
         assert pool.run(die_in_the_middle_of_the_result, tmp_path / "flag") == b"whole"
 
 
 def test_a_task_that_always_kills_its_process_fails_and_the_next_one_works() -> None:
-    with Pool(1, prepare=time.time) as pool:
+    with ComputePool(1, prepare=time.time) as pool:
         with pytest.raises(CrashedError, match="died 2 times"):
             pool.run(die)
         assert pool.run(double, 3) == 6
 
 
 def test_processes_give_way_to_others_as_far_as_they_are_told() -> None:
-    with Pool(1, prepare=time.time) as even, Pool(1, prepare=time.time, niceness=3) as nice:
+    with ComputePool(1, prepare=time.time) as even, ComputePool(1, prepare=time.time, niceness=3) as nice:
         assert even.run(niceness) == niceness()
         assert nice.run(niceness) == niceness() + 3
 
@@ -97,7 +97,7 @@ def test_closing_the_pool_ends_a_long_task_at_once(tmp_path: Path) -> None:
         except CancelledError as error:
             outcome.append(type(error))
 
-    with Pool(1, prepare=time.time) as pool:
+    with ComputePool(1, prepare=time.time) as pool:
         waiting = threading.Thread(target=wait_for_it)
         waiting.start()
         while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():

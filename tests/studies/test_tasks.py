@@ -15,10 +15,10 @@ from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.schemas import Job
 from app.jobs.states import JobState
-from app.jobs.tasks import Claimed, Desk
+from app.jobs.tasks import ClaimedJob, JobRunner
 from app.studies import service
 from app.studies.service import REPRODUCTION_JOB
-from app.studies.tasks import Reproducer
+from app.studies.tasks import ReproductionJob
 from tests.builders import WORKER
 
 LONG = "variability"
@@ -31,10 +31,10 @@ class Working:
         self.database = database
         self.closing = threading.Event()
         self.raised: list[BaseException] = []
-        self._reproducer = Reproducer(database, worker=WORKER, lease_s=30.0, closing=self.closing)
-        self.desk = Desk(database, REPRODUCTION_JOB, self._perform, room=1, worker=WORKER, lease_s=30.0)
+        self._reproducer = ReproductionJob(database, worker=WORKER, lease_s=30.0, closing=self.closing)
+        self.desk = JobRunner(database, REPRODUCTION_JOB, self._perform, room=1, worker=WORKER, lease_s=30.0)
 
-    def _perform(self, job: Claimed) -> None:
+    def _perform(self, job: ClaimedJob) -> None:
         try:
             self._reproducer(job)
         except BaseException as error:

@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from app.db.models import TrialRow
 from app.db.session import Database
-from app.trials.crew import as_asked
+from app.trials.crew import mark_if_requested
 from app.trials.spool import Spool
 from tests.builders import (
     Json,
@@ -160,7 +160,7 @@ def test_a_flight_was_ended_on_request_only_where_no_limit_had_ended_it(
     ending: str, reason: str, asked: set[str], on_request: bool
 ) -> None:
     record = create_record(ending=ending, reason=reason)  # type: ignore[arg-type]  # one of the three
-    assert as_asked(record, asked).on_request is on_request
+    assert mark_if_requested(record, asked).on_request is on_request
 
 
 def test_a_record_that_waits_on_the_disk_keeps_why_it_was_broken_off(tmp_path: Path) -> None:

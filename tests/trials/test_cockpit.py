@@ -12,17 +12,17 @@ import pytest
 from app.core.experiments import get_experiment
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import exclusive
-from app.trials.cockpit import CONTROL_WITHIN_S, Cockpit
-from app.trials.crew import Landed, Orders, Said, Staged, Trouble
-from app.vehicles.base import FlightOrder
+from app.trials.cockpit import CONTROL_WITHIN_S, FlightProcess
+from app.trials.crew import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
+from app.vehicles.base import FlightOptions
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import open_vehicle
 
 GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 
 
-def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, trial_id: int = 1) -> Orders:
-    return Orders(
+def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, trial_id: int = 1) -> FlightRequest:
+    return FlightRequest(
         campaign_id=1,
         trial_id=trial_id,
         experiment="takeoff",
@@ -30,110 +30,118 @@ def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, tria
         vehicle_options={},
         safe_gains=GAINS,
         gains=GAINS,
-        flight=FlightOrder(seed=3, speed=speed),
+        flight=FlightOptions(seed=3, speed=speed),
         lock=folder / "vehicle.lock",
     )
 
 
 @pytest.fixture(scope="module")
-def cockpit() -> Iterator[Cockpit]:
-    one = Cockpit()
+def cockpit() -> Iterator[FlightProcess]:
+    one = FlightProcess()
     yield one
     one.close()
 
 
-def fly(cockpit: Cockpit, asked: Orders, on_said: Callable[[Said], None] = lambda _said: None) -> list[Said]:
+def fly(
+    cockpit: FlightProcess, asked: FlightRequest, on_said: Callable[[FlightMessage], None] = lambda _said: None
+) -> list[FlightMessage]:
     heard = []
     for said in cockpit.fly(asked):
         heard.append(said)
-        if isinstance(said, Staged):
+        if isinstance(said, GainsStaged):
             cockpit.take_off()
         on_said(said)
     return heard
 
 
-def only(heard: list[Said], kind: type[Said]) -> list[Said]:
+def only(heard: list[FlightMessage], kind: type[FlightMessage]) -> list[FlightMessage]:
     return [said for said in heard if isinstance(said, kind)]
 
 
-def test_a_flight_in_the_process_is_the_flight_in_this_one(cockpit: Cockpit, tmp_path: Path) -> None:
+def test_a_flight_in_the_process_is_the_flight_in_this_one(cockpit: FlightProcess, tmp_path: Path) -> None:
     heard = fly(cockpit, orders(tmp_path))
     with open_vehicle("twin", {}, safe_gains=GAINS) as vehicle:
         vehicle.stage(GAINS)
-        here = vehicle.fly(FlightOrder(seed=3), on_sample=lambda _: None, should_stop=lambda: None)
-    (landed,) = only(heard, Landed)
-    assert isinstance(landed, Landed)
-    assert heard[0] == Staged(GAINS)
+        here = vehicle.fly(FlightOptions(seed=3), on_sample=lambda _: None, should_stop=lambda: None)
+    (landed,) = only(heard, FlightLanded)
+    assert isinstance(landed, FlightLanded)
+    assert heard[0] == GainsStaged(GAINS)
     assert landed.record.ending == "completed"
     np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], here.trajectory["altitude_m"])
     assert [said.phase for said in heard if isinstance(said, FlightPhase)] == ["flying", "landed"]
 
 
-def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(cockpit: Cockpit, tmp_path: Path) -> None:
+def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(
+    cockpit: FlightProcess, tmp_path: Path
+) -> None:
     heard = fly(cockpit, orders(tmp_path))
     rows = [row for said in heard if isinstance(said, Telemetry) for row in said.samples]
     assert [round(row[0] * 50) for row in rows] == list(range(len(rows)))
     assert rows[-1][0] == pytest.approx(33.0, abs=0.03)
     last = [said for said in heard if isinstance(said, Telemetry)][-1]
-    (landed,) = only(heard, Landed)
-    assert isinstance(landed, Landed)
+    (landed,) = only(heard, FlightLanded)
+    assert isinstance(landed, FlightLanded)
     # 50 Hz telemetry against the 512 Hz record
     assert last.error_so_far == pytest.approx(get_experiment("takeoff").error(landed.record.trajectory), abs=2e-4)
 
 
 def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
-    cockpit: Cockpit, tmp_path: Path
+    cockpit: FlightProcess, tmp_path: Path
 ) -> None:
-    def abort(said: Said) -> None:
+    def abort(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
             cockpit.stand_down(1, "too high")
 
-    (landed,) = only(fly(cockpit, orders(tmp_path, speed=1.0), abort), Landed)
-    assert isinstance(landed, Landed)
+    (landed,) = only(fly(cockpit, orders(tmp_path, speed=1.0), abort), FlightLanded)
+    assert isinstance(landed, FlightLanded)
     assert (landed.record.ending, landed.record.reason) == ("aborted", "too high")
     assert landed.record.trajectory["altitude_m"][-1] < 0.1
-    (landed,) = only(fly(cockpit, orders(tmp_path, trial_id=2)), Landed)
-    assert isinstance(landed, Landed)
+    (landed,) = only(fly(cockpit, orders(tmp_path, trial_id=2)), FlightLanded)
+    assert isinstance(landed, FlightLanded)
     assert landed.record.ending == "completed"
 
 
-def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(cockpit: Cockpit, tmp_path: Path) -> None:
+def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(
+    cockpit: FlightProcess, tmp_path: Path
+) -> None:
     (trouble,) = fly(cockpit, orders(tmp_path, kind="import"))
-    assert isinstance(trouble, Trouble)
+    assert isinstance(trouble, FlightFailure)
     assert not trouble.unsafe
-    assert len(only(fly(cockpit, orders(tmp_path)), Landed)) == 1
+    assert len(only(fly(cockpit, orders(tmp_path)), FlightLanded)) == 1
 
 
-def test_a_declined_flight_leaves_no_record(cockpit: Cockpit, tmp_path: Path) -> None:
+def test_a_declined_flight_leaves_no_record(cockpit: FlightProcess, tmp_path: Path) -> None:
     heard = []
     for said in cockpit.fly(orders(tmp_path)):
         heard.append(said)
         cockpit.decline()
-    assert heard == [Staged(GAINS)]
+    assert heard == [GainsStaged(GAINS)]
 
 
-def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(cockpit: Cockpit, tmp_path: Path) -> None:
+def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
+    cockpit: FlightProcess, tmp_path: Path
+) -> None:
     heard = []
     for said in cockpit.fly(orders(tmp_path, speed=1.0)):
         heard.append(said)
-        if isinstance(said, Staged):
+        if isinstance(said, GainsStaged):
             cockpit.stand_down(1, "not today")
             cockpit.take_off()
-    (landed,) = only(heard, Landed)
-    assert isinstance(landed, Landed)
+    (landed,) = only(heard, FlightLanded)
+    assert isinstance(landed, FlightLanded)
     assert (landed.record.ending, landed.record.reason) == ("aborted", "not today")
     assert landed.record.trajectory["altitude_m"].max() < 0.05
 
 
 def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
-    alone, together = Cockpit(), [Cockpit(), Cockpit()]
-    records: dict[int, Landed] = {}
+    alone, together = FlightProcess(), [FlightProcess(), FlightProcess()]
+    records: dict[int, FlightLanded] = {}
 
     def one(number: int) -> None:
         folder = tmp_path / str(number)
         folder.mkdir()
-        (landed,) = only(fly(together[number], orders(folder, kind="jsbsim")), Landed)
-        assert isinstance(landed, Landed)
+        (landed,) = only(fly(together[number], orders(folder, kind="jsbsim")), FlightLanded)
+        assert isinstance(landed, FlightLanded)
         records[number] = landed
 
     threads = [threading.Thread(target=one, args=(number,)) for number in range(2)]
@@ -141,8 +149,8 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
         thread.start()
     for thread in threads:
         thread.join()
-    (expected,) = only(fly(alone, orders(tmp_path, kind="jsbsim")), Landed)
-    assert isinstance(expected, Landed)
+    (expected,) = only(fly(alone, orders(tmp_path, kind="jsbsim")), FlightLanded)
+    assert isinstance(expected, FlightLanded)
     for landed in records.values():
         np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], expected.record.trajectory["altitude_m"])
     for each in (alone, *together):
@@ -150,9 +158,9 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
 
 
 def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) -> None:
-    cockpit = Cockpit()
+    cockpit = FlightProcess()
 
-    def kill(said: Said) -> None:
+    def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
             os.kill(cockpit._process.pid or 0, signal.SIGKILL)
 
@@ -162,13 +170,13 @@ def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) 
 
 
 def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_path: Path) -> None:
-    cockpit = Cockpit()
-    heard: list[Said] = []
+    cockpit = FlightProcess()
+    heard: list[FlightMessage] = []
     with exclusive(tmp_path / "vehicle.lock"):
         thread = threading.Thread(target=lambda: heard.extend(fly(cockpit, orders(tmp_path))))
         thread.start()
         thread.join(1.0)
         assert heard == []
     thread.join(CONTROL_WITHIN_S)
-    assert len(only(heard, Landed)) == 1
+    assert len(only(heard, FlightLanded)) == 1
     cockpit.close()

@@ -7,7 +7,7 @@ import pytest
 
 from app.core.trajectory import Trajectory
 from app.errors import StorageError
-from app.trials.spool import ROOM_BYTES, Spool
+from app.trials.spool import RESERVED_BYTES, Spool
 from app.vehicles.base import FlightRecord
 
 
@@ -47,7 +47,7 @@ def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
 def test_the_room_is_really_taken_before_the_flight(tmp_path: Path) -> None:
     Spool(tmp_path).claim(1)
     (room,) = tmp_path.iterdir()
-    assert room.stat().st_blocks * 512 >= ROOM_BYTES
+    assert room.stat().st_blocks * 512 >= RESERVED_BYTES
 
 
 def test_a_claim_without_a_record_is_swept_away_and_a_record_stays(tmp_path: Path) -> None:

@@ -13,29 +13,29 @@ from sqlalchemy.orm import Session
 
 from app.db.models import FlightRow
 from app.db.session import Database
-from app.live.messages import FlightPhase, Shown
+from app.live.messages import FlightPhase, PublishedMessage
 from app.settings import Settings
-from app.trials.crew import Orders, Restored, Said, Staged, Trouble
+from app.trials.crew import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
 from app.trials.flights import BEGINS_WITHIN
-from app.trials.flying import Airspace
+from app.trials.flying import AbortRegistry
 from app.trials.states import FlightState, TrialState
-from app.trials.tasks import FlightDeck
+from app.trials.tasks import FlightRunner
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.clocks import SimulatedClock
 from tests.conftest import Listen
 from tests.trials.states import make_vehicle_real
 
-Watch = Callable[[Shown], None]
+Watch = Callable[[PublishedMessage], None]
 
 
-class Airfield:
+class RunnerFixture:
     """A deck with its airspace; `watch` hears what the flights say."""
 
     def __init__(self, database: Database, settings: Settings) -> None:
-        self.airspace = Airspace()
-        self.heard: list[Shown] = []
+        self.airspace = AbortRegistry()
+        self.heard: list[PublishedMessage] = []
         self.watch: Watch = lambda _said: None
-        self.deck = FlightDeck(
+        self.deck = FlightRunner(
             database,
             settings.data_dir,
             self.airspace,
@@ -54,20 +54,20 @@ class Airfield:
         for cockpit in self.deck._hangar._waiting:
             os.kill(cockpit._process.pid or 0, signal.SIGKILL)
 
-    def _hear(self, said: Shown) -> None:
+    def _hear(self, said: PublishedMessage) -> None:
         self.heard.append(said)
         self.watch(said)
 
 
 @pytest.fixture
-def field(client: TestClient, database: Database, settings: Settings) -> Iterator[Airfield]:
-    one = Airfield(database, settings)
+def field(client: TestClient, database: Database, settings: Settings) -> Iterator[RunnerFixture]:
+    one = RunnerFixture(database, settings)
     yield one
     one.deck.close()
 
 
 @pytest.fixture
-def trial_id(client: TestClient, database: Database, field: Airfield) -> int:
+def trial_id(client: TestClient, database: Database, field: RunnerFixture) -> int:
     """A trial whose flight on the twin is asked for."""
     campaign = create_ready_campaign(client, database)
     identity: int = create_trial(client, campaign["id"], fly={"speed": None})["id"]
@@ -119,7 +119,7 @@ def refuse(database: Database, operation: str) -> None:
         )
 
 
-def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field: Airfield, trial_id: int) -> None:
+def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field: RunnerFixture, trial_id: int) -> None:
     field.fly_next()
     flown = get(client, f"/api/trials/{trial_id}")
     assert (flown["state"], flown["flight"]["state"]) == ("valid", "landed")
@@ -130,7 +130,7 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
 
 
 def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_ground(
-    client: TestClient, when_changed_to: WhenChanged, field: Airfield, trial_id: int
+    client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
 ) -> None:
     when_changed_to(TrialState.FLYING, lambda: field.airspace.abort(trial_id, "somebody walked in"))
     field.fly_next()
@@ -142,7 +142,7 @@ def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_grou
 
 
 def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
-    client: TestClient, when_changed_to: WhenChanged, field: Airfield, trial_id: int
+    client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
 ) -> None:
     seen: list[bool] = []
 
@@ -156,7 +156,7 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
 
 
 def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
-    client: TestClient, when_changed_to: WhenChanged, field: Airfield, trial_id: int
+    client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
 ) -> None:
     def fail() -> None:
         raise RuntimeError("the power went")
@@ -168,7 +168,7 @@ def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
 
 
 def test_a_flight_that_was_asked_for_while_the_worker_was_away_does_not_take_off(
-    client: TestClient, field: Airfield, trial_id: int
+    client: TestClient, field: RunnerFixture, trial_id: int
 ) -> None:
     field.deck.recover()
     assert field.deck.claim() is None
@@ -179,7 +179,7 @@ def test_a_flight_that_was_asked_for_while_the_worker_was_away_does_not_take_off
 
 
 def test_a_flight_that_waited_too_long_is_withdrawn_and_one_of_now_is_flown(
-    client: TestClient, database: Database, field: Airfield, trial_id: int
+    client: TestClient, database: Database, field: RunnerFixture, trial_id: int
 ) -> None:
     with database.write() as session:
         for row in session.query(FlightRow):
@@ -191,7 +191,7 @@ def test_a_flight_that_waited_too_long_is_withdrawn_and_one_of_now_is_flown(
 
 
 def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothing(
-    client: TestClient, database: Database, field: Airfield, settings: Settings, trial_id: int
+    client: TestClient, database: Database, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:
     refuse(database, "INSERT ON trajectory")
     field.fly_next()
@@ -205,12 +205,12 @@ def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothin
 
 
 def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
-    client: TestClient, database: Database, field: Airfield, settings: Settings, trial_id: int
+    client: TestClient, database: Database, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:
     refuse(database, "INSERT ON trajectory")
     spool = settings.data_dir / "spool"
 
-    def lose_the_spool(said: Shown) -> None:
+    def lose_the_spool(said: PublishedMessage) -> None:
         if isinstance(said, FlightPhase) and said.phase == "landed" and spool.exists():
             for path in spool.iterdir():
                 path.unlink()
@@ -226,7 +226,7 @@ def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
 
 @pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
 def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
-    client: TestClient, database: Database, field: Airfield, trial_id: int, real: bool, then: str
+    client: TestClient, database: Database, field: RunnerFixture, trial_id: int, real: bool, then: str
 ) -> None:
     if real:
         make_vehicle_real(database)
@@ -242,7 +242,7 @@ def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
 
 @pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
 def test_a_worker_that_died_with_gains_staged_leaves_a_real_vehicle_in_quarantine(
-    client: TestClient, database: Database, field: Airfield, trial_id: int, real: bool, then: str
+    client: TestClient, database: Database, field: RunnerFixture, trial_id: int, real: bool, then: str
 ) -> None:
     if real:
         make_vehicle_real(database)
@@ -253,7 +253,7 @@ def test_a_worker_that_died_with_gains_staged_leaves_a_real_vehicle_in_quarantin
 
 
 def test_a_real_vehicle_is_not_in_doubt_when_nothing_was_sent_to_it(
-    client: TestClient, database: Database, field: Airfield, settings: Settings, trial_id: int
+    client: TestClient, database: Database, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:
     make_vehicle_real(database)
     (settings.data_dir / "spool").write_text("a file in the way")
@@ -268,11 +268,11 @@ class Refusing:
     alive = True
     takes_its_safe_gains = True
 
-    def fly(self, orders: Orders) -> Iterator[Said]:
-        yield Staged(dict(orders.gains))
+    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
+        yield GainsStaged(dict(orders.gains))
         if self.takes_its_safe_gains:
-            yield Restored(dict(orders.safe_gains))
-        yield Trouble("The vehicle would not arm.", unsafe=not self.takes_its_safe_gains, not_flown=True)
+            yield SafeGainsRestored(dict(orders.safe_gains))
+        yield FlightFailure("The vehicle would not arm.", unsafe=not self.takes_its_safe_gains, not_flown=True)
 
     def take_off(self) -> None: ...
     def decline(self) -> None: ...
@@ -281,7 +281,7 @@ class Refusing:
 
 
 def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
-    client: TestClient, field: Airfield, trial_id: int, monkeypatch: pytest.MonkeyPatch
+    client: TestClient, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setattr(field.deck._hangar, "take", Refusing)
@@ -306,7 +306,7 @@ class RefusingAll(Refusing):
 def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gains(
     client: TestClient,
     database: Database,
-    field: Airfield,
+    field: RunnerFixture,
     trial_id: int,
     monkeypatch: pytest.MonkeyPatch,
     crew: type[Refusing],
@@ -321,7 +321,7 @@ def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gain
 
 
 def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
-    client: TestClient, database: Database, field: Airfield, trial_id: int
+    client: TestClient, database: Database, field: RunnerFixture, trial_id: int
 ) -> None:
     task = field.deck.claim()
     assert task is not None
@@ -335,7 +335,7 @@ def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
 
 
 def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_gains_back(
-    client: TestClient, database: Database, field: Airfield, trial_id: int, monkeypatch: pytest.MonkeyPatch
+    client: TestClient, database: Database, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.trials.tasks.LOOK_EVERY_S", 5.0)
     with database.write() as session:

@@ -11,7 +11,7 @@ from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, ShouldStop, Stop, Vehicle
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest, Vehicle
 from app.vehicles.open import VEHICLE_KINDS, open_vehicle
 
 TAKEOFF: Final = Takeoff()
@@ -53,7 +53,7 @@ PROFILES: Final[Mapping[str, Profile]] = {
 }
 
 
-def never() -> Stop | None:
+def never() -> StopRequest | None:
     return None
 
 
@@ -73,7 +73,7 @@ def fly(
 ) -> FlightRecord:
     """With the kind's tuned gains where none are given."""
     vehicle.stage(PROFILES[vehicle.kind].tuned if gains is None else gains)
-    return vehicle.fly(FlightOrder(seed=seed, speed=speed, clock=clock), on_sample=on_sample, should_stop=should_stop)
+    return vehicle.fly(FlightOptions(seed=seed, speed=speed, clock=clock), on_sample=on_sample, should_stop=should_stop)
 
 
 def flown(
@@ -94,6 +94,6 @@ class Watcher:
     def see(self, sample: Sample) -> None:
         self.samples.append(sample)
 
-    def decide(self) -> Stop | None:
+    def decide(self) -> StopRequest | None:
         late = bool(self.samples) and self.samples[-1].time_s >= self._abort_at_s
-        return Stop("the operator pressed Abort") if late else None
+        return StopRequest("the operator pressed Abort") if late else None

@@ -7,7 +7,7 @@ import pytest
 
 from app.core.errors import GainsError, InputError
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
-from app.vehicles.base import FlightOrder, Sample, Stop, Vehicle
+from app.vehicles.base import FlightOptions, Sample, StopRequest, Vehicle
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import VEHICLE_KINDS, open_vehicle
 from tests.clocks import SimulatedClock
@@ -45,14 +45,14 @@ def test_staged_gains_are_read_back_and_held(kind: str, vehicle: Vehicle) -> Non
 
 def test_nothing_flies_before_its_gains_are_staged(kind: str, vehicle: Vehicle) -> None:
     with pytest.raises(VehicleError, match="No gains were staged"):
-        vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_stop=never)
+        vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
 
 
 def test_gains_are_staged_anew_for_every_flight(kind: str, vehicle: Vehicle) -> None:
     fly(vehicle)
     assert vehicle.read_gains() == PROFILES[kind].safe
     with pytest.raises(VehicleError, match="No gains were staged"):
-        vehicle.fly(FlightOrder(seed=1), on_sample=unwatched, should_stop=never)
+        vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
 
 
 def test_a_flight_leaves_known_channels_at_one_rate_past_the_scored_window(kind: str, vehicle: Vehicle) -> None:
@@ -163,7 +163,7 @@ def test_an_impossible_pace_is_refused_and_the_safe_gains_are_back(kind: str, ve
 
 
 def test_a_flight_aborted_before_it_starts_leaves_one_instant(kind: str, vehicle: Vehicle) -> None:
-    record = fly(vehicle, should_stop=lambda: Stop("changed my mind"))
+    record = fly(vehicle, should_stop=lambda: StopRequest("changed my mind"))
     assert (record.ending, record.reason) == ("aborted", "changed my mind")
     assert record.trajectory.time_s.tolist() == [0.0]
 

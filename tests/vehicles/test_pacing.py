@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.vehicles.base import ShouldStop, Stop
+from app.vehicles.base import ShouldStop, StopRequest
 from app.vehicles.open import open_vehicle
 from app.vehicles.pacing import LISTEN_EVERY_S, Pacer
 from tests.vehicles.flying import CAN_FLY, PROFILES, Watcher, fly, never
@@ -11,7 +11,7 @@ from tests.vehicles.flying import CAN_FLY, PROFILES, Watcher, fly, never
 def after(questions: int) -> ShouldStop:
     """An abort that is wanted from so many questions on."""
     asked = iter(range(questions))
-    return lambda: None if next(asked, None) is not None else Stop("enough")
+    return lambda: None if next(asked, None) is not None else StopRequest("enough")
 
 
 @pytest.mark.parametrize("kind", CAN_FLY)
@@ -26,10 +26,10 @@ def test_an_abort_does_not_wait_for_the_next_sample_of_a_slow_flight(kind: str, 
 
 
 def test_whoever_waits_is_asked_again_when_the_time_has_come() -> None:
-    assert Pacer(1.0).wait_until(2.5 * LISTEN_EVERY_S, after(1)) == Stop("enough")
+    assert Pacer(1.0).wait_until(2.5 * LISTEN_EVERY_S, after(1)) == StopRequest("enough")
 
 
 @pytest.mark.parametrize("speed", [None, 1000.0])
 def test_time_that_may_pass_passes_after_one_question(speed: float | None) -> None:
     assert Pacer(speed).wait_until(0.0, never) is None
-    assert Pacer(speed).wait_until(0.0, after(0)) == Stop("enough")
+    assert Pacer(speed).wait_until(0.0, after(0)) == StopRequest("enough")

@@ -11,7 +11,7 @@ from app.core.checks import Check, Envelope
 from app.core.definition import OptionValue
 from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.trajectory import Samples, Trajectory
 
 Matrix = NDArray[np.float64]
@@ -207,7 +207,7 @@ class ModelledExperiment(Experiment, Protocol):
         """`outputs` of the model with these added to its state at the same instants, inside the control loop."""
         ...
 
-    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """What could go wrong in a flight with these gains, inside the bounds or not, on vehicles as `spread` has them:
         the checks of the gate that only the experiment can make. Pure; a tenth of a second at most."""
         ...

@@ -28,7 +28,7 @@ from app.core.plants.pitch import (
     transitions,
 )
 from app.core.policy import Gain, PolicySpace, Vector
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.trajectory import Samples, Trajectory
 
 WINDOW_S: Final = 60.0
@@ -192,7 +192,7 @@ class PitchTracking:
         """`outputs` with `disturbances` added to the states after each step."""
         return track_batch(gains, self._moves(model), _SAMPLES, disturbances)
 
-    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:  # noqa: ARG002
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:  # noqa: ARG002
         """None that is known beside its bounds: it is flown in simulation only."""
         return ()
 

@@ -21,7 +21,7 @@ from app.core.plants.vertical_disturbed import fly_batch as fly_disturbed
 from app.core.plants.vertical_disturbed import observe
 from app.core.plants.vertical_lanes import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.trajectory import Samples, Trajectory
 
 TARGET_M: Final = 3.0
@@ -157,7 +157,7 @@ class Takeoff:
         """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, 16693)."""
         return fly_disturbed(_counts(gains), self._models(model, len(gains)), _TARGET, disturbances)
 
-    def hazards(self, gains: Vector, spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """Products that can wrap, exactly; altitude, divergence, oscillation and aborts of simulated takeoffs.
 
         Takes a tenth of a second, and nothing for a question asked before.
@@ -204,7 +204,7 @@ def _hazards(
     gains: tuple[float, ...],
     safe_gains: tuple[float, ...],
     ceiling_m: float,
-    spread: Spread,
+    spread: ParameterDistribution,
     parameters: tuple[ModelParameter, ...],
 ) -> tuple[Check, ...]:
     takeoff = Takeoff(parameters)

@@ -4,7 +4,7 @@
 (`app.core.hazards` for the takeoff). `overruling` says what a refusal means, and who may fly in spite of it.
 """
 
-from app.core.gate.judging import Gate, check_policy
+from app.core.gate.judging import GateResult, check_policy
 from app.core.gate.overruling import require_flyable
 
-__all__ = ["Gate", "check_policy", "require_flyable"]
+__all__ = ["GateResult", "check_policy", "require_flyable"]

@@ -4,23 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.core.calibration import known
+from app.core.calibration import known_distribution
 from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.envelope import envelope_of
 from app.core.experiments.base import Experiment
 from app.core.gate.bounds import NUMBERS, check_bounds, check_numbers, check_step, jointly_offered
 from app.core.policy import Gains, PolicySpace
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.starting import start_gains
 from app.core.strategies.history import was_flown
 
-BETTER_TOLD_BY_FLIGHT: Final = frozenset({"altitude", "divergence"})
+WAIVED_AFTER_VALID_FLIGHT: Final = frozenset({"altitude", "divergence"})
 """Checks of simulated takeoffs whose refusal does not hold for gains that have flown."""
 
 
 @dataclass(frozen=True, slots=True)
-class Gate:
+class GateResult:
     """The verdict on one policy; each check with its worst number and the case that gave it."""
 
     checks: tuple[Check, ...]
@@ -47,8 +47,8 @@ def check_policy(
     flights: Sequence[Flight],
     *,
     start: Gains | None = None,
-    spread: Spread | None = None,
-) -> Gate:
+    spread: ParameterDistribution | None = None,
+) -> GateResult:
     """Judge a complete set of gains (every name of `space`): its numbers, the campaign's bounds, its step limit, and
     the experiment's hazards, where it has a model to find them with.
     What a valid flight of this campaign has flown may fly again although simulated takeoffs go astray: the flight is
@@ -61,16 +61,18 @@ def check_policy(
     the vehicle, where `flights` come without their records.
     """
     if numbers := check_numbers(space, gains):
-        return Gate(numbers)
-    hazards = _hazards(definition, experiment, space, gains, known(experiment, flights) if spread is None else spread)
+        return GateResult(numbers)
+    hazards = _hazards(
+        definition, experiment, space, gains, known_distribution(experiment, flights) if spread is None else spread
+    )
     if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
         hazards = tuple(_flown_before(check) for check in hazards)
     limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
-    return Gate(jointly_offered(gains, (*limits, *hazards)))
+    return GateResult(jointly_offered(gains, (*limits, *hazards)))
 
 
 def _hazards(
-    definition: Definition, experiment: Experiment, space: PolicySpace, gains: Gains, spread: Spread
+    definition: Definition, experiment: Experiment, space: PolicySpace, gains: Gains, spread: ParameterDistribution
 ) -> tuple[Check, ...]:
     modelled = experiment.modelled
     if modelled is None:
@@ -80,7 +82,7 @@ def _hazards(
 
 def _flown_before(check: Check) -> Check:
     """The check's answer for gains that a valid flight of the campaign has flown."""
-    if check.passed or check.name not in BETTER_TOLD_BY_FLIGHT:
+    if check.passed or check.name not in WAIVED_AFTER_VALID_FLIGHT:
         return check
     sentence = f"{check.sentence} But a flight of this campaign flew these gains to its end, so they may fly again."
     return replace(check, passed=True, sentence=sentence)

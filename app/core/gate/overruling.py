@@ -1,10 +1,10 @@
 """What a refusal means, and who may fly in spite of it."""
 
 from app.core.errors import GainsError, Problem
-from app.core.gate.judging import Gate
+from app.core.gate.judging import GateResult
 
 
-def require_flyable(gate: Gate, *, overrule: str = "", is_real: bool = False) -> str:
+def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = False) -> str:
     """The reason to record with the flight: `overrule` where it lets refused gains fly, else empty.
 
     On a simulated vehicle an operator may overrule a refusal with a reason, to fly what the paper flew for instance
@@ -22,7 +22,7 @@ def require_flyable(gate: Gate, *, overrule: str = "", is_real: bool = False) ->
     raise GainsError("The gate refuses these gains.", hint=_hint(gate, is_real), problems=problems_of_gate(gate))
 
 
-def problems_of_gate(gate: Gate) -> tuple[Problem, ...]:
+def problems_of_gate(gate: GateResult) -> tuple[Problem, ...]:
     """Every refusal by its field, `gains.ki`, or `gains` where no single gain is to blame."""
     return tuple(
         Problem(f"gains.{check.gain}" if check.gain else "gains", check.sentence, check.offer)
@@ -30,7 +30,7 @@ def problems_of_gate(gate: Gate) -> tuple[Problem, ...]:
     )
 
 
-def _hint(gate: Gate, is_real: bool) -> str:
+def _hint(gate: GateResult, is_real: bool) -> str:
     offers = {name: value for check in gate.refusals for name, value in check.offer.items()}
     offered = ", ".join(f"{name} = {value:g}" for name, value in offers.items())
     nearest = f"The nearest that these checks let pass: {offered}. " if offered else ""

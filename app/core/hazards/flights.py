@@ -105,7 +105,7 @@ def check_flights(
     )
 
 
-def gone_astray(reports: "Matrix", set_point_m: float) -> Vector:
+def divergence_distance(reports: "Matrix", set_point_m: float) -> Vector:
     """How far from the set point each flight got that fell back to the ground or still moves away at its end; zero for
     the others: (k, 7) → (k,)."""
     middle, last = reports[:, DISTANCE_MIDDLE_M], reports[:, DISTANCE_LAST_M]
@@ -136,7 +136,7 @@ def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: flo
 
 
 def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float) -> Check:
-    distances = gone_astray(runs.reports, set_point_m)
+    distances = divergence_distance(runs.reports, set_point_m)
     worst = int(np.argmax(distances))
     distance_m, fallen_step = float(distances[worst]), float(runs.reports[worst, FALLEN_STEP])
     if distance_m == 0.0:

@@ -54,7 +54,7 @@ from app.core.plants.vertical import (
 )
 from app.core.trajectory import Samples
 
-LANES: Final = 16
+BATCH_WIDTH: Final = 16
 """So many runs go side by side at most."""
 FASTEST_M_S: Final = 4000.0
 """Climb rates beyond do not fit into the loop's 32 bits (4096 m/s)."""
@@ -68,28 +68,28 @@ _CHECK: Final = 3
 _GUIDE_SIZE: Final = 4
 """Rows of the table that guides every run: reference position and speed, feed-forward, whether flight is checked."""
 
-_KP: Final = 0 * LANES
-_KI: Final = 1 * LANES
-_KD: Final = 2 * LANES
-_SHARE: Final = 3 * LANES
-_HOVER_FORCE: Final = 4 * LANES
-_RESPONSE: Final = 5 * LANES
-_GROUND: Final = 6 * LANES
-_SAG: Final = 7 * LANES
-_LATENCY: Final = 8 * LANES
-_DRAG: Final = 9 * LANES
-_PART: Final = 10 * LANES
-_HEIGHT: Final = 11 * LANES
-_CLIMB: Final = 12 * LANES
-_THRUST: Final = 13 * LANES
-_ERROR_SUM: Final = 14 * LANES
-_COMMAND: Final = 15 * LANES
-_IN_FLIGHT: Final = 16 * LANES
-_HEIGHT_BEFORE: Final = 17 * LANES
-_CLIMB_BEFORE: Final = 18 * LANES
-_SENSED: Final = 19 * LANES
-_FASTEST: Final = 20 * LANES
-_SIZE: Final = 21 * LANES
+_KP: Final = 0 * BATCH_WIDTH
+_KI: Final = 1 * BATCH_WIDTH
+_KD: Final = 2 * BATCH_WIDTH
+_SHARE: Final = 3 * BATCH_WIDTH
+_HOVER_FORCE: Final = 4 * BATCH_WIDTH
+_RESPONSE: Final = 5 * BATCH_WIDTH
+_GROUND: Final = 6 * BATCH_WIDTH
+_SAG: Final = 7 * BATCH_WIDTH
+_LATENCY: Final = 8 * BATCH_WIDTH
+_DRAG: Final = 9 * BATCH_WIDTH
+_PART: Final = 10 * BATCH_WIDTH
+_HEIGHT: Final = 11 * BATCH_WIDTH
+_CLIMB: Final = 12 * BATCH_WIDTH
+_THRUST: Final = 13 * BATCH_WIDTH
+_ERROR_SUM: Final = 14 * BATCH_WIDTH
+_COMMAND: Final = 15 * BATCH_WIDTH
+_IN_FLIGHT: Final = 16 * BATCH_WIDTH
+_HEIGHT_BEFORE: Final = 17 * BATCH_WIDTH
+_CLIMB_BEFORE: Final = 18 * BATCH_WIDTH
+_SENSED: Final = 19 * BATCH_WIDTH
+_FASTEST: Final = 20 * BATCH_WIDTH
+_SIZE: Final = 21 * BATCH_WIDTH
 """Where in the array of the runs each of their numbers begins. One array at fixed distances, because only then does the
 compiler see that no number of one run is another's. The gains are negative, and scaled as the loop shifts their
 products; `_BEFORE` is what was sensed of height and climb rate a step ago, had the delay been whole."""
@@ -115,7 +115,7 @@ def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samp
     alone = np.setdiff1d(np.arange(len(gains)), side_by_side)
     if side_by_side.size:
         guide = _guide(target, samples)
-        for runs in np.array_split(side_by_side, -(-side_by_side.size // LANES)):
+        for runs in np.array_split(side_by_side, -(-side_by_side.size // BATCH_WIDTH)):
             flown, fastest_m_s = _fly(gains[runs], models[runs], guide)
             altitude[runs] = flown
             alone = np.concatenate((alone, runs[~(fastest_m_s < FASTEST_M_S)]))
@@ -176,7 +176,7 @@ def _set_up(gains: Counts, models: Samples, runs: Samples, whole: Counts) -> Non
 @kernel
 def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, guide: Samples, i: int) -> None:
     """Step i of the loop and of the model for each run: `vertical_loop.step` in doubles, then `advance`."""
-    now, seconds = (i & (PAST - 1)) * LANES, i * STEP_S
+    now, seconds = (i & (PAST - 1)) * BATCH_WIDTH, i * STEP_S
     position, speed, feed_forward = guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i]
     for lane in range(lanes):
         part, late, late_climb = runs[_PART + lane], heights[now + lane], climbs[now + lane]
@@ -217,13 +217,13 @@ def _fly_lanes(gains: Counts, models: Samples, guide: Samples, altitude: Samples
     What is sensed late is written ahead, where it will be due, so that all runs read in the same place.
     """
     lanes, wanted = len(gains), len(altitude)
-    runs, whole = np.zeros(_SIZE), np.zeros(LANES, dtype=np.int64)
-    heights, climbs = np.zeros(PAST * LANES), np.zeros(PAST * LANES)
-    states = np.zeros((LANES, STATE_SIZE), dtype=np.int64)
+    runs, whole = np.zeros(_SIZE), np.zeros(BATCH_WIDTH, dtype=np.int64)
+    heights, climbs = np.zeros(PAST * BATCH_WIDTH), np.zeros(PAST * BATCH_WIDTH)
+    states = np.zeros((BATCH_WIDTH, STATE_SIZE), dtype=np.int64)
     _set_up(gains, models, runs, whole)
     for i in range(guide.shape[1]):
         for lane in range(lanes):
-            due = ((i + whole[lane]) & (PAST - 1)) * LANES + lane
+            due = ((i + whole[lane]) & (PAST - 1)) * BATCH_WIDTH + lane
             heights[due], climbs[due] = runs[_HEIGHT + lane], runs[_CLIMB + lane]
         if guide[_CHECK, i] > 0.0:
             for lane in range(lanes):

@@ -8,7 +8,7 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment
 from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.trajectory import Trajectory
 
 ErrorsOf = Callable[[Matrix], Vector]
@@ -78,7 +78,7 @@ class Proposal:
     predicted_error: float | None
     explanation: Explanation
     interval: Interval | None = None
-    spread: Spread | None = None
+    spread: ParameterDistribution | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 from app.core.definition import Flight
 from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.policy import Vector
-from app.core.recorded import on_grid
+from app.core.recorded import resample_to_grid
 from app.core.trajectory import Samples, Trajectory
 
 
@@ -49,18 +49,18 @@ class DisturbedModel(CorrectedModel):
         return self.experiment.disturbed_outputs(gains, self.model, self.disturbances)
 
 
-def nominal(experiment: ModelledExperiment) -> CorrectedModel:
+def uncorrected_model(experiment: ModelledExperiment) -> CorrectedModel:
     """What is known before the first flight: no correction."""
     return CorrectedModel(experiment, experiment.nominal_model, np.zeros_like(experiment.grid_s))
 
 
-def corrected_by(experiment: ModelledExperiment, flight: Flight) -> CorrectedModel:
+def correct_by_bias(experiment: ModelledExperiment, flight: Flight) -> CorrectedModel:
     """b(t) = measured(t) − model(t; flown gains)."""
     flown = experiment.outputs(experiment.space.vector(flight.gains)[np.newaxis], experiment.nominal_model)[0]
-    return CorrectedModel(experiment, experiment.nominal_model, on_grid(experiment, flight) - flown)
+    return CorrectedModel(experiment, experiment.nominal_model, resample_to_grid(experiment, flight) - flown)
 
 
-def corrected_inside_by(experiment: ModelledExperiment, flight: Flight) -> DisturbedModel | None:
+def correct_in_loop(experiment: ModelledExperiment, flight: Flight) -> DisturbedModel | None:
     """The nominal model with the flight's disturbances inside the loop, the flight taken as the database keeps it; None
     where its record lacks a state or the command."""
     disturbances = experiment.disturbances(

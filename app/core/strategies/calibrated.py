@@ -17,18 +17,18 @@ from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import ErrorsOf, Explanation, Kind, Proposal, Strategy
-from app.core.strategies.foretelling import Foretold, foresee_errors, foretell
-from app.core.strategies.hedging import Box, best_in, merit
-from app.core.strategies.history import best_flight, describe, was_flown
-from app.core.strategies.passing import may_fly
+from app.core.strategies.foretelling import FlightPrediction, predict_errors, predict_flight
+from app.core.strategies.hedging import Box, find_robust_optimum, merit
+from app.core.strategies.history import best_flight, format_gains, was_flown
+from app.core.strategies.passing import allows
 from app.core.strategies.trust import trust_fraction
 from app.core.wording import percent, short
 
 MODELS: Final = 8
-HEDGE: Final = 0.75
+ROBUSTNESS_SD: Final = 0.75
 """How far the models lie from the fit that the choice is hedged over, in standard deviations: more costs error on
 vehicles that are what they seem, less costs it on the others."""
-WORTH: Final = 0.005
+MIN_IMPROVEMENT: Final = 0.005
 """A step that promises less than this share of the error is not worth a flight."""
 
 _HALVINGS: Final = 5
@@ -36,7 +36,7 @@ _DIFFERENCE: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class _Choice:
+class _ChosenGains:
     """Gains to fly, shape (n,), how that came about, and what else the model had in mind."""
 
     kind: Kind
@@ -57,11 +57,11 @@ def propose(
     calibration = calibrate(experiment, flights)
     fitted = [flight for flight in flights if flight.number in calibration.numbers]
     base = best_flight(fitted)
-    models = calibration.plausible(runs=MODELS, width=HEDGE)
+    models = calibration.plausible(runs=MODELS, width=ROBUSTNESS_SD)
     fraction = min(trust_fraction(flights), definition.step_fraction)
     box = Box(*space.reachable(space.vector(base.gains), fraction))
     choice = _choose(definition, experiment, space, flights, calibration, base, models, box)
-    foretold = foretell(calibration, base, choice.gains)
+    foretold = predict_flight(calibration, base, choice.gains)
     clipped = _at_an_edge(space, box, choice.optimum)
     explanation = Explanation(
         summary=_summary(experiment, base, choice, foretold, len(calibration.numbers)),
@@ -70,7 +70,7 @@ def propose(
         direction=_named(space, choice.gains - space.vector(base.gains)),
         clipped=clipped,
         notes=(*choice.notes, *_notes(fraction, clipped)),
-        lesson=_lesson(calibration, foretold),
+        lesson=_describe_lesson(calibration, foretold),
         fitted=calibration.fitted,
         trust_fraction=fraction,
     )
@@ -89,7 +89,7 @@ def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Se
     """The errors that the calibrated model foretells. At least one flight must be valid."""
     calibration = calibrate(experiment, flights)
     base = best_flight([flight for flight in flights if flight.number in calibration.numbers])
-    return partial(foresee_errors, calibration, base)
+    return partial(predict_errors, calibration, base)
 
 
 def _choose(
@@ -101,25 +101,27 @@ def _choose(
     base: Flight,
     models: Matrix,
     box: Box,
-) -> _Choice:
+) -> _ChosenGains:
     here = space.nearest(space.vector(base.gains))
-    optimum = best_in(takeoff, box, models, here[np.newaxis])
+    optimum = find_robust_optimum(takeoff, box, models, here[np.newaxis])
     now, then = merit(takeoff, np.stack((here, optimum)), models).tolist()
-    if then > (1.0 - WORTH) * now and was_flown(space.mapping(here), flights):
-        return _Choice("none", here, optimum)
+    if then > (1.0 - MIN_IMPROVEMENT) * now and was_flown(space.mapping(here), flights):
+        return _ChosenGains("none", here, optimum)
     for halvings in range(_HALVINGS):
         gains = box.nearest(here + (optimum - here) / 2**halvings)
         if was_flown(space.mapping(gains), [flight for flight in flights if flight.outcome == "valid"]):
             break
         if was_flown(space.mapping(gains), flights):
             continue
-        if may_fly(definition, takeoff, gains, calibration.spread()):
+        if allows(definition, takeoff, gains, calibration.spread()):
             if halvings == 0:
-                return _Choice("step", gains, optimum)
-            note = f"The whole step, to {describe(space.mapping(optimum))}, was aborted before or the gate refuses it."
-            return _Choice("shorter step", gains, optimum, (note,))
-    note = f"Every step towards {describe(space.mapping(optimum))} was flown before or is refused by the gate."
-    return _Choice("none", here, optimum, (note,))
+                return _ChosenGains("step", gains, optimum)
+            note = (
+                f"The whole step, to {format_gains(space.mapping(optimum))}, was aborted before or the gate refuses it."
+            )
+            return _ChosenGains("shorter step", gains, optimum, (note,))
+    note = f"Every step towards {format_gains(space.mapping(optimum))} was flown before or is refused by the gate."
+    return _ChosenGains("none", here, optimum, (note,))
 
 
 def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
@@ -141,12 +143,14 @@ def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
     return tuple(name for name, is_there in zip(space.names, at_edge, strict=True) if is_there)
 
 
-def _summary(experiment: ModelledExperiment, base: Flight, choice: _Choice, foretold: Foretold, flights: int) -> str:
+def _summary(
+    experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, foretold: FlightPrediction, flights: int
+) -> str:
     unit = experiment.error_unit
     told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
-    best = f"flight {base.number} ({describe(base.gains)}, error {short(base.error)} {unit})"
+    best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
-        return f"{told} finds nothing that is better than {best} by {percent(WORTH, 1)} and may be flown."
+        return f"{told} finds nothing that is better than {best} by {percent(MIN_IMPROVEMENT, 1)} and may be flown."
     low, high = foretold.interval.lower, foretold.interval.upper
     assert base.error is not None
     share = 1.0 - foretold.error / base.error
@@ -164,7 +168,7 @@ def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(filter(None, (kept, limits, trust)))
 
 
-def _lesson(calibration: Calibration, foretold: Foretold) -> str:
+def _describe_lesson(calibration: Calibration, foretold: FlightPrediction) -> str:
     """The parameter that the foretold error hangs on most."""
     values = foretold.models - foretold.models.mean(axis=0)
     errors = foretold.errors - foretold.errors.mean()

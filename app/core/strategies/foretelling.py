@@ -23,14 +23,14 @@ CONFIDENCE: Final = 0.9
 _MODELS: Final = 16
 _AT_ONCE: Final = 8
 """Gain sets that are flown together: their curves are held in memory."""
-_MISFIT: Final = 0.02
+_MODEL_ERROR: Final = 0.02
 """Share of the error that even the best simple model is off."""
-_WEATHER: Final = 0.5
+_GUST_VARIATION: Final = 0.5
 """Share by which the next flight's gusts cost more or less than the last one's did."""
 
 
 @dataclass(frozen=True, slots=True)
-class Foretold:
+class FlightPrediction:
     """The expected curve with its band, the expected error with its interval, and the models it was made with: (k, m),
     with their errors (k,)."""
 
@@ -41,7 +41,7 @@ class Foretold:
     errors: Vector
 
 
-def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
+def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> FlightPrediction:
     """A flight of `gains`, shape (n,); `base` is the best of the calibrated flights."""
     from scipy.special import ndtri
 
@@ -51,16 +51,16 @@ def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
     clean = experiment.outputs(np.tile(gains, (_MODELS, 1)), models)
     outputs = clean + bias
     errors = experiment.errors(outputs)
-    weather = _WEATHER * float(np.mean(errors - experiment.errors(clean)))
+    weather = _GUST_VARIATION * float(np.mean(errors - experiment.errors(clean)))
     error = float(np.mean(errors))
-    sd = float(np.sqrt(np.var(errors) + weather**2 + (_MISFIT * error) ** 2))
+    sd = float(np.sqrt(np.var(errors) + weather**2 + (_MODEL_ERROR * error) ** 2))
     curve = outputs.mean(axis=0)
     noise = float(np.sqrt(np.mean(bias**2)))
     reach = float(ndtri(0.5 + CONFIDENCE / 2.0))
     half = reach * np.sqrt(outputs.var(axis=0) + noise**2)
     lower, upper = band_channels(experiment.output)
     channels = {experiment.output: curve, lower: curve - half, upper: curve + half}
-    return Foretold(
+    return FlightPrediction(
         trajectory=Trajectory(experiment.grid_s, channels, "model", "simulation"),
         error=error,
         interval=Interval(lower=max(error - reach * sd, 0.0), upper=error + reach * sd, confidence=CONFIDENCE),
@@ -69,7 +69,7 @@ def foretell(calibration: Calibration, base: Flight, gains: Vector) -> Foretold:
     )
 
 
-def foresee_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vector:
+def predict_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vector:
     """The errors that `foretell` gives to many gain sets, a few at a time: (c, n) → (c,)."""
     experiment = calibration.experiment
     models = calibration.plausible(runs=_MODELS, next_flight=True)
@@ -94,7 +94,7 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
     own = calibration.own_models[calibration.numbers.index(base.number)]
     disturbances = experiment.disturbances(base.trajectory.as_stored(), flown, own)
     if disturbances is None:
-        return np.stack([calibration.residual * _closeness(experiment, some, flown) for some in gains])
+        return np.stack([calibration.residual * _similarity(experiment, some, flown) for some in gains])
     calm = np.zeros_like(disturbances)
     calm[:, ENTERED] = disturbances[:, ENTERED]
     disturbed, undisturbed = (experiment.disturbed_outputs(gains, own, acting) for acting in (disturbances, calm))
@@ -102,6 +102,6 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
     return beyond
 
 
-def _closeness(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:
+def _similarity(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:
     """1 at the flown gains, 0.6 one scale away from them."""
     return float(np.exp(-0.5 * np.sum(((gains - flown) / experiment.space.scale) ** 2)))

@@ -12,16 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from app.core.calibration import known
+from app.core.calibration import known_distribution
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment
 from app.core.options import Option
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import ErrorsOf, Explanation, LadderStep, Proposal, Strategy
-from app.core.strategies.bias import CorrectedModel, corrected_by, corrected_inside_by
-from app.core.strategies.history import best_flight, describe, was_flown
-from app.core.strategies.line_search import Line, try_lengths
-from app.core.strategies.passing import may_fly
+from app.core.strategies.bias import CorrectedModel, correct_by_bias, correct_in_loop
+from app.core.strategies.history import best_flight, format_gains, was_flown
+from app.core.strategies.line_search import SearchLine, evaluate_lengths
+from app.core.strategies.passing import allows
 from app.core.wording import short
 
 SCALED_LADDER: Final = tuple(2.0**power for power in range(3, -13, -1))
@@ -72,16 +72,18 @@ def propose(
     slopes = gradient(model, space, base_gains, metric.scale)
     steepness = float(np.linalg.norm(slopes * metric.scale))
     direction = -slopes * metric.scale**2 / (steepness or 1.0)
-    line = Line(space, base_gains, direction, *space.reachable(base_gains, definition.step_fraction))
-    ladder = try_lengths(line, metric.ladder, model)
+    line = SearchLine(space, base_gains, direction, *space.reachable(base_gains, definition.step_fraction))
+    ladder = evaluate_lengths(line, metric.ladder, model)
     best = min(ladder, key=lambda step: step.predicted_error)
     now = float(model.errors(base_gains[np.newaxis])[0])
-    spread = known(experiment, flights)
+    spread = known_distribution(experiment, flights)
 
     def passes(gains: Vector) -> bool:
-        return may_fly(definition, experiment, gains, spread)
+        return allows(definition, experiment, gains, spread)
 
-    chosen, refused = _first_to_fly(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
+    chosen, refused = (
+        _first_allowed_step(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
+    )
     explanation = Explanation(
         summary=_summary(experiment, base, best, chosen, len(ladder), refused),
         base_flight=base.number,
@@ -109,8 +111,8 @@ def foresee(definition: Definition, experiment: ModelledExperiment, flights: Seq
     return _corrected(definition, experiment, best_flight(flights))[0].errors
 
 
-def _first_to_fly(
-    line: Line,
+def _first_allowed_step(
+    line: SearchLine,
     best: LadderStep,
     flights: Sequence[Flight],
     model: CorrectedModel,
@@ -128,7 +130,7 @@ def _first_to_fly(
             break
         if was_flown(line.space.mapping(gains), flights):
             continue
-        step = best if length == best.length else try_lengths(line, (length,), model)[0]
+        step = best if length == best.length else evaluate_lengths(line, (length,), model)[0]
         if passes(gains):
             return step, tuple(refused)
         refused.append(step)
@@ -152,7 +154,7 @@ def _summary(
     refused: Sequence[LadderStep],
 ) -> str:
     unit = experiment.error_unit
-    origin = f"The best flight so far is {base.number} ({describe(base.gains)}), error {short(base.error)} {unit}."
+    origin = f"The best flight so far is {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}."
     if chosen is None:
         may = " and may be flown" if refused else ""
         return f"{origin} Along its gradient the corrected model finds nothing better that was not flown yet{may}."
@@ -171,16 +173,16 @@ def _summary(
 def _corrected(definition: Definition, experiment: ModelledExperiment, base: Flight) -> tuple[CorrectedModel, str]:
     """The corrected model, and how it is corrected."""
     if definition.options.get("bias") != "inside":
-        return corrected_by(experiment, base), f"{_OUTSIDE}."
-    if (inside := corrected_inside_by(experiment, base)) is not None:
+        return correct_by_bias(experiment, base), f"{_OUTSIDE}."
+    if (inside := correct_in_loop(experiment, base)) is not None:
         return inside, "The correction is added to the state in every step, inside the control loop."
     missing = f"flight {base.number} was recorded without all of its state and its command"
-    return corrected_by(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
+    return correct_by_bias(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
 
 
 def _notes(chosen: LadderStep | None, refused: Sequence[LadderStep]) -> tuple[str, ...]:
     stopped = f"A bound or the step limit stopped {', '.join(chosen.clipped)}." if chosen and chosen.clipped else ""
-    shortened = f"The gate refuses {'; '.join(describe(step.gains) for step in refused)}." if refused else ""
+    shortened = f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}." if refused else ""
     return tuple(filter(None, (stopped, shortened)))
 
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.descent import descend
+from app.core.descent import minimise_in_box
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Vector
@@ -47,7 +47,7 @@ def merit(takeoff: Takeoff, gains: Matrix, models: Matrix, until_s: float = _FIN
     return np.asarray(np.round(sketches.errors.mean(axis=1) + beyond.max(axis=1), _DIGITS))
 
 
-def best_in(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
+def find_robust_optimum(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
     """The best gains found in the box, shape (n,); `known` (c, n) are tried among the first points."""
     spread = box.low + halton(len(box.low), _POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))
@@ -63,7 +63,7 @@ def best_in(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector
 
     steps = (box.high - box.low) / 10.0
     ends = [
-        box.nearest(descend(fine, start, steps, box.low, box.high, evaluations=evaluations, tolerance=1.0))
+        box.nearest(minimise_in_box(fine, start, steps, box.low, box.high, evaluations=evaluations, tolerance=1.0))
         for start, evaluations in zip(starts, _EVALUATIONS, strict=True)
     ]
     return ends[int(np.argmin([fine(end) for end in ends]))]

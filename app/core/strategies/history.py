@@ -21,6 +21,6 @@ def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
     )
 
 
-def describe(gains: Gains) -> str:
+def format_gains(gains: Gains) -> str:
     """`kp 283, ki 13, kd 82`."""
     return ", ".join(f"{name} {value:g}" for name, value in gains.items())

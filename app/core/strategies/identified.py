@@ -15,10 +15,10 @@ from app.core.options import Option
 from app.core.plants.pitch import STEP_S
 from app.core.policy import PolicySpace, Vector
 from app.core.quasi_random import halton
-from app.core.spread import Spread
+from app.core.spread import ParameterDistribution
 from app.core.strategies.base import ErrorsOf, Explanation, Interval, Proposal, Strategy, band_channels
-from app.core.strategies.bias import nominal
-from app.core.strategies.history import best_flight, describe, was_flown
+from app.core.strategies.bias import uncorrected_model
+from app.core.strategies.history import best_flight, format_gains, was_flown
 from app.core.strategies.simplex import Optimum, model_optimum
 from app.core.trajectory import Samples, Trajectory
 from app.core.wording import short
@@ -28,7 +28,7 @@ _SEARCHES: Final = 1
 _RESTARTS: Final = 8
 _SETTLED: Final = 1e-4
 _MODELS: Final = 48
-_WORTH_A_FLIGHT: Final = 0.002
+_MIN_IMPROVEMENT: Final = 0.002
 """Share of the best error that the model must promise to gain."""
 _UNMODELLED: Final = 0.005
 """Standard deviation of what no linear model knows, as a share of the predicted error."""
@@ -54,7 +54,7 @@ def propose(
     gains = space.mapping(optimum.gains)
     expected = _expected_error(aircraft, found, here)
     promised = _expected_error(aircraft, found, optimum.gains)
-    stays = was_flown(gains, flights) or promised > expected - _WORTH_A_FLIGHT * expected
+    stays = was_flown(gains, flights) or promised > expected - _MIN_IMPROVEMENT * expected
     chosen = space.mapping(here) if stays else gains
     trajectory, error, interval = _prediction(aircraft, found, space.vector(chosen))
     return Proposal(
@@ -72,7 +72,7 @@ def foresee(definition: Definition, experiment: ModelledExperiment, flights: Seq
     assert isinstance(experiment, PitchTracking)
     found = identify(experiment, flights, _fit_of(definition))
     if found is None:
-        return nominal(experiment).errors
+        return uncorrected_model(experiment).errors
     aircraft = experiment.informed(found.model, np.sqrt(np.diag(found.covariance)))
     return partial(_expected_errors, aircraft, found)
 
@@ -92,7 +92,7 @@ def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vec
     )
     spread = low + (high - low) * halton(len(low), _STARTS)
     starts = np.vstack((base, reach.nearest(space.default), spread))
-    errors = nominal(aircraft).errors(starts)
+    errors = uncorrected_model(aircraft).errors(starts)
     likely = starts[np.argsort(errors, kind="stable")[:_SEARCHES]]
     ends = [_restarted(aircraft, reach, start) for start in (*likely, base)]
     return min(ends, key=lambda end: end.error)
@@ -128,7 +128,7 @@ def _folded(outputs: Matrix, noise: float) -> Matrix:
 
 def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> tuple[Trajectory, float, Interval]:
     """Predicted output with its band, error, and interval: over models as plausible as the identified one."""
-    spread = Spread(
+    spread = ParameterDistribution(
         mean=tuple(found.model.tolist()),
         covariance=tuple(tuple(row) for row in found.covariance.tolist()),
         origin="the flights",
@@ -155,10 +155,10 @@ def _trajectory(aircraft: PitchTracking, outputs: Matrix, reach: float) -> Traje
 
 
 def _nothing_to_fit(experiment: PitchTracking, space: PolicySpace, base: Flight) -> Proposal:
-    trajectory, error = nominal(experiment).predict(space.vector(base.gains))
+    trajectory, error = uncorrected_model(experiment).predict(space.vector(base.gains))
     summary = (
         "No flight recorded all of its states and commands, so the model cannot be identified. "
-        f"The best so far is flight {base.number} ({describe(base.gains)})."
+        f"The best so far is flight {base.number} ({format_gains(base.gains)})."
     )
     return Proposal(
         kind="none",
@@ -183,7 +183,7 @@ def _explanation(
     numbers = ", ".join(str(number) for number in found.flights)
     plural = "s" if len(found.flights) > 1 else ""
     fitted = f"A and B were identified again from flight{plural} {numbers}."
-    gains = describe(space.mapping(optimum.gains))
+    gains = format_gains(space.mapping(optimum.gains))
     offer = (
         f"The identified model offers nothing worth a flight beyond flight {base.number}, "
         f"error {short(base.error)} {experiment.error_unit}."

@@ -11,7 +11,7 @@ from app.core.strategies.bias import CorrectedModel
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class SearchLine:
     """Flyable gains at every length from `base` along `direction` (gains per unit of length), each gain held within
     `low` … `high`; all of shape (n,)."""
 
@@ -32,7 +32,7 @@ class Line:
         return tuple(name for name, is_stopped in zip(self.space.names, stopped, strict=True) if is_stopped)
 
 
-def try_lengths(line: Line, lengths: Sequence[float], model: CorrectedModel) -> tuple[LadderStep, ...]:
+def evaluate_lengths(line: SearchLine, lengths: Sequence[float], model: CorrectedModel) -> tuple[LadderStep, ...]:
     """The model's error at each length, in the order of `lengths`."""
     candidates = np.array([line.at(length) for length in lengths])
     return tuple(

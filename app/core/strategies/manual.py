@@ -7,8 +7,8 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.policy import PolicySpace
 from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
-from app.core.strategies.bias import corrected_by
-from app.core.strategies.history import best_flight, describe
+from app.core.strategies.bias import correct_by_bias
+from app.core.strategies.history import best_flight, format_gains
 from app.core.wording import short
 
 
@@ -18,9 +18,9 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
     best = best_flight(flights)
     gains = space.nearest(space.vector(best.gains))
     modelled = experiment.modelled
-    trajectory, error = (None, None) if modelled is None else corrected_by(modelled, best).predict(gains)
+    trajectory, error = (None, None) if modelled is None else correct_by_bias(modelled, best).predict(gains)
     summary = (
-        f"You choose the next gains. The best so far are those of flight {best.number} ({describe(best.gains)}), "
+        f"You choose the next gains. The best so far are those of flight {best.number} ({format_gains(best.gains)}), "
         f"error {short(best.error)} {experiment.error_unit}."
     )
     return Proposal(
@@ -34,7 +34,7 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
 
 def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors of the model, corrected by the best flight. At least one flight must be valid."""
-    return corrected_by(experiment, best_flight(flights)).errors
+    return correct_by_bias(experiment, best_flight(flights)).errors
 
 
 MANUAL: Final = Strategy(

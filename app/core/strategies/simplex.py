@@ -11,8 +11,8 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment, SimplexSearch
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import ErrorsOf, Explanation, Proposal, Strategy
-from app.core.strategies.bias import nominal
-from app.core.strategies.history import best_flight, describe, was_flown
+from app.core.strategies.bias import uncorrected_model
+from app.core.strategies.history import best_flight, format_gains, was_flown
 from app.core.wording import short
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
     first steps and budget the experiment's own; gains are rounded before each run of the model, and run once."""
     from scipy.optimize import minimize
 
-    model, search = nominal(experiment), experiment.search
+    model, search = uncorrected_model(experiment), experiment.search
 
     @cache
     def rounded_error(gains: tuple[float, ...]) -> float:
@@ -88,10 +88,10 @@ def propose(
     target = np.clip(optimum.gains, low, high)
     is_flown = was_flown(space.mapping(target), flights)
     gains = space.nearest(space.vector(base.gains)) if is_flown else target
-    trajectory, error = nominal(experiment).predict(gains)
+    trajectory, error = uncorrected_model(experiment).predict(gains)
     stopped = tuple(name for name, is_stopped in zip(space.names, target != optimum.gains, strict=True) if is_stopped)
     found = (
-        f"{optimum.evaluations} runs of the nominal model end at {describe(space.mapping(optimum.gains))}, "
+        f"{optimum.evaluations} runs of the nominal model end at {format_gains(space.mapping(optimum.gains))}, "
         f"model error {short(optimum.error)} {experiment.error_unit}."
     )
     summary = f"{found} That was flown; the model alone offers nothing more." if is_flown else found
@@ -111,7 +111,7 @@ def propose(
 
 def foresee(_definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]) -> ErrorsOf:
     """The errors of the nominal model, which no flight changes."""
-    return nominal(experiment).errors
+    return uncorrected_model(experiment).errors
 
 
 SIMPLEX: Final = Strategy(

@@ -170,7 +170,7 @@ class Codec:
         return message
 
 
-_FROM_CAMERAS: Final = ("ODOMETRY", "VISION_", "ATT_POS_MOCAP")
+_MOCAP_MESSAGES: Final = ("ODOMETRY", "VISION_", "ATT_POS_MOCAP")
 """What a bridge may say in the vehicle's name, by numbers of its own."""
 
 PAPARAZZI: Final = Dialect(
@@ -178,19 +178,19 @@ PAPARAZZI: Final = Dialect(
     module="pymavlink.dialects.v10.paparazzi",
     mavlink=1,
     heeds_heartbeats=False,
-    uncounted=("SCRIPT_", "MISSION_", *_FROM_CAMERAS),
+    uncounted=("SCRIPT_", "MISSION_", *_MOCAP_MESSAGES),
 )
 ARDUPILOTMEGA: Final = Dialect(
     name="ardupilotmega",
     module="pymavlink.dialects.v20.ardupilotmega",
     mavlink=2,
-    uncounted=_FROM_CAMERAS,
+    uncounted=_MOCAP_MESSAGES,
 )
 COMMON: Final = Dialect(
     name="common",
     module="pymavlink.dialects.v20.common",
     mavlink=2,
-    uncounted=_FROM_CAMERAS,
+    uncounted=_MOCAP_MESSAGES,
 )
 
 DIALECTS: Final[Mapping[str, Dialect]] = MappingProxyType(

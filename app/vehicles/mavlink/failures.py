@@ -152,6 +152,8 @@ class Finding:
     why: str
 
 
-SUSPECT: Final = frozenset({failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"})
+GAIN_FAILURES: Final = frozenset(
+    {failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"}
+)
 """Failures that speak against the gains: the safe ones are sent before Land. A vehicle that lifted off late, its
 integrator wound up, is treated in the same way."""

@@ -5,7 +5,7 @@ from typing import Final
 from app.vehicles.mavlink import agreement
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.watch import Watch, is_disarmed, is_restless, mode_of
+from app.vehicles.mavlink.watch import TrialObservation, has_unreliable_position, is_disarmed, mode_of
 
 _HEARTBEATS_MISSED: Final = 3.5
 _OWN_CEILING_M: Final = 0.5
@@ -15,7 +15,7 @@ _NO_BATTERY_S: Final = 10.0
 _IMPACT_BELOW_M: Final = 0.5
 
 
-def find_on_ground(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     """The gravest limit that a vehicle does not keep that has not been told to take off."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
@@ -28,7 +28,7 @@ def find_on_ground(watch: Watch, limits: Limits, now_s: float) -> Finding | None
     )
 
 
-def find_taken_over(watch: Watch, limits: Limits) -> Finding | None:
+def find_taken_over(watch: TrialObservation, limits: Limits) -> Finding | None:
     """A person flies it now."""
     mode = mode_of(watch, limits)
     if not watch.armed or mode not in limits.manual_modes:
@@ -37,7 +37,7 @@ def find_taken_over(watch: Watch, limits: Limits) -> Finding | None:
 
 
 def find_unexpected(
-    watch: Watch, limits: Limits, modes: frozenset[str], blocks: frozenset[str] = frozenset()
+    watch: TrialObservation, limits: Limits, modes: frozenset[str], blocks: frozenset[str] = frozenset()
 ) -> Finding | None:
     """`modes` and `blocks` are those that it may be in, empty where any will do."""
     why, mode = "", mode_of(watch, limits)
@@ -56,7 +56,7 @@ def _named(mode: str, limits: Limits) -> str:
     return limits.mode_names.get(mode, mode)
 
 
-def find_own_landing(watch: Watch, limits: Limits, ground_m: float, *, mode_known: bool) -> Finding | None:
+def find_own_landing(watch: TrialObservation, limits: Limits, ground_m: float, *, mode_known: bool) -> Finding | None:
     """For a vehicle that should fly. `mode_known`: its mode is not the one from before the command. So high up it is
     the vehicle's own ceiling, somewhat below ours, that was met."""
     why = ""
@@ -71,11 +71,11 @@ def find_own_landing(watch: Watch, limits: Limits, ground_m: float, *, mode_know
     return Finding(failure=Failure.OWN_LANDING, why=why)
 
 
-def find_doubled(watch: Watch) -> Finding | None:
+def find_doubled(watch: TrialObservation) -> Finding | None:
     return Finding(failure=Failure.DOUBLED, why=watch.doubled) if watch.doubled else None
 
 
-def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+def find_link(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if now_s - watch.heard_s > limits.silent_s:
         return Finding(failure=Failure.LINK, why=f"Nothing was heard for {limits.silent_s:g} s.")
     if now_s - watch.heartbeat_s > _HEARTBEATS_MISSED * limits.heartbeat_s:
@@ -83,7 +83,7 @@ def find_link(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
     return None
 
 
-def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bool) -> Finding | None:
+def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, settling: bool) -> Finding | None:
     why = ""
     if watch.breached:
         why = f"The vehicle's own fence was crossed: {watch.breached}."
@@ -100,23 +100,23 @@ def find_envelope(watch: Watch, limits: Limits, ground_m: float, *, settling: bo
     return Finding(failure=Failure.ENVELOPE, why=why) if why else None
 
 
-def find_frozen(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if watch.stuck_s > limits.stuck_s:
         return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
     return agreement.find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
 
 
-def find_lost_position(watch: Watch, limits: Limits, now_s: float) -> Finding | None:
+def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     """To be asked after `find_link`: silence is a lost link."""
     why = ""
     if now_s - watch.accepted_s > limits.lost_s and watch.heard_s - watch.accepted_s > limits.lost_s:
         why = f"None of its positions could be believed for {limits.lost_s:g} s."
-    elif is_restless(watch):
+    elif has_unreliable_position(watch):
         why = "Its position jumps to and fro."
     return Finding(failure=Failure.LOST_POSITION, why=why) if why else None
 
 
-def find_battery(watch: Watch, now_s: float) -> Finding | None:
+def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:
     if watch.low_since_s is not None and now_s - watch.low_since_s > _LOW_BATTERY_S:
         return Finding(failure=Failure.BATTERY, why=f"The battery was at {watch.battery_v:.1f} V.")
     if now_s - watch.battery_s > _NO_BATTERY_S:
@@ -124,7 +124,7 @@ def find_battery(watch: Watch, now_s: float) -> Finding | None:
     return None
 
 
-def find_fall(watch: Watch, limits: Limits, ground_m: float) -> Finding | None:
+def find_fall(watch: TrialObservation, limits: Limits, ground_m: float) -> Finding | None:
     """It comes to the ground faster than anything that lands."""
     last = watch.last
     if last is None or watch.doubted is not None or watch.leapt:

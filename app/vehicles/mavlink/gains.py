@@ -7,7 +7,7 @@ from app.vehicles.base import CheckItem
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink import parameters
 from app.vehicles.mavlink.profiles.base import GainSet, check_gains
-from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.signals import Setting
 
 
@@ -15,7 +15,7 @@ class GainStore:
     """`staged` are those that were written for the next flight and read back equal, None while there are none; `held`
     those that were read back last, whichever they were."""
 
-    def __init__(self, radio: Radio, safe: Gains) -> None:
+    def __init__(self, radio: AutopilotLink, safe: Gains) -> None:
         """Raises GainsError for safe gains that the autopilot cannot hold."""
         self._radio = radio
         self._gain_set: GainSet | None = None

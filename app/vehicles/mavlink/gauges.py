@@ -7,7 +7,7 @@ from typing import Final
 
 from app.vehicles.base import Condition
 from app.vehicles.mavlink.link import LinkHealth
-from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.radio import AutopilotLink
 
 RATE_OVER_S: Final = 2.0
 LOSS_OVER_S: Final = 10.0
@@ -22,10 +22,10 @@ class _Count:
     lost: int
 
 
-class Gauges:
+class StatusReader:
     """Reads a radio, sending and waiting for nothing. Losses are counted over the last ten seconds or so."""
 
-    def __init__(self, radio: Radio) -> None:
+    def __init__(self, radio: AutopilotLink) -> None:
         self._radio = radio
         opened = _Count(radio.clock.now_s(), 0, 0)
         self._counts: deque[_Count] = deque([opened], maxlen=round(LOSS_OVER_S / _EVERY_S) + 1)

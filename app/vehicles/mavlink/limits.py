@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-WITNESSES_APART: Final = 1.05
+MAX_WITNESS_GAP: Final = 1.05
 """Periods of its heartbeat that lie between two of them which agree: one that said otherwise would come between."""
 GROUND_M: Final = 0.15
 """Nearer to the ground than this a vehicle may stand on it."""
@@ -48,7 +48,7 @@ class Limits:
     @property
     def witness_s(self) -> float:
         """How far apart two heartbeats are that agree without another between them having said otherwise."""
-        return WITNESSES_APART * self.heartbeat_s
+        return MAX_WITNESS_GAP * self.heartbeat_s
 
     def stretched(self, patience: float) -> "Limits":
         """The same with so many times the patience for packets that do not come."""

@@ -29,7 +29,7 @@ from app.vehicles.mavlink.dialects import (
     source_component,
     source_system,
 )
-from app.vehicles.mavlink.speakers import Speakers
+from app.vehicles.mavlink.speakers import DuplicateDetector
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
@@ -39,17 +39,17 @@ HEARTBEAT_EVERY_S: Final = 1.0
 UNATTENDED_AFTER_S: Final = 3.0
 """When nobody has listened for so long, the program hangs: no heartbeat then pretends otherwise, and the vehicle's own
 answer to a lost ground station is not kept from acting."""
-INBOX: Final = 20_000
+MAX_QUEUED_MESSAGES: Final = 20_000
 """Messages kept for a program that does not ask for them; then the oldest are dropped, and counted."""
 STEP_S: Final = 1.0 / 256.0
 """How far the clock is advanced between two looks at a transport that no thread reads."""
-OLDER: Final = 128
+MAX_SEQUENCE_LEAD: Final = 128
 """A sequence number so far ahead is one from the past: packets may overtake each other."""
 GONE_AFTER_S: Final = 1.5
 """A peer that has said nothing for so long may have moved to another port of the same host."""
-RIVAL_S: Final = 3.0
+RIVAL_TIMEOUT_S: Final = 3.0
 """How long the heartbeat of another peer with the vehicle's own system id is remembered."""
-STRANGERS_EVERY_S: Final = 0.2
+UNKNOWN_PEER_INTERVAL_S: Final = 0.2
 """How often a datagram of another peer is looked into: a flood of them costs nothing."""
 
 MAV_TYPE_GCS: Final = 6
@@ -99,7 +99,7 @@ class LossCounter:
         if kind.startswith(self._uncounted):
             return
         ahead = (number - self._latest.get(component, number - 1)) % 256
-        if 0 < ahead < OLDER:
+        if 0 < ahead < MAX_SEQUENCE_LEAD:
             self.lost += ahead - 1
             self._latest[component] = number
 
@@ -141,7 +141,7 @@ class Link:
         self._opened_s, self._opened_unix_us = clock.now_s(), time.time_ns() // 1000
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
-        self._speakers = Speakers()
+        self._speakers = DuplicateDetector()
         self._looked_s = self._rival_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
@@ -178,7 +178,7 @@ class Link:
         """Why it is believed that two vehicles speak under the one system id; empty while one does."""
         now_s = self._clock.now_s()
         with self._news:
-            if now_s - self._rival_s < RIVAL_S:
+            if now_s - self._rival_s < RIVAL_TIMEOUT_S:
                 return "Another vehicle with its system id speaks from another port."
             return self._speakers.doubt(now_s)
 
@@ -328,7 +328,7 @@ class Link:
         else:
             self._foreign += 1
             now_s = self._clock.now_s()
-            if peer[0] == remote[0] and now_s - self._looked_s >= STRANGERS_EVERY_S:
+            if peer[0] == remote[0] and now_s - self._looked_s >= UNKNOWN_PEER_INTERVAL_S:
                 self._looked_s = now_s
                 self._look_at_rival(data, peer, now_s)
 
@@ -369,7 +369,7 @@ class Link:
         if not fresh:
             return
         with self._news:
-            excess = max(len(self._inbox) + len(fresh) - INBOX, 0)
+            excess = max(len(self._inbox) + len(fresh) - MAX_QUEUED_MESSAGES, 0)
             self._overrun += excess
             self._inbox.extend(fresh)
             for _ in range(excess):

@@ -28,23 +28,23 @@ from app.vehicles.mavlink.moves import (
     stop_motors,
 )
 from app.vehicles.mavlink.signals import (
-    AbortWanted,
+    AbortRequested,
     Action,
+    ActionDone,
+    ActionRefused,
     Command,
-    Done,
-    Doubled,
+    DuplicateVehicleDetected,
     Event,
-    Heard,
-    Keep,
-    MotorsOffWanted,
-    Perform,
-    Refused,
-    Restored,
+    GainsRestored,
+    MotorsOffRequested,
+    PacketReceived,
+    PerformAction,
+    RecordSample,
     RestoreGains,
-    Sighted,
+    SecondaryAltitudeReceived,
 )
 from app.vehicles.mavlink.states import COMMANDED, State
-from app.vehicles.mavlink.watch import Watch
+from app.vehicles.mavlink.watch import TrialObservation
 
 __all__ = ["Plan", "Trial", "advance", "begin"]
 
@@ -62,9 +62,9 @@ _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
 
 
-def begin(plan: Plan, watch: Watch, now_s: float) -> Step:
+def begin(plan: Plan, watch: TrialObservation, now_s: float) -> Step:
     """A vehicle that stands disarmed on the ground with its gains confirmed is told to arm."""
-    return Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch), (Perform(Action.ARM),)
+    return Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch), (PerformAction(Action.ARM),)
 
 
 def advance(trial: Trial, event: Event) -> Step:
@@ -72,28 +72,28 @@ def advance(trial: Trial, event: Event) -> Step:
     if trial.is_over:
         return trial, ()
     kept: tuple[Command, ...] = ()
-    if isinstance(event, Heard):
+    if isinstance(event, PacketReceived):
         trial, kept = _hear(trial, event)
-    elif isinstance(event, Sighted):
+    elif isinstance(event, SecondaryAltitudeReceived):
         sighted = replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
         trial = replace(trial, watch=watching.sight(trial.watch, sighted))
-    elif isinstance(event, Doubled):
+    elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=replace(trial.watch, doubled=event.why))
     trial = replace(trial, watch=watching.settle(trial.watch, event.now_s, trial.plan.ground_m))
     trial, commands = _react(_with_fall(trial), event)
     return trial, (*kept, *commands)
 
 
-def _hear(trial: Trial, event: Heard) -> Step:
-    watch, positions = watching.hear(trial.watch, event.measurement, event.now_s, trial.plan.limits)
+def _hear(trial: Trial, event: PacketReceived) -> Step:
+    watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
     trial = replace(trial, watch=watch)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
         return trial, ()
     if trial.state is State.ARM:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
-    to_m = trial.plan.ground_m if trial.state not in _HOLDING else trial.plan.limits.set_point_m
+    to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
-    return trial, tuple(Keep(position, to_m, watch.battery_v, second_m) for position in positions)
+    return trial, tuple(RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
 
 
 def _with_fall(trial: Trial) -> Trial:
@@ -105,17 +105,17 @@ def _with_fall(trial: Trial) -> Trial:
 
 
 def _react(trial: Trial, event: Event) -> Step:
-    if isinstance(event, MotorsOffWanted):
+    if isinstance(event, MotorsOffRequested):
         return stop_motors(trial, event.reason, event.now_s)
-    if isinstance(event, AbortWanted) and trial.state in COMMANDED:
+    if isinstance(event, AbortRequested) and trial.state in COMMANDED:
         trial = _with_ground(trial) if trial.state is State.ARM else trial
         return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
-    return _COURSES[trial.state](trial, event)
+    return _HANDLERS[trial.state](trial, event)
 
 
 def _arm(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
-    if isinstance(event, Done) and event.action is Action.ARM:
+    if isinstance(event, ActionDone) and event.action is Action.ARM:
         trial = replace(trial, asked_s=now_s)
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
@@ -126,7 +126,7 @@ def _arm(trial: Trial, event: Event) -> Step:
         return trial, ()
     trial = _with_ground(replace(trial, watch=replace(trial.watch, block="")))
     trial = replace(trial, commanded_s=now_s, commanded_boot_s=last.time_boot_s)
-    return enter(trial, State.TAKEOFF, now_s), (Perform(Action.TAKE_OFF),)
+    return enter(trial, State.TAKEOFF, now_s), (PerformAction(Action.TAKE_OFF),)
 
 
 def _with_ground(trial: Trial) -> Trial:
@@ -152,7 +152,7 @@ def _with_ground(trial: Trial) -> Trial:
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
     why = ""
-    if isinstance(event, Refused):
+    if isinstance(event, ActionRefused):
         why = event.why
     elif trial.armed_s is not None and watching.is_disarmed(trial.watch, trial.plan.limits):
         why = "It disarmed itself."
@@ -168,7 +168,7 @@ def _take_off(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
         return enter(trial, State.RECORD, now_s), ()
-    if isinstance(event, Refused):
+    if isinstance(event, ActionRefused):
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
     if now_s - trial.since_s > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):
         why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
@@ -181,7 +181,7 @@ def _record(trial: Trial, event: Event) -> Step:
     if finding := _finding(trial, now_s):
         return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
-    if _rests_for(trial, DOWN_S, now_s):
+    if _has_rested(trial, DOWN_S, now_s):
         return fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
     if not _is_whole(trial):
         return _overtime(trial, now_s)
@@ -223,7 +223,7 @@ def _landing(trial: Trial, event: Event) -> Step:
     if now_s - trial.since_s > LANDING_S:
         return quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
     if _is_land_due(trial, now_s) and not _obeys(trial, now_s):
-        return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
+        return replace(trial, repeated_s=now_s), (PerformAction(Action.LAND),)
     return trial, ()
 
 
@@ -257,7 +257,7 @@ def _resting(trial: Trial, now_s: float) -> Trial:
     return replace(trial, resting_since_s=since_s if rests else None)
 
 
-def _rests_for(trial: Trial, seconds: float, now_s: float) -> bool:
+def _has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
     return trial.resting_since_s is not None and now_s - trial.resting_since_s >= seconds
 
 
@@ -266,7 +266,7 @@ def _has_landed(trial: Trial, now_s: float) -> bool:
     is_high = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     near = watching.is_fresh(trial.watch, now_s) and not is_high
     disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
-    return _rests_for(trial, LANDED_S, now_s) or (near and disarmed)
+    return _has_rested(trial, LANDED_S, now_s) or (near and disarmed)
 
 
 def _link_lost(trial: Trial, event: Event) -> Step:
@@ -274,12 +274,12 @@ def _link_lost(trial: Trial, event: Event) -> Step:
     trial = _doubting(trial)
     if finding := _taken_over(trial):
         return fail(trial, finding, now_s)
-    if isinstance(event, Heard) and isinstance(event.measurement, Heartbeat):
+    if isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat):
         return land(trial, State.ABORT_LAND, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
         return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
     if _is_land_due(trial, now_s):
-        return replace(trial, repeated_s=now_s), (Perform(Action.LAND),)
+        return replace(trial, repeated_s=now_s), (PerformAction(Action.LAND),)
     return trial, ()
 
 
@@ -295,29 +295,29 @@ def _disarming(trial: Trial, event: Event) -> Step:
         return abort(note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
         return quarantine(trial, f"It has not said within {DISARMED_WITHIN_S:g} s that its motors stopped.", now_s)
-    may_stop = trial.stopped or watching.may_stop(trial.watch, now_s)
+    may_stop = trial.stopped or watching.may_stop_motors(trial.watch, now_s)
     if may_stop and now_s - trial.repeated_s >= REPEAT_S:
         action = Action.KILL if trial.stopped else Action.MOTORS_OFF
-        return replace(trial, repeated_s=now_s), (Perform(action),)
+        return replace(trial, repeated_s=now_s), (PerformAction(action),)
     return trial, ()
 
 
 def _answered(trial: Trial, event: Event) -> Trial:
     """Note that it has answered the order to stop its motors: with what its heartbeat says, a second witness."""
-    heard = event.measurement if isinstance(event, Heard) else None
+    heard = event.measurement if isinstance(event, PacketReceived) else None
     answered = confirms_motors_off(heard, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
     return replace(trial, answered=trial.answered or answered)
 
 
 def _is_stopped(trial: Trial, event: Event) -> bool:
     """By two heartbeats, or by one and its answer to the order."""
-    if not isinstance(event, Heard) or not isinstance(event.measurement, Heartbeat) or event.measurement.armed:
+    if not isinstance(event, PacketReceived) or not isinstance(event.measurement, Heartbeat) or event.measurement.armed:
         return False
     return trial.answered or watching.is_disarmed(trial.watch, trial.plan.limits)
 
 
 def _restoring(trial: Trial, event: Event) -> Step:
-    if not isinstance(event, Restored):
+    if not isinstance(event, GainsRestored):
         return trial, ()
     if event.problem:
         return quarantine(trial, f"Its safe gains could not be verified: {event.problem}", event.now_s)
@@ -326,7 +326,7 @@ def _restoring(trial: Trial, event: Event) -> Step:
     return enter(trial, State.IDLE, event.now_s), ()
 
 
-_COURSES: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
+_HANDLERS: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
     State.ARM: _arm,
     State.TAKEOFF: _take_off,
     State.RECORD: _record,
@@ -336,7 +336,7 @@ _COURSES: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
     State.DISARM: _disarming,
     State.RESTORE: _restoring,
 }
-_HOLDING: Final = frozenset({State.TAKEOFF, State.RECORD})
+_STATES_WITH_TRIAL_GAINS: Final = frozenset({State.TAKEOFF, State.RECORD})
 _RECORDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.ABORT_LAND, State.LINK_LOST})
 
 
@@ -388,7 +388,7 @@ def _blocks(trial: Trial) -> frozenset[str]:
     limits = trial.plan.limits
     allowed = limits.flying_blocks | limits.landing_blocks
     early = trial.commanded_s is None or trial.watch.block_s - trial.commanded_s < _MODE_KNOWN_S
-    return allowed | limits.arming_blocks if early or trial.state not in _HOLDING else allowed
+    return allowed | limits.arming_blocks if early or trial.state not in _STATES_WITH_TRIAL_GAINS else allowed
 
 
 def _obeys(trial: Trial, now_s: float) -> bool:

@@ -45,7 +45,7 @@ class Battery:
 
 
 @dataclass(frozen=True, slots=True)
-class Spoken:
+class StatusText:
     """A line of text from the vehicle; of a longer one (with a `number`) the piece that has this `place`."""
 
     text: str
@@ -65,7 +65,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class CommandReply:
     """The vehicle's answer to what was asked: `to` is "command 400" or "waypoint"."""
 
     to: str
@@ -74,7 +74,7 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
-class Breach:
+class FenceBreach:
     """The vehicle's own fence was crossed; which limit of it, where it is told."""
 
     limit: str = ""
@@ -120,10 +120,10 @@ Measurement = (
     Position
     | Heartbeat
     | Battery
-    | Spoken
+    | StatusText
     | Parameter
-    | Reply
-    | Breach
+    | CommandReply
+    | FenceBreach
     | LandedState
     | BlockCount
     | Block
@@ -135,7 +135,7 @@ Measurement = (
 def confirms_motors_off(measurement: Measurement | None, stop_settings: Collection[str]) -> bool:
     """Whether it answers the order to stop the motors: the command accepted, or a setting that stops them read back."""
     match measurement:
-        case Reply(to=to, accepted=True):
+        case CommandReply(to=to, accepted=True):
             return to == DISARMING
         case Parameter(name=name, value=value):
             return name in stop_settings and value != 0.0

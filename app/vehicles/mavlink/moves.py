@@ -7,12 +7,12 @@ from typing import Final
 
 from app.vehicles.base import MOTORS_OFF_ASKED
 from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure, Finding, Outcome, Reaction
+from app.vehicles.mavlink.failures import GAIN_FAILURES, RESPONSES, Failure, Finding, Outcome, Reaction
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.measurements import Parameter, Position
-from app.vehicles.mavlink.signals import Action, Command, Event, Heard, Perform, SendGain, Setting
+from app.vehicles.mavlink.signals import Action, Command, Event, PacketReceived, PerformAction, SendGain, Setting
 from app.vehicles.mavlink.states import MOVES, OVER, State
-from app.vehicles.mavlink.watch import Watch
+from app.vehicles.mavlink.watch import TrialObservation
 
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
@@ -56,7 +56,7 @@ class Trial:
     plan: Plan
     state: State
     since_s: float
-    watch: Watch
+    watch: TrialObservation
     failure: Failure | None = None
     why: str = ""
     asked_s: float | None = None
@@ -102,7 +102,11 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     if reaction == "cease":
         return quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)
     if trial.state in (State.ABORT_LAND, State.LINK_LOST):
-        return save(trial, now_s) if finding.failure in SUSPECT and trial.gains_since_s is None else (trial, ())
+        return (
+            abort_with_safe_gains(trial, now_s)
+            if finding.failure in GAIN_FAILURES and trial.gains_since_s is None
+            else (trial, ())
+        )
     return _REACTIONS[reaction](trial, now_s)
 
 
@@ -136,10 +140,10 @@ def enter(trial: Trial, state: State, now_s: float) -> Trial:
 
 
 def abort(trial: Trial, now_s: float) -> Step:
-    return save(enter(trial, State.ABORT_LAND, now_s), now_s)
+    return abort_with_safe_gains(enter(trial, State.ABORT_LAND, now_s), now_s)
 
 
-def save(trial: Trial, now_s: float) -> Step:
+def abort_with_safe_gains(trial: Trial, now_s: float) -> Step:
     """The gains are suspect: the first safe gain leaves at once, Land follows the last."""
     first, *others = trial.plan.safe_gains
     trial = replace(trial, awaited=first, unsent=tuple(others), gains_since_s=now_s, sent_s=now_s)
@@ -148,15 +152,15 @@ def save(trial: Trial, now_s: float) -> Step:
 
 def land(trial: Trial, state: State, now_s: float) -> Step:
     """Land now; it is repeated from `state`."""
-    return replace(enter(trial, state, now_s), repeated_s=now_s), (Perform(Action.LAND),)
+    return replace(enter(trial, state, now_s), repeated_s=now_s), (PerformAction(Action.LAND),)
 
 
 def disarm(trial: Trial, now_s: float) -> Step:
     """Motors off at once where every witness has had the vehicle on the ground for a second; else only once it has."""
     trial = replace(enter(trial, State.DISARM, now_s), answered=False)
-    if not watching.may_stop(trial.watch, now_s):
+    if not watching.may_stop_motors(trial.watch, now_s):
         return trial, ()
-    return replace(trial, repeated_s=now_s), (Perform(Action.MOTORS_OFF),)
+    return replace(trial, repeated_s=now_s), (PerformAction(Action.MOTORS_OFF),)
 
 
 def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
@@ -167,7 +171,7 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
     trial = replace(trial, failure=Failure.OPERATOR, why=why, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
-    return replace(trial, repeated_s=now_s), (Perform(Action.KILL),)
+    return replace(trial, repeated_s=now_s), (PerformAction(Action.KILL),)
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:
@@ -183,7 +187,7 @@ def send_gains(trial: Trial, event: Event) -> Step:
     """One request in flight: the next safe gain when the last was echoed or 0.1 s have passed; Land after 0.3 s."""
     now_s = event.now_s
     echoed = (
-        isinstance(event, Heard)
+        isinstance(event, PacketReceived)
         and isinstance(event.measurement, Parameter)
         and trial.awaited is not None
         and event.measurement.name == trial.awaited.parameter
@@ -196,7 +200,7 @@ def send_gains(trial: Trial, event: Event) -> Step:
         return replace(trial, awaited=following, unsent=tuple(others), sent_s=now_s), (SendGain(following),)
     rest = tuple(SendGain(setting) for setting in trial.unsent)
     trial = replace(trial, awaited=None, unsent=(), repeated_s=now_s)
-    return trial, (*rest, Perform(Action.LAND))
+    return trial, (*rest, PerformAction(Action.LAND))
 
 
 _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {

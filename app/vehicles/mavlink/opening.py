@@ -11,19 +11,19 @@ from app.vehicles.mavlink import addresses, signing
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Aim
-from app.vehicles.mavlink.radio import PATIENCE_S, Radio
+from app.vehicles.mavlink.profiles.base import Target
+from app.vehicles.mavlink.radio import PATIENCE_S, AutopilotLink
 from app.vehicles.mavlink.transports import Transport
 
 TAKEOFF_ALTITUDE_M: Final = 3.0
-HASTE: Final = 4.0
+MAX_UNSCALED_SPEED: Final = 4.0
 """Up to this speed of its clock a simulated vehicle is waited for as a real one is. Beyond, waiting for packets takes
 longer by its time, because a busy computer's pauses are on the wall."""
 
 
-def patience_of(options: Options) -> float:
+def timeout_factor_of(options: Options) -> float:
     """How many times longer than a real vehicle this one is waited for."""
-    return max(1.0, float(options["clock_speed"]) / HASTE)
+    return max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED)
 
 
 def open_radio(
@@ -32,7 +32,7 @@ def open_radio(
     *,
     overhear: Callable[[Received], None] | None,
     transport: Transport | None = None,
-) -> Radio:
+) -> AutopilotLink:
     """`clock` is the vehicle's time, by default that of its options; `transport` is read by whoever listens, in place
     of a thread that reads the address. Raises LinkError when its link or its log cannot be opened, InputError for a
     signing key that cannot be read or used."""
@@ -49,16 +49,18 @@ def open_radio(
         signing_key=signing.read_key(Path(key_file)) if key_file else None,
         transport=transport,
     )
-    aim = Aim(
+    aim = Target(
         system=0,
         aircraft=int(options["aircraft_id"]),
         waypoint=int(options["climb_waypoint"]),
         altitude_m=TAKEOFF_ALTITUDE_M,
     )
-    return Radio(link, profile, clock, aim, patience_s=PATIENCE_S * patience_of(options), overhear=overhear)
+    return AutopilotLink(
+        link, profile, clock, aim, patience_s=PATIENCE_S * timeout_factor_of(options), overhear=overhear
+    )
 
 
-def limits_of(options: Options, radio: Radio) -> Limits:
+def limits_of(options: Options, radio: AutopilotLink) -> Limits:
     """Those of a vehicle that stands at its own zero."""
     profile = radio.profile
     return Limits(
@@ -74,7 +76,7 @@ def limits_of(options: Options, radio: Radio) -> Limits:
         arming_blocks=profile.arming_blocks,
         flying_blocks=profile.flying_blocks,
         landing_blocks=profile.landing_blocks,
-    ).stretched(patience_of(options))
+    ).stretched(timeout_factor_of(options))
 
 
 def _log_path(folder: str) -> Path | None:

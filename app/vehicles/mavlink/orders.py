@@ -5,17 +5,17 @@ from typing import Final
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
 from app.vehicles.mavlink.measurements import confirms_motors_off
-from app.vehicles.mavlink.radio import Radio
-from app.vehicles.mavlink.signals import Action, Heard
+from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.signals import Action, PacketReceived
 
 STOPPING_S: Final = 5.0
 """For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""
 
 
-class StandingOrder:
+class RepeatedCommand:
     """Once the vehicle has obeyed nothing more is sent: somebody else may fly it again."""
 
-    def __init__(self, radio: Radio, action: Action) -> None:
+    def __init__(self, radio: AutopilotLink, action: Action) -> None:
         """Sends it. Raises VehicleError when it takes a block of a flight plan that is not known."""
         self._radio, self._action = radio, action
         self._asked_s = radio.clock.now_s()
@@ -23,7 +23,7 @@ class StandingOrder:
         self._is_over = False
         self._send()
 
-    def proceed(self, heard: list[Heard]) -> None:
+    def proceed(self, heard: list[PacketReceived]) -> None:
         """Take in what came, and send it again when it is due."""
         if self._action is Action.KILL:
             settings = self._radio.profile.stop_settings

@@ -9,15 +9,15 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.measurements import Measurement, Parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing
-from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, Radio
-from app.vehicles.mavlink.signals import Heard, Setting
+from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, AutopilotLink
+from app.vehicles.mavlink.signals import PacketReceived, Setting
 
 LIST_ATTEMPTS: Final = 3
 LIST_ENDS_S: Final = 2.0
 """The list is over when nothing of it has come for so long."""
 
 
-def find_gain_set(radio: Radio) -> GainSet:
+def find_gain_set(radio: AutopilotLink) -> GainSet:
     """The gains by the names that this vehicle has for them. Raises VehicleError when it answers to none."""
     for gain_set in radio.profile.gain_sets:
         if read_parameter(radio, gain_set[0].parameter) is not None:
@@ -29,7 +29,7 @@ def find_gain_set(radio: Radio) -> GainSet:
     )
 
 
-def write_gains(radio: Radio, gain_set: GainSet, gains: Gains) -> dict[str, float]:
+def write_gains(radio: AutopilotLink, gain_set: GainSet, gains: Gains) -> dict[str, float]:
     """Write every gain, then read every one back: what the vehicle holds. Raises VehicleError for silence."""
     for gain in gain_set:
         wanted = gain.sent(gains[gain.gain])
@@ -38,7 +38,7 @@ def write_gains(radio: Radio, gain_set: GainSet, gains: Gains) -> dict[str, floa
     return read_gains(radio, gain_set, gains)
 
 
-def read_gains(radio: Radio, gain_set: GainSet, asked: Gains | None = None) -> dict[str, float]:
+def read_gains(radio: AutopilotLink, gain_set: GainSet, asked: Gains | None = None) -> dict[str, float]:
     """What the vehicle holds, in the very numbers `asked` where it holds these. Raises VehicleError for silence."""
     held_now: dict[str, float] = {}
     for gain in gain_set:
@@ -49,17 +49,17 @@ def read_gains(radio: Radio, gain_set: GainSet, asked: Gains | None = None) -> d
     return held_now
 
 
-def read_parameter(radio: Radio, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
+def read_parameter(radio: AutopilotLink, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     """None when the vehicle does not answer: it has no such parameter, or no ears."""
     return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter, attempts=attempts)
 
 
-def write_parameter(radio: Radio, parameter: str, value: float) -> float | None:
+def write_parameter(radio: AutopilotLink, parameter: str, value: float) -> float | None:
     """What it answers to have; None when it does not answer."""
     return _ask(radio, radio.profile.set_parameter(radio.aim, parameter, value), parameter)
 
 
-def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str, float]:
+def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[str, float]:
     """Every parameter of the vehicle, by the list that it sends; what is lost of that is asked for one by one. Raises
     VehicleError when it sends none, or not all."""
     heard: dict[int, Parameter] = {}
@@ -79,7 +79,7 @@ def read_all(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[str,
     return {heard[place].name: heard[place].value for place in sorted(heard)}
 
 
-def _list(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[int, Parameter]:
+def _list(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[int, Parameter]:
     """What comes by itself, until all has come or nothing more does."""
     heard: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
@@ -91,12 +91,12 @@ def _list(radio: Radio, on_progress: Callable[[int, int], None]) -> dict[int, Pa
     return heard
 
 
-def _listed(heard: list[Heard]) -> dict[int, Parameter]:
+def _listed(heard: list[PacketReceived]) -> dict[int, Parameter]:
     found = (each.measurement for each in heard if isinstance(each.measurement, Parameter))
     return {each.place: each for each in found if each.place is not None}
 
 
-def _fetched(radio: Radio, place: int) -> dict[int, Parameter]:
+def _fetched(radio: AutopilotLink, place: int) -> dict[int, Parameter]:
     answer = radio.ask(base.read_place(radio.aim, place), lambda it: isinstance(it, Parameter) and it.place == place)
     return {place: answer} if isinstance(answer, Parameter) else {}
 
@@ -115,7 +115,7 @@ def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
     return tuple(Setting(gain.parameter, gain.sent(gains[gain.gain])) for gain in ordered)
 
 
-def _ask(radio: Radio, request: Outgoing, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
+def _ask(radio: AutopilotLink, request: Outgoing, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     def fits(heard: Measurement) -> bool:
         return isinstance(heard, Parameter) and heard.name == parameter
 

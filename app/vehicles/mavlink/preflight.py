@@ -11,12 +11,12 @@ from typing import Final
 from app.vehicles.base import CheckItem, Identity
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.measurements import DISARMING, Heartbeat, Position, Reply
+from app.vehicles.mavlink.measurements import DISARMING, CommandReply, Heartbeat, Position
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
-from app.vehicles.mavlink.radio import Radio
-from app.vehicles.mavlink.sources import Lookout
+from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.sources import AlignedAltitudeSource
 
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
@@ -44,7 +44,7 @@ class Ground:
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class GroundObservation:
     """What was heard of a vehicle on the ground within `seconds`."""
 
     positions: tuple[Position, ...]
@@ -63,7 +63,7 @@ class Watched:
 # ---- meeting the vehicle
 
 
-def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
+def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = None) -> None:
     """Wait for the heartbeat of an autopilot of the right make, sending nothing. Raises VehicleError when none comes
     within 5 s (longer where the vehicle's clock is fast), or another vehicle's than the `pinned` one's."""
     within_s = HEARTBEAT_S * radio.patience
@@ -72,7 +72,7 @@ def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
         radio.listen(_LISTEN_S)
         heartbeat = radio.seen.heartbeat
         if heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot:
-            return _take_aim(radio, heartbeat, pinned)
+            return _set_target(radio, heartbeat, pinned)
     makes = sorted(radio.link.other_makes)
     others = f" Others were heard: MAVLink's autopilots {makes}." if makes else ""
     raise VehicleError(
@@ -82,7 +82,7 @@ def meet(radio: Radio, address: str, pinned: Identity | None = None) -> None:
     )
 
 
-def _take_aim(radio: Radio, heartbeat: Heartbeat, pinned: Identity | None) -> None:
+def _set_target(radio: AutopilotLink, heartbeat: Heartbeat, pinned: Identity | None) -> None:
     if pinned is not None and pinned.system_id != heartbeat.system:
         raise VehicleError(
             f"Another vehicle answers: system {heartbeat.system} instead of {pinned.system_id}.",
@@ -96,7 +96,7 @@ def _take_aim(radio: Radio, heartbeat: Heartbeat, pinned: Identity | None) -> No
     )
 
 
-def learn(radio: Radio) -> str:
+def read_vehicle_info(radio: AutopilotLink) -> str:
     """Read the flight plan and the firmware's version, changing nothing; what is wrong with the plan, or nothing."""
     problem = ""
     try:
@@ -112,23 +112,23 @@ def learn(radio: Radio) -> str:
     return problem
 
 
-def _has(radio: Radio, parameter: str) -> bool:
+def _has(radio: AutopilotLink, parameter: str) -> bool:
     return read_parameter(radio, parameter, attempts=_NAME_ATTEMPTS) is not None
 
 
-def confirm_stop(radio: Radio, watched: Watched) -> None:
+def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
     """Find out whether a vehicle without a setting that stops its motors obeys the command that does. It is asked only
     of one that was just watched standing, disarmed by every heartbeat: in the air, the command would drop it."""
     if radio.aim.stop_settings or not radio.profile.stop_settings or radio.link.doubled:
         return
     stands = watched.disarmed and _moved_m(watched.positions) <= _STANDS_WITHIN_M and bool(watched.positions)
     if stands:
-        obeyed = radio.ask(base.disarm(radio.aim), lambda it: isinstance(it, Reply) and it.to == DISARMING)
-        accepted = isinstance(obeyed, Reply) and obeyed.accepted
+        obeyed = radio.ask(base.disarm(radio.aim), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
+        accepted = isinstance(obeyed, CommandReply) and obeyed.accepted
         radio.aim = replace(radio.aim, stops_by_command=accepted)
 
 
-def changed(radio: Radio, pinned: Identity | None) -> str:
+def identity_change(radio: AutopilotLink, pinned: Identity | None) -> str:
     """How the vehicle differs from the one that was pinned, where both tell; nothing when it does not."""
     version = radio.seen.version
     if pinned is None or not version or not pinned.version or version == pinned.version:
@@ -136,22 +136,22 @@ def changed(radio: Radio, pinned: Identity | None) -> str:
     return f"Its firmware is now version {version}; it was {pinned.version}."
 
 
-def is_armed(radio: Radio) -> bool:
+def is_armed(radio: AutopilotLink) -> bool:
     return radio.seen.heartbeat is not None and radio.seen.heartbeat.armed
 
 
-def require_disarmed(radio: Radio) -> None:
+def require_disarmed(radio: AutopilotLink) -> None:
     """Raises SafeGainsError: nobody knows what an armed vehicle is doing, so nothing but Land may be sent to it."""
     if is_armed(radio):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)
 
 
-def prepare(radio: Radio, telemetry_hz: float) -> None:
+def prepare(radio: AutopilotLink, telemetry_hz: float) -> None:
     """Ask for telemetry. Raises VehicleError when it is refused."""
     _set_up(radio, radio.profile.prepare(radio.aim, telemetry_hz))
 
 
-def make_armable(radio: Radio) -> None:
+def make_armable(radio: AutopilotLink) -> None:
     """Bring a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError when it
     refuses."""
     heartbeat = radio.seen.heartbeat
@@ -163,7 +163,7 @@ def make_armable(radio: Radio) -> None:
         _set_up(radio, steps)
 
 
-def _set_up(radio: Radio, steps: tuple[Step, ...]) -> None:
+def _set_up(radio: AutopilotLink, steps: tuple[Step, ...]) -> None:
     if why := radio.set_up(steps):
         raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
 
@@ -171,7 +171,9 @@ def _set_up(radio: Radio, steps: tuple[Step, ...]) -> None:
 # ---- judging it
 
 
-def watch(radio: Radio, lookout: Lookout | None, *, watched_s: float = WATCHED_S) -> Watched:
+def observe(
+    radio: AutopilotLink, lookout: AlignedAltitudeSource | None, *, watched_s: float = WATCHED_S
+) -> GroundObservation:
     """Listen for so long, and up to 10 s for the battery's voltage and a heartbeat that is late."""
     radio.listen(0.0)
     radio.seen.positions.clear()
@@ -186,14 +188,16 @@ def watch(radio: Radio, lookout: Lookout | None, *, watched_s: float = WATCHED_S
         armed += [each.measurement.armed for each in heard if isinstance(each.measurement, Heartbeat)]
     seen_m = () if lookout is None else lookout.stand()
     positions = tuple(position for _, position in radio.seen.positions)
-    return Watched(positions, now_s - begun_s, seen_m, disarmed=bool(armed) and not any(armed))
+    return GroundObservation(positions, now_s - begun_s, seen_m, disarmed=bool(armed) and not any(armed))
 
 
-def judge(radio: Radio, watched: Watched, *, min_battery_v: float, plan_problem: str) -> tuple[CheckItem, ...]:
+def evaluate_items(
+    radio: AutopilotLink, watched: GroundObservation, *, min_battery_v: float, plan_problem: str
+) -> tuple[CheckItem, ...]:
     """All but the gains and the second source. Asks for the parameters that switch failsafes on."""
     items = [
         _heartbeat(radio),
-        _alone(radio),
+        _single_vehicle_item(radio),
         _disarmed(radio),
         *_motion(watched),
         _battery(radio.seen.battery_v, min_battery_v),
@@ -207,7 +211,7 @@ def judge(radio: Radio, watched: Watched, *, min_battery_v: float, plan_problem:
     return (*items, *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
 
 
-def judge_source(lookout: Lookout, watched: Watched) -> CheckItem:
+def evaluate_secondary(lookout: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
     rate_hz = len(watched.seen_m) / watched.seconds
     return CheckItem(
         name="second_source",
@@ -231,7 +235,7 @@ def require(items: Sequence[CheckItem]) -> None:
         raise VehicleError(f"The vehicle is not ready to fly. {told}.", hint=hints or "Correct this, then try again.")
 
 
-def _heartbeat(radio: Radio) -> CheckItem:
+def _heartbeat(radio: AutopilotLink) -> CheckItem:
     age_s = radio.clock.now_s() - radio.seen.heartbeat_s
     heartbeat = radio.seen.heartbeat
     make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
@@ -249,7 +253,7 @@ def _heartbeat(radio: Radio) -> CheckItem:
     )
 
 
-def _alone(radio: Radio) -> CheckItem:
+def _single_vehicle_item(radio: AutopilotLink) -> CheckItem:
     doubled = radio.link.doubled
     return CheckItem(
         name="alone",
@@ -261,7 +265,7 @@ def _alone(radio: Radio) -> CheckItem:
     )
 
 
-def _stopping(radio: Radio) -> CheckItem:
+def _stopping(radio: AutopilotLink) -> CheckItem:
     ways = [f"the setting {name}" for name in radio.aim.stop_settings]
     ways += ["the command to disarm"] if radio.aim.stops_by_command else []
     return CheckItem(
@@ -274,7 +278,7 @@ def _stopping(radio: Radio) -> CheckItem:
     )
 
 
-def _own_checks(radio: Radio) -> CheckItem:
+def _own_checks(radio: AutopilotLink) -> CheckItem:
     ready = bool(radio.seen.may_arm)
     said = " / ".join(radio.seen.spoken)
     return CheckItem(
@@ -287,7 +291,7 @@ def _own_checks(radio: Radio) -> CheckItem:
     )
 
 
-def _disarmed(radio: Radio) -> CheckItem:
+def _disarmed(radio: AutopilotLink) -> CheckItem:
     armed = is_armed(radio)
     return CheckItem(
         name=_DISARMED,
@@ -299,7 +303,7 @@ def _disarmed(radio: Radio) -> CheckItem:
     )
 
 
-def _motion(watched: Watched) -> tuple[CheckItem, ...]:
+def _motion(watched: GroundObservation) -> tuple[CheckItem, ...]:
     positions = watched.positions
     passed_s = positions[-1].time_boot_s - positions[0].time_boot_s if positions else 0.0
     rate_hz = (len(positions) - 1) / passed_s if passed_s > 0.0 else 0.0
@@ -359,7 +363,7 @@ def _flight_plan(problem: str) -> CheckItem:
     )
 
 
-def _failsafe(radio: Radio, requirement: Requirement) -> CheckItem:
+def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
     value = read_parameter(radio, requirement.parameter)
     return CheckItem(
         name=f"failsafe {requirement.parameter}",

@@ -7,21 +7,21 @@ from typing import Final
 
 from app.core.clock import Clock
 from app.vehicles.mavlink.dialects import Message, source_component
-from app.vehicles.mavlink.limits import WITNESSES_APART
+from app.vehicles.mavlink.limits import MAX_WITNESS_GAP
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.measurements import (
     Battery,
     BlockEntered,
+    CommandReply,
     Heartbeat,
     Measurement,
     Parameter,
     Position,
-    Reply,
-    Spoken,
+    StatusText,
     Version,
 )
-from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile, Step
-from app.vehicles.mavlink.signals import Action, Done, Heard, Refused
+from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Step, Target
+from app.vehicles.mavlink.signals import Action, ActionDone, ActionRefused, PacketReceived
 
 PATIENCE_S: Final = 0.5
 ATTEMPTS: Final = 5
@@ -30,7 +30,7 @@ _SPOKEN: Final = 5
 
 
 @dataclass(slots=True)
-class Seen:
+class VehicleMemory:
     """The latest of what a vehicle said; positions with the time of their receipt. `block` is the number of its flight
     plan's block."""
 
@@ -62,12 +62,12 @@ class Seen:
                 self.may_arm = may_arm
             case Position():
                 self.positions.append((now_s, measurement))
-            case Spoken():
+            case StatusText():
                 self._hear(measurement)
             case _:
                 pass
 
-    def _hear(self, said: Spoken) -> None:
+    def _hear(self, said: StatusText) -> None:
         """Pieces are put together in their order; one that is lost is not waited for."""
         if said.number != self._piece_of or said.place == 0:
             self._piece_of, self._pieces = said.number, ""
@@ -77,7 +77,7 @@ class Seen:
             self._piece_of, self._pieces = 0, ""
 
 
-class Radio:
+class AutopilotLink:
     """A link with a profile; an answer is waited for `patience_s`. Only the autopilot's own component is listened to;
     `overhear` gets every message besides, of whichever. For one thread."""
 
@@ -86,7 +86,7 @@ class Radio:
         link: Link,
         profile: Profile,
         clock: Clock,
-        aim: Aim,
+        aim: Target,
         *,
         patience_s: float = PATIENCE_S,
         overhear: Callable[[Received], None] | None = None,
@@ -96,7 +96,7 @@ class Radio:
         self.clock: Final = clock
         self.aim = aim
         self.patience_s: Final = patience_s
-        self.seen: Final = Seen()
+        self.seen: Final = VehicleMemory()
         self._overhear = overhear
 
     @property
@@ -107,7 +107,7 @@ class Radio:
     @property
     def is_disarmed(self) -> bool:
         """By two heartbeats at least, and none between them that says otherwise."""
-        seen, apart_s = self.seen, WITNESSES_APART * self.profile.heartbeat_s * self.patience
+        seen, apart_s = self.seen, MAX_WITNESS_GAP * self.profile.heartbeat_s * self.patience
         return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= apart_s
 
     @property
@@ -121,14 +121,14 @@ class Radio:
         for message in messages:
             self.link.send(message.kind, **message.fields)
 
-    def listen(self, timeout_s: float) -> list[Heard]:
+    def listen(self, timeout_s: float) -> list[PacketReceived]:
         """What has come since the last call, waiting at most so long for the first. Raises LinkError as `send`."""
         messages = self.link.receive(timeout_s)
         if self._overhear is not None:
             for message in messages:
                 self._overhear(message)
         heard = [
-            Heard(self.profile.measure(received.message), received.received_s)
+            PacketReceived(self.profile.measure(received.message), received.received_s)
             for received in messages
             if self._is_autopilots(received.message)
         ]
@@ -156,25 +156,25 @@ class Radio:
 
     def set_up(self, steps: tuple[Step, ...]) -> str:
         """Carry out steps on the ground, waiting for them; why they were refused, or nothing. Raises LinkError."""
-        conversation = Conversation(Action.ARM, steps, self, told="be set up")
+        conversation = CommandSequence(Action.ARM, steps, self, told="be set up")
         while True:
             ended = conversation.proceed(self.listen(self.patience_s / 10.0))
             if ended is not None:
-                return ended.why if isinstance(ended, Refused) else ""
+                return ended.why if isinstance(ended, ActionRefused) else ""
 
 
-class Conversation:
+class CommandSequence:
     """Steps under way: each begins when the one before it was answered; nothing here waits. `told` says what the
     vehicle was told, where that is not the action."""
 
-    def __init__(self, action: Action, steps: tuple[Step, ...], radio: Radio, *, told: str = "") -> None:
+    def __init__(self, action: Action, steps: tuple[Step, ...], radio: AutopilotLink, *, told: str = "") -> None:
         self._action, self._radio, self._told = action, radio, told or action
         self._steps = list(steps)
         self._sent_s = 0.0
         self._attempts = 0
         self._send()
 
-    def proceed(self, heard: list[Heard]) -> Done | Refused | None:
+    def proceed(self, heard: list[PacketReceived]) -> ActionDone | ActionRefused | None:
         """Take in what came and send what is due; how it ended, once it has."""
         for each in heard:
             if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
@@ -185,7 +185,7 @@ class Conversation:
         while self._steps and not self._steps[0].awaits and now_s - self._sent_s >= self._steps[0].pause_s:
             self._next()
         if not self._steps:
-            return Done(self._action, now_s)
+            return ActionDone(self._action, now_s)
         if self._steps[0].awaits and now_s - self._sent_s >= self._radio.patience_s:
             if self._attempts < self._steps[0].attempts:
                 self._send()
@@ -206,20 +206,22 @@ class Conversation:
             self._attempts += 1
             self._radio.send(*self._steps[0].sends)
 
-    def _refused(self, measurement: Measurement | None) -> Refused:
-        why = measurement.why if isinstance(measurement, Reply) else ""
+    def _refused(self, measurement: Measurement | None) -> ActionRefused:
+        why = measurement.why if isinstance(measurement, CommandReply) else ""
         said = f" It said: {' / '.join(self._radio.seen.spoken)}." if self._radio.seen.spoken else ""
-        return Refused(self._action, f"The vehicle refused to {self._told} ({why}).{said}", self._radio.clock.now_s())
+        return ActionRefused(
+            self._action, f"The vehicle refused to {self._told} ({why}).{said}", self._radio.clock.now_s()
+        )
 
-    def _unanswered(self) -> Refused:
+    def _unanswered(self) -> ActionRefused:
         why = f"The vehicle did not answer when it was to {self._told}."
-        return Refused(self._action, why, self._radio.clock.now_s())
+        return ActionRefused(self._action, why, self._radio.clock.now_s())
 
 
 def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
     """Whether what was heard ends the step, and how; None when it is no answer to it."""
     match measurement:
-        case Reply(to=to, accepted=accepted) if to == step.awaits:
+        case CommandReply(to=to, accepted=accepted) if to == step.awaits:
             return accepted
         case Parameter(name=name) if name == step.awaits:
             return True

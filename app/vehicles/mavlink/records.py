@@ -10,7 +10,7 @@ from app.core.trajectory import Trajectory
 from app.vehicles.base import Ending
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.machine import Trial
-from app.vehicles.mavlink.signals import Keep
+from app.vehicles.mavlink.signals import RecordSample
 from app.vehicles.mocap.recording import Scored
 
 SOURCE: Final = "mavlink"
@@ -18,7 +18,7 @@ _SCORED: Final = "altitude_m"
 _OTHER: Final = "altitude_2_m"
 
 
-def channels_of(kept: Keep, datum_m: float, scored: Scored) -> dict[str, float]:
+def channels_of(kept: RecordSample, datum_m: float, scored: Scored) -> dict[str, float]:
     """A sample's channels; altitudes count from `datum_m` on the vehicle's own."""
     own_m = kept.position.altitude_m - datum_m
     channels = {
@@ -35,7 +35,7 @@ def channels_of(kept: Keep, datum_m: float, scored: Scored) -> dict[str, float]:
     return channels
 
 
-def trajectory_of(samples: Sequence[Keep], start_s: float, datum_m: float) -> Trajectory:
+def trajectory_of(samples: Sequence[RecordSample], start_s: float, datum_m: float) -> Trajectory:
     """What the vehicle said, by its own clock, from the command on; channels that some samples lack are left out, and
     what a second source saw is not in it: each sample holds only the last that had come."""
     rows = [channels_of(replace(sample, second_m=None), datum_m, "vehicle") for sample in samples]

@@ -32,7 +32,7 @@ class Tick:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class PacketReceived:
     """A packet from the vehicle; None where it measures nothing."""
 
     measurement: Measurement | None
@@ -40,13 +40,13 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class AbortWanted:
+class AbortRequested:
     reason: str
     now_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class MotorsOffWanted:
+class MotorsOffRequested:
     """By a person, who has seen what the program has not: at any height."""
 
     reason: str
@@ -54,7 +54,7 @@ class MotorsOffWanted:
 
 
 @dataclass(frozen=True, slots=True)
-class Sighted:
+class SecondaryAltitudeReceived:
     """The second source of altitude spoke. `altitude_m` is on the vehicle's datum; `is_new` where it really saw the
     vehicle, and not once more what it saw before."""
 
@@ -64,7 +64,7 @@ class Sighted:
 
 
 @dataclass(frozen=True, slots=True)
-class Doubled:
+class DuplicateVehicleDetected:
     """Two vehicles speak under one system id; `why` says how that shows."""
 
     why: str
@@ -72,7 +72,7 @@ class Doubled:
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class ActionDone:
     """The vehicle has taken what an action sends."""
 
     action: Action
@@ -80,25 +80,35 @@ class Done:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class ActionRefused:
     action: Action
     why: str
     now_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class Restored:
+class GainsRestored:
     """The safe gains were written and read back; `problem` says why not."""
 
     now_s: float
     problem: str = ""
 
 
-Event = Tick | Heard | AbortWanted | MotorsOffWanted | Sighted | Doubled | Done | Refused | Restored
+Event = (
+    Tick
+    | PacketReceived
+    | AbortRequested
+    | MotorsOffRequested
+    | SecondaryAltitudeReceived
+    | DuplicateVehicleDetected
+    | ActionDone
+    | ActionRefused
+    | GainsRestored
+)
 
 
 @dataclass(frozen=True, slots=True)
-class Perform:
+class PerformAction:
     action: Action
 
 
@@ -115,7 +125,7 @@ class RestoreGains:
 
 
 @dataclass(frozen=True, slots=True)
-class Keep:
+class RecordSample:
     """A sample that belongs to the record, with what it was to be, and where the second source saw the vehicle."""
 
     position: Position
@@ -124,4 +134,4 @@ class Keep:
     second_m: float | None = None
 
 
-Command = Perform | SendGain | RestoreGains | Keep
+Command = PerformAction | SendGain | RestoreGains | RecordSample

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.vehicles.mavlink.link import Received
-from app.vehicles.mavlink.signals import Sighted
+from app.vehicles.mavlink.signals import SecondaryAltitudeReceived
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ class SourceSample:
     advances: bool
 
 
-class Source(Protocol):
+class AltitudeSource(Protocol):
     """Hears in a thread of its own, or what it is given; nothing of it ever waits."""
 
     @property
@@ -53,13 +53,13 @@ class Source(Protocol):
     def close(self) -> None: ...
 
 
-class Lookout:
+class AlignedAltitudeSource:
     """A source whose altitudes are put on the vehicle's datum: both stood on the ground at the same time.
 
     `seen` are the sightings of the flight so far, as `SourceSample.seen_s` and altitude (m).
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: AltitudeSource) -> None:
         self.source = source
         self.seen: list[tuple[float, float]] = []
         self._rise_m = 0.0
@@ -78,11 +78,13 @@ class Lookout:
         self.seen.clear()
         self.forget()
 
-    def look(self) -> list[Sighted]:
+    def look(self) -> list[SecondaryAltitudeReceived]:
         """What it saw since the last call."""
         samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.source.take()]
         self.seen += [(sample.seen_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]
         return [
-            Sighted(altitude_m=sample.altitude_m + self._rise_m, is_new=is_new, now_s=sample.received_s)
+            SecondaryAltitudeReceived(
+                altitude_m=sample.altitude_m + self._rise_m, is_new=is_new, now_s=sample.received_s
+            )
             for sample, is_new in samples
         ]

@@ -33,7 +33,7 @@ class _Used:
     frame: bytes
 
 
-class Speakers:
+class DuplicateDetector:
     """The messages of one component, in the order in which they came."""
 
     def __init__(self) -> None:

@@ -57,5 +57,5 @@ COMMANDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.LAND
 """An operator's abort has a meaning in these."""
 
 OVER: Final = frozenset({State.IDLE, State.QUARANTINE})
-IN_DOUBT: Final = frozenset({State.QUARANTINE, State.OBSERVE})
+QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
 """Nothing that changes the vehicle may be sent but Land and motors off, until a person has released it."""

@@ -4,55 +4,55 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.base import Sample, ShouldStop, Stop
+from app.vehicles.base import Sample, ShouldStop, StopRequest
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.measurements import Position
-from app.vehicles.mavlink.radio import Conversation, Radio
+from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.signals import (
-    AbortWanted,
+    AbortRequested,
     Action,
     Command,
-    Doubled,
+    DuplicateVehicleDetected,
     Event,
-    Heard,
-    Keep,
-    MotorsOffWanted,
-    Perform,
-    Restored,
+    GainsRestored,
+    MotorsOffRequested,
+    PacketReceived,
+    PerformAction,
+    RecordSample,
     RestoreGains,
+    SecondaryAltitudeReceived,
     SendGain,
-    Sighted,
     Tick,
 )
 from app.vehicles.mavlink.states import State
 from app.vehicles.mavlink.transports import LinkError
-from app.vehicles.mavlink.watch import Watch
+from app.vehicles.mavlink.watch import TrialObservation
 
 LISTEN_S: Final = 0.01
 """How long the loop is deaf to an abort, at the most."""
-STALLED_S: Final = 0.2
+STALL_S: Final = 0.2
 """When this program itself stood still for so long, what came meanwhile is heard before silence is judged."""
 _SAMPLE_EVERY_S: Final = 0.015
 """Of telemetry; records keep every sample."""
 
 
 @dataclass(frozen=True, slots=True)
-class Flown:
+class TrialResult:
     """How a trial ended, and its samples; `error` is what the caller's own functions raised meanwhile. `offset_s` takes
     the vehicle's clock to ours, as the packet shows that came fastest."""
 
     trial: Trial
-    samples: tuple[Keep, ...]
+    samples: tuple[RecordSample, ...]
     offset_s: float
     error: BaseException | None
 
 
-def _blind() -> Sequence[Sighted]:
+def _no_secondary() -> Sequence[SecondaryAltitudeReceived]:
     return ()
 
 
-class Flight:
+class TrialRunner:
     """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
 
     `restore` writes the safe gains, reads them back, and says what is wrong with them, or nothing. `look` gives what a
@@ -62,21 +62,21 @@ class Flight:
 
     def __init__(
         self,
-        radio: Radio,
+        radio: AutopilotLink,
         plan: Plan,
-        watch: Watch,
+        watch: TrialObservation,
         *,
         restore: Callable[[], str],
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
-        channels: Callable[[Keep, float], dict[str, float]],
-        look: Callable[[], Sequence[Sighted]] = _blind,
+        channels: Callable[[RecordSample, float], dict[str, float]],
+        look: Callable[[], Sequence[SecondaryAltitudeReceived]] = _no_secondary,
     ) -> None:
         self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
         self._offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
-        self._samples: list[Keep] = []
-        self._conversation: Conversation | None = None
+        self._samples: list[RecordSample] = []
+        self._conversation: CommandSequence | None = None
         self._error: BaseException | None = None
         self._shown_s = float("-inf")
         self._listened_s = radio.clock.now_s()
@@ -92,13 +92,13 @@ class Flight:
         """Where altitudes count from, on the vehicle's own datum."""
         return self._trial.plan.datum_m
 
-    def fly(self) -> Flown:
+    def fly(self) -> TrialResult:
         """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
         self._guarded(lambda: self._carry_out(self._begin_with))
         while not self._trial.is_over:
             self._guarded(self._listen)
             self._guarded(self._judge)
-        return Flown(self._trial, tuple(self._samples), self._offset_s, self._error)
+        return TrialResult(self._trial, tuple(self._samples), self._offset_s, self._error)
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
@@ -111,29 +111,29 @@ class Flight:
     def _listen(self) -> None:
         heard = self._radio.listen(LISTEN_S)
         now_s = self._radio.clock.now_s()
-        if now_s - self._listened_s > STALLED_S:
+        if now_s - self._listened_s > STALL_S:
             heard += self._radio.listen(LISTEN_S)
         self._listened_s = now_s
         for each in in_order(heard, self._look()):
-            if isinstance(each, Heard) and isinstance(each.measurement, Position):
+            if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):
                 self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
             self._advance(each)
         if why := self._radio.link.doubled:
-            self._advance(Doubled(why, self._radio.clock.now_s()))
+            self._advance(DuplicateVehicleDetected(why, self._radio.clock.now_s()))
         if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
             self._conversation = None
             self._advance(ended)
 
     def _judge(self) -> None:
         if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
-            self._advance(Restored(self._radio.clock.now_s(), self._restored()))
+            self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
-            wanted = MotorsOffWanted if stop.motors_off else AbortWanted
+            wanted = MotorsOffRequested if stop.motors_off else AbortRequested
             self._advance(wanted(stop.reason, self._radio.clock.now_s()))
         self._advance(Tick(self._radio.clock.now_s()))
 
-    def _wanted(self) -> Stop | None:
-        return self._should_stop() if self._error is None else Stop(_spoken(self._error))
+    def _wanted(self) -> StopRequest | None:
+        return self._should_stop() if self._error is None else StopRequest(_spoken(self._error))
 
     def _advance(self, event: Event) -> None:
         before = self._trial.state
@@ -145,18 +145,18 @@ class Flight:
     def _carry_out(self, commands: tuple[Command, ...]) -> None:
         for command in commands:
             match command:
-                case Perform(action):
+                case PerformAction(action):
                     self._perform(action)
                 case SendGain(setting):
                     radio = self._radio
                     radio.send(radio.profile.set_parameter(radio.aim, setting.parameter, setting.value))
                 case RestoreGains():
-                    self._advance(Restored(self._radio.clock.now_s(), self._restored()))
-                case Keep():
+                    self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
+                case RecordSample():
                     self._keep(command)
 
     def _perform(self, action: Action) -> None:
-        self._conversation = Conversation(action, self._radio.profile.steps(action, self._radio.aim), self._radio)
+        self._conversation = CommandSequence(action, self._radio.profile.steps(action, self._radio.aim), self._radio)
 
     def _restored(self) -> str:
         try:
@@ -167,7 +167,7 @@ class Flight:
             self._error = self._error or error
             return self._restore()
 
-    def _keep(self, kept: Keep) -> None:
+    def _keep(self, kept: RecordSample) -> None:
         self._samples.append(kept)
         start_s = self._trial.commanded_boot_s
         if start_s is None or self._error is not None:
@@ -190,7 +190,9 @@ def _spoken(error: BaseException) -> str:
     return f"the program failed ({type(error).__name__}: {error})"
 
 
-def in_order(heard: Sequence[Heard], sighted: Sequence[Sighted]) -> list[Heard | Sighted]:
+def in_order(
+    heard: Sequence[PacketReceived], sighted: Sequence[SecondaryAltitudeReceived]
+) -> list[PacketReceived | SecondaryAltitudeReceived]:
     """As they came: after a stall of this program, where the vehicle was seen then is not held against where it says
     that it is now."""
     return sorted((*heard, *sighted), key=lambda event: event.now_s)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.parameters import read_parameter, write_parameter
-from app.vehicles.mavlink.radio import Radio
+from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.signals import Setting
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class ChangedParameter:
     """What a parameter was before a trial, and what it was set to."""
 
     before: float
@@ -24,9 +24,9 @@ class TrialParameters:
     this process. A value is put back only if it is still the one that the trial set: any other, somebody has set since.
     """
 
-    def __init__(self, radio: Radio, file: Path | None = None) -> None:
+    def __init__(self, radio: AutopilotLink, file: Path | None = None) -> None:
         self._radio, self._file = radio, file
-        self._changed: dict[str, Changed] | None = None
+        self._changed: dict[str, ChangedParameter] | None = None
 
     def set(self) -> None:
         """Raises VehicleError when the vehicle does not tell what it has, or does not take what a take-off needs, or
@@ -36,7 +36,7 @@ class TrialParameters:
             if held is None:
                 raise _unset(setting)
             if held != setting.value:
-                self._keep({setting.parameter: Changed(held, setting.value)} | self._remembered())
+                self._keep({setting.parameter: ChangedParameter(held, setting.value)} | self._remembered())
                 if not self._write(setting):
                     raise _unset(setting)
 
@@ -59,25 +59,27 @@ class TrialParameters:
 
     # ---- beyond this process
 
-    def _remembered(self) -> dict[str, Changed]:
+    def _remembered(self) -> dict[str, ChangedParameter]:
         """What this process has changed, or one before it on a vehicle of this make and system id. Raises VehicleError
         when the file cannot be read."""
         if self._changed is None:
             self._changed = {} if self._file is None else self._read(self._file)
         return self._changed
 
-    def _read(self, file: Path) -> dict[str, Changed]:
+    def _read(self, file: Path) -> dict[str, ChangedParameter]:
         try:
             kept = json.loads(file.read_text(encoding="utf-8"))
             if kept["vehicle"] != self._vehicle():
                 return {}
-            return {str(name): Changed(float(one[0]), float(one[1])) for name, one in kept["parameters"].items()}
+            return {
+                str(name): ChangedParameter(float(one[0]), float(one[1])) for name, one in kept["parameters"].items()
+            }
         except FileNotFoundError:
             return {}
         except (OSError, ArithmeticError, ValueError, TypeError, LookupError, AttributeError) as error:
             raise _unusable(file, error) from error
 
-    def _keep(self, changed: dict[str, Changed]) -> None:
+    def _keep(self, changed: dict[str, ChangedParameter]) -> None:
         """On disk first. Raises VehicleError when it cannot be."""
         if self._file is not None:
             try:
@@ -86,7 +88,7 @@ class TrialParameters:
                 raise _unusable(self._file, error) from error
         self._changed = changed
 
-    def _store(self, file: Path, changed: dict[str, Changed]) -> None:
+    def _store(self, file: Path, changed: dict[str, ChangedParameter]) -> None:
         if not changed:
             file.unlink(missing_ok=True)
             return

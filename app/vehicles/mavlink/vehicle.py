@@ -8,27 +8,27 @@ from typing import Final
 
 from app.core.clock import Clock
 from app.core.policy import Gains
-from app.vehicles.base import CheckItem, Condition, FlightOrder, FlightRecord, Identity, Sample, ShouldStop
+from app.vehicles.base import CheckItem, Condition, FlightOptions, FlightRecord, Identity, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import parameters, preflight, records
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.gains import GainStore, written
-from app.vehicles.mavlink.gauges import Gauges
+from app.vehicles.mavlink.gauges import StatusReader
 from app.vehicles.mavlink.machine import Plan
 from app.vehicles.mavlink.opening import limits_of, open_radio
-from app.vehicles.mavlink.orders import StandingOrder
+from app.vehicles.mavlink.orders import RepeatedCommand
 from app.vehicles.mavlink.preflight import Ground
-from app.vehicles.mavlink.signals import Action, Heard, Keep
-from app.vehicles.mavlink.sources import Lookout, Source
-from app.vehicles.mavlink.states import IN_DOUBT, MOVES, State
+from app.vehicles.mavlink.signals import Action, PacketReceived, RecordSample
+from app.vehicles.mavlink.sources import AlignedAltitudeSource, AltitudeSource
+from app.vehicles.mavlink.states import MOVES, QUARANTINE_STATES, State
 from app.vehicles.mavlink.transports import LinkError, Transport
-from app.vehicles.mavlink.trial import Flight, Flown
+from app.vehicles.mavlink.trial import TrialResult, TrialRunner
 from app.vehicles.mavlink.trial_parameters import TrialParameters
-from app.vehicles.mocap.recording import Recorded, Scored, with_second
+from app.vehicles.mocap.recording import AlignedRecord, Scored, add_secondary_altitude
 
-STAND_S: Final = 1.0
+STANDSTILL_S: Final = 1.0
 """Watched once more before arming, for between staging and flying a person may have taken his time."""
 
 _LISTEN_S: Final = 0.1
@@ -57,7 +57,7 @@ class MavlinkVehicle:
         observes: bool = False,
         decided: bool = True,
         trial_parameters: Path | None = None,
-        source: Source | None = None,
+        source: AltitudeSource | None = None,
         transport: Transport | None = None,
     ) -> None:
         """Connect, wait for the vehicle (the one of that `identity`, where it is given), and write the safe gains, once
@@ -78,12 +78,12 @@ class MavlinkVehicle:
         self._why = self._asked = self._plan_problem = ""
         self._pinned = identity
         self._datum_m = 0.0
-        self._flight: Flight | None = None
-        self._order: StandingOrder | None = None
-        self._lookout = None if source is None else Lookout(source)
+        self._flight: TrialRunner | None = None
+        self._order: RepeatedCommand | None = None
+        self._lookout = None if source is None else AlignedAltitudeSource(source)
         overhear = None if source is None else source.hear
         self._radio = open_radio(options, clock, overhear=overhear, transport=transport)
-        self._gauges = Gauges(self._radio)
+        self._gauges = StatusReader(self._radio)
         try:
             self._gains = GainStore(self._radio, safe_gains)
             self._decided = decided
@@ -121,7 +121,7 @@ class MavlinkVehicle:
 
     def fly(
         self,
-        order: FlightOrder,  # noqa: ARG002 - the vehicle owns its time, and chance is its own
+        order: FlightOptions,  # noqa: ARG002 - the vehicle owns its time, and chance is its own
         *,
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
@@ -136,7 +136,7 @@ class MavlinkVehicle:
         try:
             self._require_trust()
             self._require_staged()
-            ground, stop = self._stand(STAND_S), should_stop()
+            ground, stop = self._stand(STANDSTILL_S), should_stop()
             if stop is None:
                 self._parameters.set()
         except BaseException as error:
@@ -169,7 +169,7 @@ class MavlinkVehicle:
     @property
     def concern(self) -> str:
         """Why it may only be observed; empty when it may fly."""
-        if self._state not in IN_DOUBT:
+        if self._state not in QUARANTINE_STATES:
             return ""
         return " ".join(part for part in (self._why, self._asked) if part)
 
@@ -224,12 +224,12 @@ class MavlinkVehicle:
     def land(self, reason: str) -> None:
         """Tell it to land, at once and whatever it says of itself. Raises VehicleError when it cannot be told."""
         self._asked = f"Land was asked for: {reason}."
-        self._order = StandingOrder(self._radio, Action.LAND)
+        self._order = RepeatedCommand(self._radio, Action.LAND)
 
     def motors_off(self, reason: str) -> None:
         """Stop its motors, at once and at any height."""
         self._asked = f"Motors off was asked for: {reason}."
-        self._order = StandingOrder(self._radio, Action.KILL)
+        self._order = RepeatedCommand(self._radio, Action.KILL)
 
     def log_to(self, path: Path | None) -> None:
         """Write what passes from now on, in both directions, to this telemetry log; None ends the log. Raises LinkError
@@ -243,7 +243,7 @@ class MavlinkVehicle:
         self._await_heartbeat()
         self._decided = True
         self._set_up()
-        if self._state in IN_DOUBT:
+        if self._state in QUARANTINE_STATES:
             self._enter(State.IDLE)
         self._pinned = self.identity
         self._why = self._asked = ""
@@ -252,11 +252,11 @@ class MavlinkVehicle:
     # ---- connecting
 
     def _connect(self) -> None:
-        preflight.meet(self._radio, str(self._options["address"]), self._pinned)
-        self._plan_problem = preflight.learn(self._radio)
+        preflight.await_vehicle(self._radio, str(self._options["address"]), self._pinned)
+        self._plan_problem = preflight.read_vehicle_info(self._radio)
         self._enter(State.PREFLIGHT)
         self._listen(0.0)
-        if self._state in IN_DOUBT:
+        if self._state in QUARANTINE_STATES:
             return
         try:
             self._set_up()
@@ -283,7 +283,7 @@ class MavlinkVehicle:
 
     def _require_ready(self) -> None:
         """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""
-        if self._state in IN_DOUBT:
+        if self._state in QUARANTINE_STATES:
             raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
         preflight.require(self.check())
 
@@ -298,12 +298,14 @@ class MavlinkVehicle:
                 raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
             self._listen(_LISTEN_S)
 
-    def _listen(self, timeout_s: float) -> list[Heard]:
+    def _listen(self, timeout_s: float) -> list[PacketReceived]:
         """Between flights: a vehicle that somebody else arms, or that tells another version than the pinned one, is
         only observed from then on."""
         heard = self._radio.listen(timeout_s)
-        why = preflight.ARMED if preflight.is_armed(self._radio) else preflight.changed(self._radio, self._pinned)
-        if why and self._state not in IN_DOUBT:
+        why = (
+            preflight.ARMED if preflight.is_armed(self._radio) else preflight.identity_change(self._radio, self._pinned)
+        )
+        if why and self._state not in QUARANTINE_STATES:
             self._observe(why)
         return heard
 
@@ -323,32 +325,32 @@ class MavlinkVehicle:
         self._require_trust()
         return watched.ground
 
-    def _check(self, watched_s: float) -> tuple[preflight.Watched, tuple[CheckItem, ...]]:
-        if not preflight.is_armed(self._radio) and self._state not in IN_DOUBT:
+    def _check(self, watched_s: float) -> tuple[preflight.GroundObservation, tuple[CheckItem, ...]]:
+        if not preflight.is_armed(self._radio) and self._state not in QUARANTINE_STATES:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)
-        watched = preflight.watch(self._radio, self._lookout, watched_s=watched_s)
+        watched = preflight.observe(self._radio, self._lookout, watched_s=watched_s)
         self._listen(0.0)
-        if self._state not in IN_DOUBT:
+        if self._state not in QUARANTINE_STATES:
             preflight.confirm_stop(self._radio, watched)
         minimum_v = float(self._options["min_battery_v"])
-        items = preflight.judge(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
+        items = preflight.evaluate_items(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if self._lookout is not None:
-            items = (*items, preflight.judge_source(self._lookout, watched))
+            items = (*items, preflight.evaluate_secondary(self._lookout, watched))
         return watched, (*items, self._gains.check())
 
-    def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> Flown:
+    def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> TrialResult:
         last = ground.last
         self._radio.aim = replace(self._radio.aim, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
         plan = self._plan(ground)
         self._gains.staged = self._order = None
         watch = watching.begin(
-            self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STAND_S
+            self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S
         )
         if self._lookout is not None:
             self._lookout.begin(ground.seen_m, ground.altitude_m)
-        self._flight = Flight(
+        self._flight = TrialRunner(
             self._radio,
             plan,
             watch,
@@ -374,7 +376,7 @@ class MavlinkVehicle:
         by_hand = heartbeat is not None and heartbeat.mode in self._radio.profile.manual_modes
         if not by_hand and not self._radio.is_disarmed:
             with suppress(LinkError):
-                self._order = StandingOrder(self._radio, Action.LAND)
+                self._order = RepeatedCommand(self._radio, Action.LAND)
 
     def _plan(self, ground: Ground) -> Plan:
         profile = self._radio.profile
@@ -392,12 +394,12 @@ class MavlinkVehicle:
     def _give_back(self) -> None:
         """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified. One
         that is armed by now keeps what it has, and is observed."""
-        if self._state in IN_DOUBT:
+        if self._state in QUARANTINE_STATES:
             return
         try:
             self.restore()
         except VehicleError as error:
-            if self._state not in IN_DOUBT:
+            if self._state not in QUARANTINE_STATES:
                 self._enter(State.QUARANTINE)
                 self._why = f"Its safe gains could not be verified: {error}"
 
@@ -407,7 +409,7 @@ class MavlinkVehicle:
     def _scored(self) -> Scored:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
-    def _record(self, flown: Flown, ground: Ground) -> FlightRecord:
+    def _record(self, flown: TrialResult, ground: Ground) -> FlightRecord:
         """Raises VehicleError when the vehicle was never told to take off, for another reason than the operator's."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
         reason = records.reason_of(trial)
@@ -417,10 +419,12 @@ class MavlinkVehicle:
             refusal = VehicleError(reason, hint="Look at the vehicle, correct this, then fly again.")
             refusal.not_flown = True
             raise refusal
-        both = Recorded(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
+        both = AlignedRecord(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
         if self._lookout is not None:
             zero_s, name = start_s + flown.offset_s, self._lookout.source.name
-            both = with_second(both.trajectory, self._lookout.seen, name=name, zero_s=zero_s, scored=self._scored)
+            both = add_secondary_altitude(
+                both.trajectory, self._lookout.seen, name=name, zero_s=zero_s, scored=self._scored
+            )
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
@@ -430,7 +434,7 @@ class MavlinkVehicle:
 
     def _not_begun(self, ground: Ground, reason: str) -> FlightRecord:
         """Aborted before anything was commanded: the one instant on the ground."""
-        sample = Keep(ground.last, ground.altitude_m, self._radio.seen.battery_v)
+        sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
         return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=self._options)
 

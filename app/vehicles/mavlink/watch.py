@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from app.vehicles.mavlink import agreement
-from app.vehicles.mavlink.agreement import Second
+from app.vehicles.mavlink.agreement import SecondaryAltitude
 from app.vehicles.mavlink.limits import GROUND_M, Limits
 from app.vehicles.mavlink.measurements import (
     Battery,
     BlockEntered,
-    Breach,
+    FenceBreach,
     Heartbeat,
     LandedState,
     Measurement,
     Position,
 )
-from app.vehicles.mavlink.signals import Sighted
+from app.vehicles.mavlink.signals import SecondaryAltitudeReceived
 
 RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
@@ -34,7 +34,7 @@ _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
 _MOST_GLITCHES: Final = 3
-_RESTLESS: Final = 10.0
+_DOUBTED_LIMIT: Final = 10.0
 _RESTLESS_DRAINS_S: Final = 5.0
 """Doubted samples a second that are borne; ten more than that, and the position jumps to and fro."""
 _AHEAD_S: Final = 2.0
@@ -57,7 +57,7 @@ class OtherClock:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Watch:
+class TrialObservation:
     """What was heard so far. Times in s by the ground's clock, apart from those inside a Position.
 
     `heard_s`: any packet; `advanced_s`: a position with a new time stamp; `accepted_s`: one that was not doubted.
@@ -93,7 +93,7 @@ class Watch:
     grounded_since_s: float | None = None
     lifted: bool = False
     """Whether it was ever above the ground."""
-    second: Second | None = None
+    second: SecondaryAltitude | None = None
     rebooted: bool = False
     breached: str = ""
     """Which limit of its own fence it has crossed; empty while none."""
@@ -101,9 +101,11 @@ class Watch:
     """Why it is believed that two speak under its id; empty while one does."""
 
 
-def begin(now_s: float, *, last: Position | None = None, battery_v: float | None = None, stood_s: float = 0.0) -> Watch:
+def begin(
+    now_s: float, *, last: Position | None = None, battery_v: float | None = None, stood_s: float = 0.0
+) -> TrialObservation:
     """Nothing is late yet. `last` is where the vehicle stands, and was watched standing for `stood_s`."""
-    return Watch(
+    return TrialObservation(
         heard_s=now_s,
         heartbeat_s=now_s,
         advanced_s=now_s,
@@ -116,15 +118,15 @@ def begin(now_s: float, *, last: Position | None = None, battery_v: float | None
     )
 
 
-def reset_altitude(watch: Watch) -> Watch:
+def reset_altitude(watch: TrialObservation) -> TrialObservation:
     """The memory of a vehicle on the ground whose altitude begins anew: what it was before says nothing any more."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
     return replace(watch, leapt=False, lifted=False, side=-1, crossings=0, second=second)
 
 
-def hear(
-    watch: Watch, measurement: Measurement | None, now_s: float, limits: Limits
-) -> tuple[Watch, tuple[Position, ...]]:
+def update(
+    watch: TrialObservation, measurement: Measurement | None, now_s: float, limits: Limits
+) -> tuple[TrialObservation, tuple[Position, ...]]:
     """The memory after one packet (None: one that measures nothing), and the positions that it makes certain."""
     stuck_s = watch.stuck_s + min(now_s - watch.heard_s, _ATTENDED_S)
     watch = replace(watch, heard_s=now_s, stuck_s=stuck_s)
@@ -137,7 +139,7 @@ def hear(
             low = volts < limits.min_battery_v
             since = (watch.low_since_s if watch.low_since_s is not None else now_s) if low else None
             watch = replace(watch, battery_v=volts, battery_s=now_s, low_since_s=since)
-        case Breach(limit=limit):
+        case FenceBreach(limit=limit):
             watch = replace(watch, breached=limit or "some limit")
         case LandedState(on_ground=landed):
             watch = replace(watch, landed=landed, landed_s=now_s)
@@ -148,14 +150,14 @@ def hear(
     return watch, ()
 
 
-def sight(watch: Watch, sighted: Sighted) -> Watch:
+def sight(watch: TrialObservation, sighted: SecondaryAltitudeReceived) -> TrialObservation:
     """The memory after the second source of altitude spoke."""
-    second = watch.second or Second(heard_s=sighted.now_s)
+    second = watch.second or SecondaryAltitude(heard_s=sighted.now_s)
     vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sighted.now_s) else None
-    return replace(watch, second=agreement.sight(second, sighted, vehicle_m))
+    return replace(watch, second=agreement.update(second, sighted, vehicle_m))
 
 
-def settle(watch: Watch, now_s: float, ground_m: float) -> Watch:
+def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObservation:
     """Note since when every witness has it on the ground: its own position by height and speed, what it says of itself,
     and the second source. A lone sample that jumps says nothing either way."""
     if watch.doubted is not None and is_fresh(watch, now_s):
@@ -166,56 +168,56 @@ def settle(watch: Watch, now_s: float, ground_m: float) -> Watch:
     return replace(watch, grounded_since_s=since_s if grounded else None)
 
 
-def _is_contradicted(watch: Watch, now_s: float, ground_m: float) -> bool:
+def _is_contradicted(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """What it says of itself counts once it has flown: one that was told to climb may believe that it does."""
     says_flying = watch.lifted and watch.landed is False and now_s - watch.landed_s < AGREED_S
-    seen_m = agreement.seen_m(watch.second, now_s)
+    seen_m = agreement.current_altitude_m(watch.second, now_s)
     return says_flying or (seen_m is not None and seen_m - ground_m > GROUND_M)
 
 
 # ---- what may be believed
 
 
-def too_many_glitches(watch: Watch) -> bool:
+def too_many_glitches(watch: TrialObservation) -> bool:
     return watch.glitches > _MOST_GLITCHES
 
 
-def is_restless(watch: Watch) -> bool:
-    return watch.restless > _RESTLESS
+def has_unreliable_position(watch: TrialObservation) -> bool:
+    return watch.restless > _DOUBTED_LIMIT
 
 
-def is_fresh(watch: Watch, now_s: float) -> bool:
+def is_fresh(watch: TrialObservation, now_s: float) -> bool:
     return watch.last is not None and now_s - watch.accepted_s < FRESH_S
 
 
-def is_still(watch: Watch, now_s: float, ground_m: float, *, within_m: float = _DRIFT_M) -> bool:
+def is_still(watch: TrialObservation, now_s: float, ground_m: float, *, within_m: float = _DRIFT_M) -> bool:
     """Neither climbing nor sinking so near to the ground, as a fresh sample has it."""
     last = watch.last
     low = last is not None and last.altitude_m - ground_m < within_m
     return low and last is not None and is_fresh(watch, now_s) and abs(last.climb_rate_m_s) < RESTING_M_S
 
 
-def is_grounded(watch: Watch, now_s: float, ground_m: float) -> bool:
+def is_grounded(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """On the ground by height and by speed, as a fresh sample has it."""
     return watch.doubted is None and is_still(watch, now_s, ground_m, within_m=GROUND_M)
 
 
-def is_airborne(watch: Watch, now_s: float, ground_m: float) -> bool:
+def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """Above the ground by height, as a fresh sample has it."""
     return watch.last is not None and is_fresh(watch, now_s) and watch.last.altitude_m - ground_m > GROUND_M
 
 
-def is_disarmed(watch: Watch, limits: Limits) -> bool:
+def is_disarmed(watch: TrialObservation, limits: Limits) -> bool:
     """By two heartbeats at least, and none between them that says otherwise."""
     return not watch.armed and watch.heartbeat_s - watch.armed_since_s >= limits.witness_s
 
 
-def mode_of(watch: Watch, limits: Limits) -> str:
+def mode_of(watch: TrialObservation, limits: Limits) -> str:
     """The mode that heartbeats agree upon; empty while they do not."""
     return watch.mode if watch.heartbeat_s - watch.mode_since_s >= limits.witness_s else ""
 
 
-def may_stop(watch: Watch, now_s: float) -> bool:
+def may_stop_motors(watch: TrialObservation, now_s: float) -> bool:
     """Whether its motors may be stopped without a person's word: every witness has had it on the ground for a second,
     and where it is has never leapt there."""
     since_s = watch.grounded_since_s
@@ -226,7 +228,7 @@ def may_stop(watch: Watch, now_s: float) -> bool:
 # ---- positions and heartbeats
 
 
-def _hear_heartbeat(watch: Watch, heartbeat: Heartbeat, now_s: float) -> Watch:
+def _hear_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float) -> TrialObservation:
     return replace(
         watch,
         heartbeat_s=now_s,
@@ -238,8 +240,8 @@ def _hear_heartbeat(watch: Watch, heartbeat: Heartbeat, now_s: float) -> Watch:
 
 
 def _hear_position(
-    watch: Watch, position: Position, now_s: float, limits: Limits
-) -> tuple[Watch, tuple[Position, ...]]:
+    watch: TrialObservation, position: Position, now_s: float, limits: Limits
+) -> tuple[TrialObservation, tuple[Position, ...]]:
     last, doubted = watch.last, watch.doubted
     newest = doubted or last
     if newest is not None:
@@ -262,7 +264,7 @@ def _hear_position(
     return replace(watch, doubted=position, glitches=watch.glitches + 1), ()
 
 
-def _hear_other_clock(watch: Watch, position: Position, now_s: float, newest: Position) -> Watch:
+def _hear_other_clock(watch: TrialObservation, position: Position, now_s: float, newest: Position) -> TrialObservation:
     """Late, repeated, or ahead: out of order. Only a clock that fell back and goes on from there by itself, with
     nothing more from the one before, is that of a vehicle that has rebooted."""
     other = watch.other
@@ -296,7 +298,7 @@ def _leaps(one: Position, other: Position) -> bool:
     return abs(off_m) > _JUMP_M + 0.5 * _ACCELERATION_M_S2 * elapsed_s**2
 
 
-def _accept(watch: Watch, position: Position, now_s: float, limits: Limits) -> Watch:
+def _accept(watch: TrialObservation, position: Position, now_s: float, limits: Limits) -> TrialObservation:
     above_m = position.altitude_m - limits.set_point_m
     side = watch.side if abs(above_m) <= limits.crossing_m else (1 if above_m > 0.0 else -1)
     crossed = watch.crossings + (side != watch.side)

@@ -1,13 +1,13 @@
 """Opens the second source of altitude that a text names."""
 
 from app.core.clock import Clock
-from app.vehicles.mavlink.sources import Source
+from app.vehicles.mavlink.sources import AltitudeSource
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, StreamAddress, parse
 from app.vehicles.mocap.natnet import NatNetSource
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource
 
 
-def open_source(text: str, clock: Clock) -> Source:
+def open_source(text: str, clock: Clock) -> AltitudeSource:
     """Raises InputError for a text that names none, VehicleError when nothing is heard there; what the vehicle's own
     link is to bring is not waited for."""
     match parse(text):

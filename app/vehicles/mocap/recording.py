@@ -22,7 +22,7 @@ _STEPPED: Final = ("set_point_m",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recorded:
+class AlignedRecord:
     """`settings` tell delay and differences of the two sources, `remark` what a person has to know of them: empty when
     all is well."""
 
@@ -31,9 +31,9 @@ class Recorded:
     remark: str = ""
 
 
-def with_second(
+def add_secondary_altitude(
     trajectory: Trajectory, seen: Sequence[tuple[float, float]], *, name: str, zero_s: float, scored: Scored
-) -> Recorded:
+) -> AlignedRecord:
     """The vehicle's own record with what the second source, `name`, saw of the flight: when each sighting was received,
     s, and the altitude, m, on any datum; `zero_s` is the record's time 0 on the clock of the receipts. Where `mocap` is
     scored the record runs on its times, and the vehicle's own altitude is `altitude_2_m`; else the other way round. A
@@ -42,7 +42,7 @@ def with_second(
     inside = (other_s >= trajectory.time_s[0]) & (other_s <= trajectory.time_s[-1])
     if np.count_nonzero(inside) < 2:
         unseen = f"Nothing was seen by {name}, the second source of altitude; the vehicle's own is scored."
-        return Recorded(trajectory=trajectory, remark=unseen)
+        return AlignedRecord(trajectory=trajectory, remark=unseen)
     alignment, remarks = _aligned(trajectory, other_s, other_m)
     second_m = resample(trajectory.time_s, other_s, other_m, alignment)
     covered = (trajectory.time_s + alignment.delay_s >= other_s[0]) & (
@@ -66,7 +66,7 @@ def with_second(
         "second_largest_m": round(apart.largest_m, 4),
         "second_rms_m": round(apart.rms_m, 4),
     }
-    return Recorded(trajectory=both, settings=settings, remark=" ".join(remarks))
+    return AlignedRecord(trajectory=both, settings=settings, remark=" ".join(remarks))
 
 
 def _rising(seen: Sequence[tuple[float, float]], zero_s: float) -> tuple[Samples, Samples]:

@@ -15,7 +15,7 @@ _RESTART_S: Final = 1.0
 """A source whose clock goes back by so much has started anew; by less, a packet came late."""
 
 
-class Arrivals:
+class ClockOffset:
     """A source's time stamps on our clock, as if every message had travelled as fast as the fastest of the last minute:
     without what the network and a busy computer hold back."""
 
@@ -45,7 +45,7 @@ class PoseStream:
 
     def __init__(self) -> None:
         self._samples: deque[SourceSample] = deque(maxlen=KEPT)
-        self._arrivals = Arrivals()
+        self._arrivals = ClockOffset()
         self._time_s = float("-inf")
         self._pose: tuple[float, ...] = ()
         self.newest: SourceSample | None = None

@@ -11,7 +11,7 @@ from typing import Final, Protocol
 from app.vehicles.mavlink.dialects import COMMON, FieldValue
 from app.vehicles.mavlink.transports import LinkError, Transport, open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, SourceAddress, StreamAddress
-from app.vehicles.simdrone.autopilots.base import Letter
+from app.vehicles.simdrone.autopilots.base import OutgoingMessage
 
 RATE_HZ: Final = 100.0
 NOISE_M: Final = 0.001
@@ -30,7 +30,7 @@ _COMPONENT: Final = 197
 
 
 @dataclass(frozen=True, slots=True)
-class Glimpse:
+class MocapFrame:
     """What the cameras saw once: the body's place, x north, y east, z up, and when by their own clock."""
 
     frame: int
@@ -39,12 +39,12 @@ class Glimpse:
     tracked: bool
 
 
-class Cameras:
+class MotionCapture:
     """Look 100 times a second, and say it 20 ms later."""
 
     def __init__(self, seed: int = 1) -> None:
         self._random = random.Random(seed)  # noqa: S311  noise
-        self._late: deque[Glimpse] = deque()
+        self._late: deque[MocapFrame] = deque()
         self._frame = 0
         self._drift_m = 0.0
         self.blind = False
@@ -53,9 +53,9 @@ class Cameras:
         """A fault: the last frame is sent again and again."""
         self.drifts = False
         """A fault: the altitude goes away from the true one, by 0.1 m/s."""
-        self._last = Glimpse(0, 0.0, (0.0, 0.0, 0.0), tracked=False)
+        self._last = MocapFrame(0, 0.0, (0.0, 0.0, 0.0), tracked=False)
 
-    def look(self, time_s: float, altitude_m: float) -> list[Glimpse]:
+    def look(self, time_s: float, altitude_m: float) -> list[MocapFrame]:
         """What is said in the tick that ends at `time_s`; the body stands or hovers over one spot."""
         frame = int(time_s * RATE_HZ)
         if frame > self._frame:
@@ -66,44 +66,46 @@ class Cameras:
             due.append(self._late.popleft())
         return [self._last] * len(due) if self.stuck else due
 
-    def _see(self, time_s: float, altitude_m: float) -> Glimpse:
+    def _see(self, time_s: float, altitude_m: float) -> MocapFrame:
         self._drift_m += DRIFT_M_S / RATE_HZ if self.drifts else 0.0
         x, y, noise = (self._random.gauss(0.0, NOISE_M) for _ in range(3))
         seen = (x, y, altitude_m + self._drift_m + noise)
-        glimpse = Glimpse(self._frame, time_s, self._last.position_m if self.blind else seen, not self.blind)
+        glimpse = MocapFrame(self._frame, time_s, self._last.position_m if self.blind else seen, not self.blind)
         self._last = self._last if self.stuck else glimpse
         return glimpse
 
 
-class Outlet(Protocol):
+class MocapOutput(Protocol):
     """Says what the cameras saw."""
 
-    def say(self, glimpses: Sequence[Glimpse]) -> list[Letter]:
+    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         """Send it; what is to go over the drone's own link is returned."""
         ...
 
     def close(self) -> None: ...
 
 
-class OwnLink:
+class VehicleLinkOutput:
     """VISION_POSITION_ESTIMATE among the drone's own messages, as every version of MAVLink carries it; it cannot say
     that the body is not tracked, so nothing is said then."""
 
-    def say(self, glimpses: Sequence[Glimpse]) -> list[Letter]:
-        return [Letter("VISION_POSITION_ESTIMATE", _vision(each), "cameras") for each in glimpses if each.tracked]
+    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+        return [
+            OutgoingMessage("VISION_POSITION_ESTIMATE", _vision(each), "cameras") for each in glimpses if each.tracked
+        ]
 
     def close(self) -> None:
         """Nothing was opened."""
 
 
-class Stream:
+class OdometryOutput:
     """ODOMETRY on a link of its own."""
 
     def __init__(self, address: StreamAddress) -> None:
         self._transport: Transport = open_transport(address.link)
         self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
 
-    def say(self, glimpses: Sequence[Glimpse]) -> list[Letter]:
+    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         for glimpse in glimpses:
             self._transport.write(self._codec.pack(COMMON.message("ODOMETRY", _odometry(glimpse))))
         return []
@@ -132,7 +134,7 @@ class NatNetServer:
         group = (address.multicast, address.data_port)
         self._listeners: set[tuple[str, int]] = {group} if address.multicast else set()
 
-    def say(self, glimpses: Sequence[Glimpse]) -> list[Letter]:
+    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         self._answer()
         for glimpse in glimpses:
             packet = frame_packet(glimpse, self._address.body, up=self._address.up)
@@ -161,15 +163,15 @@ class NatNetServer:
             self._listeners.discard(listener)
 
 
-def open_outlet(address: SourceAddress) -> Outlet:
+def open_outlet(address: SourceAddress) -> MocapOutput:
     """Raises LinkError when it cannot be opened."""
     match address:
         case NatNetAddress():
             return NatNetServer(address)
         case OdometryAddress():
-            return OwnLink()
+            return VehicleLinkOutput()
         case StreamAddress():
-            return Stream(address)
+            return OdometryOutput(address)
 
 
 def server_packet(version: Version) -> bytes:
@@ -177,7 +179,7 @@ def server_packet(version: Version) -> bytes:
     return _packet(_SERVER_INFO, struct.pack("<256s4B4BQ", b"Gainline sim-drone", 3, 1, 0, 0, *version, _TICKS_HZ))
 
 
-def frame_packet(glimpse: Glimpse, body: int, *, up: str) -> bytes:
+def frame_packet(glimpse: MocapFrame, body: int, *, up: str) -> bytes:
     """NAT_FRAMEOFDATA of NatNet 4.1: every list with its count and its size in bytes, only that of bodies filled."""
     north, east, height = glimpse.position_m
     place = (north, height, east) if up == "y" else (north, -east, height)
@@ -193,12 +195,12 @@ def _packet(kind: int, payload: bytes) -> bytes:
     return struct.pack("<HH", kind, len(payload)) + payload
 
 
-def _vision(glimpse: Glimpse) -> dict[str, FieldValue]:
+def _vision(glimpse: MocapFrame) -> dict[str, FieldValue]:
     x, y, z = glimpse.position_m
     return {"usec": round(glimpse.time_s * 1e6), "x": x, "y": y, "z": -z, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
 
 
-def _odometry(glimpse: Glimpse) -> dict[str, FieldValue]:
+def _odometry(glimpse: MocapFrame) -> dict[str, FieldValue]:
     x, y, z = glimpse.position_m
     unknown = [float("nan"), *(0.0 for _ in range(20))]
     still = dict.fromkeys(("vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed"), 0.0)

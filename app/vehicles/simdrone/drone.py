@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from app.vehicles.mavlink.dialects import Codec
-from app.vehicles.simdrone.autopilots.base import Autopilot, Letter
+from app.vehicles.simdrone.autopilots.base import Autopilot, OutgoingMessage
 from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body
-from app.vehicles.simdrone.cameras import Cameras, Outlet
-from app.vehicles.simdrone.faults import Faults, Planned
+from app.vehicles.simdrone.cameras import MocapOutput, MotionCapture
+from app.vehicles.simdrone.faults import Faults, PlannedFault
 
 BOOT_S: Final = 2.0
 """Silence after a reboot."""
@@ -21,11 +21,11 @@ class Drone:
         self,
         body: Body,
         switch_on: Callable[[Body], Autopilot],
-        faults: Sequence[Planned] = (),
-        outlet: Outlet | None = None,
+        faults: Sequence[PlannedFault] = (),
+        outlet: MocapOutput | None = None,
     ) -> None:
         self.body = body
-        self.cameras = Cameras()
+        self.cameras = MotionCapture()
         self._outlet = outlet
         self.autopilot = switch_on(body)
         self._switch_on = switch_on
@@ -42,7 +42,7 @@ class Drone:
 
     def afflict(self, fault: str, duration_s: float = float("inf")) -> None:
         """Let a fault of `FAULTS` set in with the next tick."""
-        self._faults.add(Planned(fault, None, self.time_s + duration_s))
+        self._faults.add(PlannedFault(fault, None, self.time_s + duration_s))
 
     def receive(self, data: bytes) -> None:
         """What came over the link."""
@@ -71,7 +71,7 @@ class Drone:
         self._codecs.clear()
         self._silent_until_s = self.time_s + BOOT_S
 
-    def _packed(self, letter: Letter) -> bytes:
+    def _packed(self, letter: OutgoingMessage) -> bytes:
         system = letter.system or self.autopilot.system
         key = (letter.counter, system)
         if key not in self._codecs:

@@ -8,9 +8,9 @@ from typing import ClassVar, Final, Protocol
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
 from app.vehicles.mavlink.dialects import FieldValue
-from app.vehicles.simdrone.autopilots.base import Autopilot, Letter
+from app.vehicles.simdrone.autopilots.base import Autopilot, OutgoingMessage
 from app.vehicles.simdrone.body import Body
-from app.vehicles.simdrone.cameras import Cameras
+from app.vehicles.simdrone.cameras import MotionCapture
 
 CONNECT: Final = "connect"
 FORM: Final = "NAME[:DURATION]@T, T in seconds after the takeoff command, or NAME[:DURATION]@connect"
@@ -24,12 +24,12 @@ _SWAP_EVERY: Final = 4
 _WRONG_SYSTEM: Final = 77
 
 
-class Afflicted(Protocol):
+class FaultTarget(Protocol):
     """What a fault can reach."""
 
     body: Body
     autopilot: Autopilot
-    cameras: Cameras
+    cameras: MotionCapture
 
     def reboot(self) -> None: ...
 
@@ -39,13 +39,13 @@ class Fault:
 
     name: ClassVar[str]
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         """Called when the fault sets in."""
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         """Called when it is over."""
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         """What becomes of the messages of one tick."""
         return list(letters)
 
@@ -64,7 +64,7 @@ class NoHeartbeat(Fault):
 
     name = "no-heartbeat"
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [letter for letter in letters if letter.kind != "HEARTBEAT"]
 
 
@@ -73,10 +73,10 @@ class ParamUnconfirmed(Fault):
 
     name = "param-unconfirmed"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.autopilot.ignores_parameters = True
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         drone.autopilot.ignores_parameters = False
 
 
@@ -85,10 +85,10 @@ class ArmRefused(Fault):
 
     name = "arm-refused"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.autopilot.refuses_arming = True
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         drone.autopilot.refuses_arming = False
 
 
@@ -97,10 +97,10 @@ class NoLiftOff(Fault):
 
     name = "no-lift-off"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.body.motors_dead = True
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         drone.body.motors_dead = False
 
 
@@ -122,9 +122,9 @@ class FrozenPosition(Fault):
     """Packets arrive, but those of the position repeat the last one, its time too."""
 
     name: ClassVar[str] = "frozen-position"
-    _held: dict[str, Letter] = field(default_factory=dict)
+    _held: dict[str, OutgoingMessage] = field(default_factory=dict)
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [
             self._held.setdefault(letter.kind, letter) if letter.kind in _POSITIONS else letter for letter in letters
         ]
@@ -137,10 +137,10 @@ class JumpingPosition(Fault):
     name: ClassVar[str] = "jumping-position"
     _count: int = 0
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [self._jumped(letter) for letter in letters]
 
-    def _jumped(self, letter: Letter) -> Letter:
+    def _jumped(self, letter: OutgoingMessage) -> OutgoingMessage:
         z = letter.fields.get("z")
         if letter.kind != "LOCAL_POSITION_NED" or not isinstance(z, int | float):
             return letter
@@ -154,7 +154,7 @@ class LowBattery(Fault):
 
     name = "low-battery"
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [replace(letter, fields=_drained(letter.fields)) for letter in letters]
 
 
@@ -164,7 +164,7 @@ class Reboot(Fault):
 
     name = "reboot"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.reboot()
 
 
@@ -208,7 +208,7 @@ class WrongSystem(Fault):
 
     name = "wrong-system"
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [replace(letter, system=_WRONG_SYSTEM) for letter in letters]
 
 
@@ -217,10 +217,10 @@ class MocapLost(Fault):
 
     name = "mocap-lost"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.cameras.blind = True
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         drone.cameras.blind = False
 
 
@@ -229,10 +229,10 @@ class MocapFrozen(Fault):
 
     name = "mocap-frozen"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.cameras.stuck = True
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         drone.cameras.stuck = False
 
 
@@ -241,10 +241,10 @@ class MocapDrift(Fault):
 
     name = "mocap-drift"
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         drone.cameras.drifts = True
 
-    def end(self, drone: Afflicted) -> None:
+    def end(self, drone: FaultTarget) -> None:
         drone.cameras.drifts = False
 
 
@@ -273,7 +273,7 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedFault:
     """A fault and when: `start_s` after the takeoff command, None from the beginning; infinite: for good."""
 
     fault: str
@@ -287,7 +287,7 @@ class Planned:
         return takeoff_s is not None and 0.0 <= now_s - takeoff_s - self.start_s < self.duration_s
 
 
-def parse_fault(text: str) -> Planned:
+def parse_fault(text: str) -> PlannedFault:
     """What `FORM` writes. Raises InputError saying what is wrong."""
     what, at, when = text.partition("@")
     name, colon, duration = what.partition(":")
@@ -296,23 +296,23 @@ def parse_fault(text: str) -> Planned:
     if not at:
         raise _unusable(f"must say when: {FORM}")
     start_s = None if when == CONNECT else _seconds(when)
-    return Planned(name, start_s, _seconds(duration)) if colon else Planned(name, start_s)
+    return PlannedFault(name, start_s, _seconds(duration)) if colon else PlannedFault(name, start_s)
 
 
 class Faults:
     """The faults planned for one drone, and which of them are at work."""
 
-    def __init__(self, planned: Sequence[Planned]) -> None:
-        self._waiting: list[tuple[Planned, Fault]] = []
-        self._working: list[tuple[Planned, Fault]] = []
+    def __init__(self, planned: Sequence[PlannedFault]) -> None:
+        self._waiting: list[tuple[PlannedFault, Fault]] = []
+        self._working: list[tuple[PlannedFault, Fault]] = []
         for plan in planned:
             self.add(plan)
 
-    def add(self, plan: Planned) -> None:
+    def add(self, plan: PlannedFault) -> None:
         """One more, even while the drone flies."""
         self._waiting.append((plan, FAULTS[plan.fault]()))
 
-    def update(self, now_s: float, takeoff_s: float | None, drone: Afflicted) -> None:
+    def update(self, now_s: float, takeoff_s: float | None, drone: FaultTarget) -> None:
         """Let those begin whose time has come, and those end whose time is over; none comes twice."""
         for entry in [each for each in self._waiting if each[0].is_active(now_s, takeoff_s)]:
             self._waiting.remove(entry)
@@ -326,7 +326,7 @@ class Faults:
     def is_deaf(self) -> bool:
         return any(fault.is_deaf for _, fault in self._working)
 
-    def letters(self, letters: list[Letter]) -> list[Letter]:
+    def letters(self, letters: list[OutgoingMessage]) -> list[OutgoingMessage]:
         for _, fault in self._working:
             letters = fault.letters(letters)
         return letters

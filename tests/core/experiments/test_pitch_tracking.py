@@ -7,7 +7,7 @@ from app.core.experiments import get_experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.plants.f16 import A, B, perturbed
 from app.core.plants.pitch import transitions
-from app.core.spread import before_flight
+from app.core.spread import prior_distribution
 from app.core.strategies.simplex import model_optimum
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from tests.core.flying import compiled_only
@@ -130,4 +130,4 @@ def test_without_the_commands_a_record_tells_nothing_about_single_steps() -> Non
 
 
 def test_no_hazard_is_known_beside_the_bounds() -> None:
-    assert TRUTH.hazards(HAND, before_flight(TRUTH), Envelope(ceiling_m=4.5, safe_gains={})) == ()
+    assert TRUTH.hazards(HAND, prior_distribution(TRUTH), Envelope(ceiling_m=4.5, safe_gains={})) == ()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.core.advice import advise
-from app.core.calibration import known
+from app.core.calibration import known_distribution
 from app.core.checking import check_definition, problems_of
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.experiments import get_experiment
@@ -16,7 +16,7 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.gate import check_policy
 from app.core.policy import Gains
 from app.core.proposing import next_proposal
-from app.core.stopping import judge
+from app.core.stopping import evaluate_stop_rule
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Proposal
 from app.core.trajectory import Trajectory
@@ -116,7 +116,7 @@ def test_a_campaign_by_hand_proposes_the_start_and_then_the_best_flown_and_predi
     then = next_proposal(BY_HAND, FLOWN)
     assert said(then) == ("manual", FIRMER)
     assert "The best so far are those of flight 2" in then.explanation.summary
-    assert advise(BY_HAND, PX4, FLOWN, then, judge(BY_HAND, FLOWN, then)).kind == "step"
+    assert advise(BY_HAND, PX4, FLOWN, then, evaluate_stop_rule(BY_HAND, FLOWN, then)).kind == "step"
 
 
 def test_a_warm_start_takes_the_others_gains_and_nothing_else() -> None:
@@ -160,5 +160,5 @@ def test_the_gate_holds_gains_to_bounds_and_steps_and_simulates_nothing() -> Non
 
 
 def test_of_a_vehicle_without_a_model_nothing_is_known_however_often_it_flew() -> None:
-    assert known(PX4, FLOWN).mean == ()
-    assert known(PX4, ()).origin == "nothing: there is no model"
+    assert known_distribution(PX4, FLOWN).mean == ()
+    assert known_distribution(PX4, ()).origin == "nothing: there is no model"

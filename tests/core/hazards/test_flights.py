@@ -12,8 +12,8 @@ from app.core.hazards.flights import (
     MODELS,
     abort_steps,
     check_flights,
+    divergence_distance,
     fly_runs,
-    gone_astray,
     undamped_swing,
 )
 from app.core.hazards.kernels import (
@@ -26,8 +26,8 @@ from app.core.hazards.kernels import (
     report_swings,
 )
 from app.core.policy import Gains
-from app.core.spread import Spread, before_flight
-from app.vehicles.base import FlightOrder, Stop
+from app.core.spread import ParameterDistribution, prior_distribution
+from app.vehicles.base import FlightOptions, StopRequest
 from app.vehicles.open import open_vehicle
 from tests.core.flying import TAKEOFF, compiled_only
 
@@ -52,19 +52,25 @@ GOOD = [
 """Tables 1 and 2 of the paper but for what can wrap; the best of the twin, of a calibrated model, of the nominal."""
 
 
-def around(hover: float, *, lag_s: float = 0.05, within: float = 0.3) -> Spread:
+def around(hover: float, *, lag_s: float = 0.05, within: float = 0.3) -> ParameterDistribution:
     """A vehicle known about as well as one flight tells."""
     mean = TAKEOFF.nominal_model
     mean[0], mean[2] = hover, lag_s
     sd = np.array([within * parameter.known_within / 2.0 for parameter in TAKEOFF.model_parameters])
-    return Spread(mean=tuple(mean.tolist()), covariance=tuple(map(tuple, np.diag(sd**2).tolist())), origin="test")
+    return ParameterDistribution(
+        mean=tuple(mean.tolist()), covariance=tuple(map(tuple, np.diag(sd**2).tolist())), origin="test"
+    )
 
 
 def checks(
-    gains: tuple[int, int, int], spread: Spread | None = None, *, ceiling_m: float = 4.5, safe_gains: Gains = SAFE
+    gains: tuple[int, int, int],
+    spread: ParameterDistribution | None = None,
+    *,
+    ceiling_m: float = 4.5,
+    safe_gains: Gains = SAFE,
 ) -> Mapping[str, Check]:
     envelope = Envelope(ceiling_m=ceiling_m, safe_gains=safe_gains)
-    answers = TAKEOFF.hazards(np.array(gains, dtype=float), spread or before_flight(TAKEOFF), envelope)
+    answers = TAKEOFF.hazards(np.array(gains, dtype=float), spread or prior_distribution(TAKEOFF), envelope)
     return {check.name: check for check in answers}
 
 
@@ -179,9 +185,9 @@ def test_an_abort_is_what_the_simulated_vehicle_does(model_parameters: dict[str,
     with open_vehicle("twin", options, safe_gains=SAFE) as vehicle:
         vehicle.stage({"kp": 1600, "ki": 1023, "kd": 127})
         record = vehicle.fly(
-            FlightOrder(seed=1),
+            FlightOptions(seed=1),
             on_sample=lambda _: None,
-            should_stop=lambda: Stop("now") if next(asked) >= 45 else None,
+            should_stop=lambda: StopRequest("now") if next(asked) >= 45 else None,
         ).trajectory
     aborted_at = int(np.argmax(record["set_point_m"] == 0.0))
     assert aborted_at == pytest.approx(abort_step, abs=1)
@@ -234,7 +240,7 @@ def test_what_is_astray_and_what_only_takes_its_time(
     altitude_m: NDArray[np.float64], astray_m: float, swing_m_s: float
 ) -> None:
     report = report_of(altitude_m)
-    assert gone_astray(report, 3.0)[0] == pytest.approx(astray_m, abs=0.02)
+    assert divergence_distance(report, 3.0)[0] == pytest.approx(astray_m, abs=0.02)
     assert undamped_swing(report)[0] == pytest.approx(swing_m_s, abs=0.02)
 
 
@@ -245,7 +251,7 @@ def test_uncompiled_one_short_takeoff_is_judged() -> None:
         SAFE_COUNTS,
         False,
         TAKEOFF.model_parameters,
-        before_flight(TAKEOFF).samples(TAKEOFF, 2),
+        prior_distribution(TAKEOFF).samples(TAKEOFF, 2),
         1.0,
         TARGET,
         1600,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition
-from app.core.strategies.bias import corrected_inside_by
+from app.core.strategies.bias import correct_in_loop
 from app.core.strategies.gradient import propose
 from app.core.trajectory import Trajectory
 from tests.core.flying import TAKEOFF, TWIN, compiled_only, fly
@@ -15,7 +15,7 @@ LATE = (*TWIN[:1], 0.25, *TWIN[2:])
 def test_the_model_with_a_flights_disturbances_inside_flies_that_flight_again() -> None:
     """The flight's hover throttle, motor lag and late start are not in the model; single precision leaves 0.1 mm."""
     flight = fly(1, DEFAULT, LATE)
-    inside = corrected_inside_by(TAKEOFF, flight)
+    inside = correct_in_loop(TAKEOFF, flight)
     assert inside is not None
     gains = TAKEOFF.space.vector(DEFAULT)[np.newaxis]
     assert inside.outputs(gains)[0] == pytest.approx(flight.trajectory["altitude_m"], abs=1e-3)
@@ -23,7 +23,7 @@ def test_the_model_with_a_flights_disturbances_inside_flies_that_flight_again() 
 
 
 def test_until_the_flights_first_thrust_nothing_moves() -> None:
-    inside = corrected_inside_by(TAKEOFF, fly(1, DEFAULT, LATE))
+    inside = correct_in_loop(TAKEOFF, fly(1, DEFAULT, LATE))
     assert inside is not None
     outputs = inside.outputs(np.array([[1600.0, 1023.0, 127.0]]))[0]
     assert not outputs[:128].any()

@@ -7,8 +7,8 @@ from app.core.control.vertical_loop import POSITION_BITS, STATE_SIZE
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
 from app.core.plants.vertical import HOVER_THROTTLE, MEASUREMENT_DELAY_S, Counts, decay, rollouts
-from app.core.plants.vertical_lanes import LANES, are_exact, fly_batch
-from app.core.spread import Spread
+from app.core.plants.vertical_lanes import BATCH_WIDTH, are_exact, fly_batch
+from app.core.spread import ParameterDistribution
 
 TARGET = fix(3.0, POSITION_BITS)
 SAMPLES = 2000
@@ -19,7 +19,7 @@ def models(count: int) -> Matrix:
     """Every parameter at work."""
     parameters = Takeoff().model_parameters
     covariance = np.diag([parameter.prior_sd**2 for parameter in parameters])
-    spread = Spread(
+    spread = ParameterDistribution(
         mean=tuple(parameter.prior_mean + 0.5 * parameter.prior_sd for parameter in parameters),
         covariance=tuple(tuple(row) for row in covariance.tolist()),
         origin="",
@@ -38,7 +38,7 @@ def one_by_one(gains: Counts, each: Matrix) -> Matrix:
 
 
 def test_side_by_side_is_bit_for_bit_one_by_one() -> None:
-    gains, each = gain_sets(LANES + 2), models(LANES + 2)
+    gains, each = gain_sets(BATCH_WIDTH + 2), models(BATCH_WIDTH + 2)
     assert np.array_equal(fly_batch(gains, each, TARGET, SAMPLES), one_by_one(gains, each))
 
 

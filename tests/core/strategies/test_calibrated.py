@@ -14,10 +14,10 @@ from app.core.proposing import next_proposal
 from app.core.strategies import STRATEGIES
 from app.core.strategies.base import Proposal
 from app.core.strategies.calibrated import CALIBRATED, propose
-from app.core.strategies.foretelling import foretell, remaining_bias
-from app.core.strategies.hedging import Box, best_in, merit
+from app.core.strategies.foretelling import predict_flight, remaining_bias
+from app.core.strategies.hedging import Box, find_robust_optimum, merit
 from app.core.trajectory import Trajectory
-from tests.core.bowl import Bowl
+from tests.core.bowl import QuadraticExperiment
 from tests.core.bowl import fly as fly_bowl
 from tests.core.flying import ARDRONE, TAKEOFF, TWIN, compiled_only, fly
 
@@ -42,7 +42,7 @@ def test_it_is_the_first_that_is_offered() -> None:
 
 def test_it_refuses_an_experiment_that_it_is_not_made_for() -> None:
     with pytest.raises(TypeError, match="takeoff only, not with bowl"):
-        propose(CALM, Bowl(), Bowl.space, [fly_bowl(1, 30.0, 40)])
+        propose(CALM, QuadraticExperiment(), QuadraticExperiment.space, [fly_bowl(1, 30.0, 40)])
 
 
 @compiled_only
@@ -53,7 +53,7 @@ def test_it_refuses_an_experiment_that_it_is_not_made_for() -> None:
 def test_the_second_flight_is_within_5_percent_of_the_optimum(truth: tuple[float, ...], optimum: float | None) -> None:
     """The twin's optimum was measured once with the original loop; the others' are searched here on the vehicle."""
     box, model = Box(SPACE.lower, SPACE.upper), np.array([truth])
-    best = best_in(TAKEOFF, box, model, np.array([[1600.0, 1023, 130], [3500, 1040, 220]]))
+    best = find_robust_optimum(TAKEOFF, box, model, np.array([[1600.0, 1023, 130], [3500, 1040, 220]]))
     lowest = min(filter(None, (optimum, float(TAKEOFF.errors(TAKEOFF.outputs(best[np.newaxis], model[0]))[0]))))
     flights = [fly(1, DEFAULT, truth)]
     proposal = next_proposal(CALM, flights)
@@ -241,7 +241,7 @@ def test_what_remains_reproduces_the_flight_and_fades_without_a_recorded_command
     here, far = SPACE.vector(DEFAULT), np.array([3000.0, 1000, 200])
     assert remaining_bias(calibration, without_thrust(bent), here) == pytest.approx(calibration.residual, abs=1e-12)
     assert np.abs(remaining_bias(calibration, without_thrust(bent), far)).max() < 1e-6
-    recorded = foretell(calibrate(TAKEOFF, [flight]), flight, here)
+    recorded = predict_flight(calibrate(TAKEOFF, [flight]), flight, here)
     assert recorded.error == pytest.approx(flight.error, rel=0.05)
 
 

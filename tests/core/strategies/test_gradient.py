@@ -9,13 +9,13 @@ from app.core.checks import Check, Envelope
 from app.core.definition import Definition
 from app.core.gate import check_policy
 from app.core.policy import Vector
-from app.core.spread import Spread
-from app.core.strategies.bias import corrected_by
+from app.core.spread import ParameterDistribution
+from app.core.strategies.bias import correct_by_bias
 from app.core.strategies.gradient import RAW_LADDER, SCALED_LADDER, gradient, propose
-from tests.core.bowl import Bowl, fly
+from tests.core.bowl import QuadraticExperiment, fly
 
-BOWL = Bowl()
-SPACE = Bowl.space
+BOWL = QuadraticExperiment()
+SPACE = QuadraticExperiment.space
 
 
 def test_the_ladders_are_the_methods() -> None:
@@ -29,13 +29,13 @@ def test_the_ladders_are_the_methods() -> None:
 
 def test_central_differences_are_exact_on_a_parabola() -> None:
     """∂/∂a = 2(a − 30)/100 = 0.4, ∂/∂b = 2(b − 40)/100 = 0.6."""
-    model = corrected_by(BOWL, fly(1, 50.0, 70))
+    model = correct_by_bias(BOWL, fly(1, 50.0, 70))
     assert gradient(model, SPACE, np.array([50.0, 70.0]), SPACE.scale) == pytest.approx([0.4, 0.6], abs=1e-12)
 
 
 def test_at_a_bound_the_difference_is_one_sided_and_stays_inside() -> None:
     """a = 100 with step 1: 7² − 6.9² = 1.39; b = 0 with step 2: ((38/10)² − 16)/2 = −0.78."""
-    model = corrected_by(BOWL, fly(1, 100.0, 0))
+    model = correct_by_bias(BOWL, fly(1, 100.0, 0))
     assert gradient(model, SPACE, np.array([100.0, 0.0]), SPACE.scale) == pytest.approx([1.39, -0.78], abs=1e-9)
 
 
@@ -150,10 +150,12 @@ def test_with_every_gain_pinned_there_is_nothing_better() -> None:
 def test_a_step_that_the_gate_refuses_is_halved_until_it_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """4 units from (50, 70) lead to a = 18; the experiment sees a hazard below a = 30, so 2 units it is."""
 
-    def hazards(_bowl: Bowl, gains: Vector, _spread: Spread, _envelope: Envelope) -> tuple[Check, ...]:
+    def hazards(
+        _bowl: QuadraticExperiment, gains: Vector, _spread: ParameterDistribution, _envelope: Envelope
+    ) -> tuple[Check, ...]:
         return (Check("altitude", bool(gains[0] >= 30.0), "too high", worst=30.0, limit=30.0),)
 
-    monkeypatch.setattr(Bowl, "hazards", hazards)
+    monkeypatch.setattr(QuadraticExperiment, "hazards", hazards)
     proposal = propose(Definition(), BOWL, SPACE, [fly(1, 50.0, 70)])
     assert proposal.kind == "shorter step"
     assert proposal.gains == pytest.approx({"a": 34.0, "b": 64})
@@ -167,11 +169,13 @@ def test_the_vehicles_own_safe_gains_are_what_a_step_is_judged_with(
 ) -> None:
     """An abort to these safe gains (not to the experiment's, a = 90) is a hazard from below a = 30."""
 
-    def hazards(_bowl: Bowl, gains: Vector, _spread: Spread, envelope: Envelope) -> tuple[Check, ...]:
+    def hazards(
+        _bowl: QuadraticExperiment, gains: Vector, _spread: ParameterDistribution, envelope: Envelope
+    ) -> tuple[Check, ...]:
         passed = bool(gains[0] >= 30.0 or envelope.safe_gains["a"] > 80.0)
         return (Check("abort altitude", passed, "too high", worst=30.0, limit=30.0),)
 
-    monkeypatch.setattr(Bowl, "hazards", hazards)
+    monkeypatch.setattr(QuadraticExperiment, "hazards", hazards)
     definition = Definition(safe_gains=safe_gains)
     proposal = propose(definition, BOWL, SPACE, [fly(1, 50.0, 70)])
     assert proposal.gains["a"] == pytest.approx(a)

@@ -6,7 +6,7 @@ import pytest
 from app.core.definition import Definition, Flight, OptionValue, Start
 from app.core.proposing import next_proposal
 from app.core.strategies.base import Proposal
-from app.core.strategies.bias import nominal
+from app.core.strategies.bias import uncorrected_model
 from app.core.strategies.identified import foresee
 from app.core.trajectory import Trajectory
 from app.vehicles.lti import LOG_NOISE
@@ -109,4 +109,4 @@ def test_without_recorded_states_its_landscape_is_the_nominal_models() -> None:
     bare = Trajectory(first.trajectory.time_s, {"pitch_error_rad": first.trajectory["pitch_error_rad"]}, "csv", "x")
     points = MODEL.space.vector(TRACKING)[np.newaxis]
     unseen = foresee(definition(), MODEL, [replace(first, trajectory=bare)])
-    assert unseen(points) == pytest.approx(nominal(MODEL).errors(points))
+    assert unseen(points) == pytest.approx(uncorrected_model(MODEL).errors(points))

@@ -4,10 +4,10 @@ import pytest
 from app.core.definition import Definition
 from app.core.experiments.takeoff import Takeoff
 from app.core.strategies.simplex import foresee, model_optimum, propose
-from tests.core.bowl import Bowl, fly
+from tests.core.bowl import QuadraticExperiment, fly
 from tests.core.flying import compiled_only
 
-BOWL = Bowl()
+BOWL = QuadraticExperiment()
 
 
 @compiled_only
@@ -22,32 +22,32 @@ def test_the_search_on_the_nominal_takeoff_finds_the_papers_near_optimum_inside_
 
 @pytest.mark.parametrize("start", [(90.0, 90.0), (100.0, 100.0), (0.0, 0.0)])
 def test_the_search_reaches_a_known_optimum_from_any_corner(start: tuple[float, float]) -> None:
-    optimum = model_optimum(BOWL, Bowl.space, np.array(start))
+    optimum = model_optimum(BOWL, QuadraticExperiment.space, np.array(start))
     assert optimum.gains == pytest.approx([30.0, 40.0], abs=1e-3)
     assert optimum.error == pytest.approx(1.0, abs=1e-6)
     assert optimum.evaluations <= 300
 
 
 def test_as_a_strategy_it_flies_the_models_optimum_once() -> None:
-    first = propose(Definition(), BOWL, Bowl.space, [fly(1, 90.0, 90)])
+    first = propose(Definition(), BOWL, QuadraticExperiment.space, [fly(1, 90.0, 90)])
     assert first.kind == "step"
     assert first.gains == pytest.approx({"a": 30.0, "b": 40}, abs=1e-3)
     assert first.predicted_error == pytest.approx(1.0, abs=1e-6)
     flown = [fly(1, 90.0, 90), fly(2, first.gains["a"], first.gains["b"])]
-    second = propose(Definition(), BOWL, Bowl.space, flown)
+    second = propose(Definition(), BOWL, QuadraticExperiment.space, flown)
     assert second.kind == "none"
     assert second.gains == flown[1].gains
     assert "nothing more" in second.explanation.summary
 
 
 def test_a_step_limit_lets_it_approach_the_optimum_flight_by_flight() -> None:
-    proposal = propose(Definition(step_fraction=0.2), BOWL, Bowl.space, [fly(1, 90.0, 90)])
+    proposal = propose(Definition(step_fraction=0.2), BOWL, QuadraticExperiment.space, [fly(1, 90.0, 90)])
     assert proposal.gains == pytest.approx({"a": 70.0, "b": 70})
     assert proposal.explanation.clipped == ("a", "b")
 
 
 def test_the_search_leaves_a_pinned_gain_where_it_is() -> None:
-    pinned = Bowl.space.narrowed({"b": (70, 70)})
+    pinned = QuadraticExperiment.space.narrowed({"b": (70, 70)})
     optimum = model_optimum(BOWL, pinned, np.array([90.0, 70.0]))
     assert optimum.gains == pytest.approx([30.0, 70.0], abs=1e-3)
 

@@ -15,7 +15,7 @@ SOON_S: Final = 5.0
 """Far longer than anything on the loopback interface takes."""
 
 
-class Speaker:
+class FakeVehicleEndpoint:
     """A vehicle's end over UDP: says what it is told to, and keeps what it hears."""
 
     def __init__(self, dialect: Dialect, *, system: int = 31, component: int = 1, key: bytes | None = None) -> None:
@@ -72,7 +72,7 @@ class Speaker:
         return self.codec.parse(frame)
 
 
-def heartbeat(speaker: Speaker, *, autopilot: int = 3, kind: int = 2) -> bytes:
+def heartbeat(speaker: FakeVehicleEndpoint, *, autopilot: int = 3, kind: int = 2) -> bytes:
     """A frame saying that this is a quadrotor flown by ArduPilot, unless told otherwise."""
     return speaker.frame(
         "HEARTBEAT", type=kind, autopilot=autopilot, base_mode=0, custom_mode=0, system_status=3, mavlink_version=3

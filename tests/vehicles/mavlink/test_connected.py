@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from app.vehicles.base import FlightOrder, Identity, Sample, Stop
+from app.vehicles.base import FlightOptions, Identity, Sample, StopRequest
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -16,7 +16,7 @@ from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
 
-ORDER = FlightOrder(seed=1)
+ORDER = FlightOptions(seed=1)
 START_ENGINE, TAKE_OFF, LAND_HERE = 3, 4, 13
 PINNED = Identity(system_id=31, autopilot="paparazzi", version="")
 
@@ -266,10 +266,10 @@ def test_a_vehicle_that_somebody_else_arms_is_only_observed_from_then_on() -> No
 def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() -> None:
     told: list[float] = []
 
-    def slide() -> Stop | None:
+    def slide() -> StopRequest | None:
         if rig.drone.body.altitude_m > 2.0 and not told:
             told.append(rig.now_s())
-            return Stop("people below", motors_off=True)
+            return StopRequest("people below", motors_off=True)
         return None
 
     with LockstepRig("ardupilot") as rig:

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from app.vehicles.base import FlightOrder, FlightRecord, Identity, Stop
+from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone import faults
-from app.vehicles.simdrone.autopilots.base import Letter
-from app.vehicles.simdrone.faults import Afflicted, Fault
+from app.vehicles.simdrone.autopilots.base import OutgoingMessage
+from app.vehicles.simdrone.faults import Fault, FaultTarget
 from tests.vehicles.flying import never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_connected import connected
 
-ORDER = FlightOrder(seed=1)
+ORDER = FlightOptions(seed=1)
 LAND_MODE, HOLD_MODE = "4.6", "4.3"
 
 
@@ -85,15 +85,15 @@ class AltitudeAnew(Fault):
     """An estimator that puts its origin half a metre lower as it is armed."""
 
     name = "altitude-anew"
-    drone: Afflicted
+    drone: FaultTarget
 
-    def begin(self, drone: Afflicted) -> None:
+    def begin(self, drone: FaultTarget) -> None:
         self.drone = drone
 
-    def letters(self, letters: Sequence[Letter]) -> list[Letter]:
+    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [self._raised(letter) for letter in letters]
 
-    def _raised(self, letter: Letter) -> Letter:
+    def _raised(self, letter: OutgoingMessage) -> OutgoingMessage:
         z = letter.fields.get("z")
         if letter.kind != "LOCAL_POSITION_NED" or not self.drone.autopilot.armed:
             return letter
@@ -121,10 +121,10 @@ def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
         assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
         flown: list[float] = []
 
-        def look() -> Stop | None:
+        def look() -> StopRequest | None:
             if rig.drone.body.altitude_m > 2.0:
                 flown.append(rig.drone.autopilot.held("MIS_TAKEOFF_ALT"))
-            return Stop("seen enough") if len(flown) > 100 else None
+            return StopRequest("seen enough") if len(flown) > 100 else None
 
         vehicle.stage(SAFE["px4"])
         vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)
@@ -139,10 +139,10 @@ def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) 
     file, kept = tmp_path / "parameters.json", set[str]()
     with ready("px4") as rig, connected(rig, trial_parameters=file) as vehicle:
 
-        def look() -> Stop | None:
+        def look() -> StopRequest | None:
             if rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0:
                 kept.add(file.read_text())
-            return Stop("seen enough") if rig.drone.body.altitude_m > 0.5 else None
+            return StopRequest("seen enough") if rig.drone.body.altitude_m > 0.5 else None
 
         vehicle.stage(SAFE["px4"])
         vehicle.fly(ORDER, on_sample=unwatched, should_stop=look)

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from app.vehicles.mavlink.failures import RESPONSES, SUSPECT, Failure
+from app.vehicles.mavlink.failures import GAIN_FAILURES, RESPONSES, Failure
 
 PAGE = (Path(__file__).parents[3] / "docs" / "real-flight.md").read_text(encoding="utf-8")
 
@@ -12,8 +12,8 @@ def test_every_failure_has_its_response() -> None:
 
 
 def test_only_a_safety_limit_and_a_person_speak_against_the_gains() -> None:
-    assert frozenset({Failure.ENVELOPE, Failure.OPERATOR}) == SUSPECT
-    assert all(RESPONSES[failure].outcome == "aborted" for failure in SUSPECT)
+    assert frozenset({Failure.ENVELOPE, Failure.OPERATOR}) == GAIN_FAILURES
+    assert all(RESPONSES[failure].outcome == "aborted" for failure in GAIN_FAILURES)
 
 
 def test_a_bad_measurement_never_counts_as_a_safety_limit() -> None:

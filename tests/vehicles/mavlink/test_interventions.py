@@ -6,10 +6,10 @@ import pytest
 
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.measurements import BlockEntered
-from app.vehicles.mavlink.signals import AbortWanted, Action, MotorsOffWanted, Sighted
+from app.vehicles.mavlink.signals import AbortRequested, Action, MotorsOffRequested, SecondaryAltitudeReceived
 from app.vehicles.mavlink.states import State
 from tests.vehicles.mavlink.test_machine import STAGES
-from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, Walk
+from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 TAKE_OFF, STANDBY, LAND_BLOCK = 4, 5, 14
 BLOCKS = {2: "Holding point", 3: "Start Engine", TAKE_OFF: "Takeoff", STANDBY: "Standby", LAND_BLOCK: "land"}
@@ -26,8 +26,8 @@ WITH_BLOCKS = replace(
 COPTER = replace(PLAN, limits=replace(LIMITS, flying_modes=frozenset({"guided"}), landing_modes=frozenset({"land"})))
 
 
-def slide(walk: Walk, reason: str = "it flies towards people") -> Walk:
-    return walk.give(MotorsOffWanted(reason, walk.now_s))
+def slide(walk: TrialDriver, reason: str = "it flies towards people") -> TrialDriver:
+    return walk.give(MotorsOffRequested(reason, walk.now_s))
 
 
 @pytest.mark.parametrize("state", STAGES)
@@ -56,7 +56,7 @@ def test_motors_off_that_is_not_obeyed_quarantines_the_vehicle() -> None:
 
 def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -> None:
     walk = STAGES[State.RECORD]()
-    walk.give(AbortWanted("too high", walk.now_s)).pass_s(0.2)
+    walk.give(AbortRequested("too high", walk.now_s)).pass_s(0.2)
     for _ in range(55):
         slide(walk).pass_s(STEP_S)
     assert len(walk.when(Action.KILL)) == 2
@@ -64,7 +64,7 @@ def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -
 
 
 def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void() -> None:
-    walk = Walk(plan=WITH_BLOCKS).lift_off()
+    walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(LAND_BLOCK)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
     assert walk.trial.why == "Its flight plan went to the block “land”."
@@ -73,7 +73,7 @@ def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void
 
 
 def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains() -> None:
-    walk = Walk(plan=WITH_BLOCKS).lift_off()
+    walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.climb_rate_m_s = 1.0
     walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
@@ -82,7 +82,7 @@ def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains(
 
 
 def test_a_flight_plan_that_goes_where_nobody_sent_it_is_told_to_land() -> None:
-    walk = Walk(plan=WITH_BLOCKS).lift_off()
+    walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
     assert walk.trial.why == "Its flight plan went to the block “Standby”."
@@ -90,7 +90,7 @@ def test_a_flight_plan_that_goes_where_nobody_sent_it_is_told_to_land() -> None:
 
 
 def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
-    walk = Walk(plan=WITH_BLOCKS).arm()
+    walk = TrialDriver(plan=WITH_BLOCKS).arm()
     walk.hear(BlockEntered(3)).hear(BlockEntered(TAKE_OFF))
     walk.climb_rate_m_s = 1.0
     walk.pass_s(2.9)
@@ -102,7 +102,7 @@ def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
 
 
 def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
-    walk = Walk(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
+    walk = TrialDriver(plan=COPTER, mode="guided").lift_off().pass_s(1.0)
     walk.mode = "land"
     walk.pass_s(1.6)
     assert (walk.state, walk.trial.failure, walk.trial.why) == (
@@ -113,7 +113,7 @@ def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
 
 
 def test_the_mode_of_the_landing_before_is_no_landing() -> None:
-    walk = Walk(plan=COPTER, mode="land").arm()
+    walk = TrialDriver(plan=COPTER, mode="land").arm()
     walk.climb_rate_m_s = 1.0
     walk.pass_s(0.8)
     walk.mode = "guided"
@@ -121,16 +121,16 @@ def test_the_mode_of_the_landing_before_is_no_landing() -> None:
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
 
 
-def watched(walk: Walk, seconds: float, off_m: float = 0.0, *, is_new: bool = True) -> Walk:
+def watched(walk: TrialDriver, seconds: float, off_m: float = 0.0, *, is_new: bool = True) -> TrialDriver:
     """Let time pass under the eyes of a second source, 50 times a second."""
     for _ in range(round(seconds / STEP_S)):
         walk.pass_s(STEP_S)
-        walk.give(Sighted(walk.altitude_m + off_m, is_new, walk.now_s))
+        walk.give(SecondaryAltitudeReceived(walk.altitude_m + off_m, is_new, walk.now_s))
     return walk
 
 
-def hovering() -> Walk:
-    return watched(Walk().lift_off(), 0.5)
+def hovering() -> TrialDriver:
+    return watched(TrialDriver().lift_off(), 0.5)
 
 
 def test_two_sources_that_disagree_for_a_third_of_a_second_land_the_vehicle() -> None:

@@ -5,29 +5,29 @@ import pytest
 from app.vehicles.mavlink import findings
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.measurements import Battery, Breach, Heartbeat, Measurement, Position
-from app.vehicles.mavlink.watch import Watch
+from app.vehicles.mavlink.measurements import Battery, FenceBreach, Heartbeat, Measurement, Position
+from app.vehicles.mavlink.watch import TrialObservation
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
 
 START_S = 10.0
 
 
-def watch_of(*altitudes_m: float, every_s: float = 0.02, climb_rate_m_s: float = 0.0) -> Watch:
+def watch_of(*altitudes_m: float, every_s: float = 0.02, climb_rate_m_s: float = 0.0) -> TrialObservation:
     """What is remembered of these altitudes, one after the other from 10 s on."""
     watch = watching.begin(START_S)
     for number, altitude_m in enumerate(altitudes_m):
         at_s = START_S + number * every_s
-        watch, _ = watching.hear(watch, Position(at_s, altitude_m, climb_rate_m_s), at_s, LIMITS)
+        watch, _ = watching.update(watch, Position(at_s, altitude_m, climb_rate_m_s), at_s, LIMITS)
     return watch
 
 
-def told(watch: Watch, *measurements: Measurement | None, at_s: float) -> Watch:
+def told(watch: TrialObservation, *measurements: Measurement | None, at_s: float) -> TrialObservation:
     for measurement in measurements:
-        watch, _ = watching.hear(watch, measurement, at_s, LIMITS)
+        watch, _ = watching.update(watch, measurement, at_s, LIMITS)
     return watch
 
 
-def envelope(watch: Watch, *, settling: bool = True) -> str | None:
+def envelope(watch: TrialObservation, *, settling: bool = True) -> str | None:
     finding = findings.find_envelope(watch, LIMITS, ground_m=GROUND_M, settling=settling)
     return None if finding is None else finding.why
 
@@ -56,7 +56,7 @@ def test_speed_is_limited_in_both_directions(climb_rate_m_s: float) -> None:
 
 def test_drifting_away_is_limited() -> None:
     watch = watching.begin(START_S, last=Position(9.98, 3.0, 0.0))
-    watch, _ = watching.hear(watch, Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, LIMITS)
+    watch, _ = watching.update(watch, Position(10.0, 3.0, 0.0, 3.0, 4.1), 10.0, LIMITS)
     assert envelope(watch) == "It flew 5.1 m away from its start, over 5 m."
 
 
@@ -72,35 +72,35 @@ def test_ripples_within_the_band_are_no_crossings() -> None:
 
 
 def test_the_vehicles_own_fence_counts() -> None:
-    watch = told(watch_of(3.0), Breach("its greatest altitude"), at_s=10.1)
+    watch = told(watch_of(3.0), FenceBreach("its greatest altitude"), at_s=10.1)
     assert envelope(watch) == "The vehicle's own fence was crossed: its greatest altitude."
 
 
 def test_a_lone_jump_is_dropped_and_counted() -> None:
     watch = watch_of(3.0, 3.0, 3.6)
     assert (watch.last, watch.glitches) == (Position(10.02, 3.0, 0.0), 0)
-    watch, kept = watching.hear(watch, Position(10.06, 3.0, 0.0), 10.06, LIMITS)
+    watch, kept = watching.update(watch, Position(10.06, 3.0, 0.0), 10.06, LIMITS)
     assert kept == (Position(10.06, 3.0, 0.0),)
     assert watch.glitches == 1
 
 
 def test_a_jump_that_stays_is_where_the_vehicle_is() -> None:
     watch = watch_of(3.0, 3.0, 3.6)
-    watch, kept = watching.hear(watch, Position(10.06, 3.6, 0.0), 10.06, LIMITS)
+    watch, kept = watching.update(watch, Position(10.06, 3.6, 0.0), 10.06, LIMITS)
     assert [position.time_boot_s for position in kept] == [10.04, 10.06]
     assert watch.glitches == 0
 
 
 def test_a_lone_speed_beyond_reason_is_no_abort() -> None:
     watch = watch_of(3.0, 3.0)
-    watch, kept = watching.hear(watch, Position(10.04, 3.0, 7.0), 10.04, LIMITS)
+    watch, kept = watching.update(watch, Position(10.04, 3.0, 7.0), 10.04, LIMITS)
     assert (kept, envelope(watch)) == ((), None)
 
 
 def test_a_speed_beyond_reason_that_lasts_is_an_abort() -> None:
     watch = watch_of(3.0, 3.0)
     for at_s, altitude_m in ((10.04, 3.14), (10.06, 3.28)):
-        watch, _ = watching.hear(watch, Position(at_s, altitude_m, 7.0), at_s, LIMITS)
+        watch, _ = watching.update(watch, Position(at_s, altitude_m, 7.0), at_s, LIMITS)
     assert envelope(watch) == "It flew at +7.0 m/s, beyond 4 m/s."
 
 
@@ -126,7 +126,7 @@ def test_any_packet_keeps_the_link_but_three_missed_heartbeats_lose_it() -> None
     assert lost.why == "Three heartbeats were missed."
 
 
-def repeated(watch: Watch, *, until_s: float) -> Watch:
+def repeated(watch: TrialObservation, *, until_s: float) -> TrialObservation:
     """The last position again and again, 50 times a second."""
     for tick in range(1, round((until_s - START_S) * 50) + 1):
         watch = told(watch, Position(START_S, 3.0, 0.0), at_s=START_S + tick * 0.02)
@@ -154,7 +154,7 @@ def test_a_position_that_stays_away_among_other_packets_is_frozen_too() -> None:
 
 def test_silence_alone_is_not_frozen() -> None:
     watch = watch_of(3.0, 3.0)
-    watch, _ = watching.hear(watch, Position(10.9, 3.0, 0.0), 10.9, LIMITS)
+    watch, _ = watching.update(watch, Position(10.9, 3.0, 0.0), 10.9, LIMITS)
     assert findings.find_frozen(watch, LIMITS, 10.3) is None
 
 
@@ -185,7 +185,7 @@ def test_a_battery_that_says_nothing_for_ten_seconds_counts_as_low() -> None:
     assert silent.why == "No battery voltage was heard for 10 s."
 
 
-def beating(*beats: Heartbeat) -> Watch:
+def beating(*beats: Heartbeat) -> TrialObservation:
     """What is remembered of these heartbeats, as far apart as Paparazzi's."""
     watch = told(watch_of(3.0), Heartbeat(9, True, "4"), at_s=10.0)
     for number, beat in enumerate(beats, start=1):

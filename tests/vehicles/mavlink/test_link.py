@@ -28,13 +28,20 @@ from app.vehicles.mavlink.dialects import (
     number,
     text,
 )
-from app.vehicles.mavlink.link import GONE_AFTER_S, INBOX, UNATTENDED_AFTER_S, Link, LinkError, LossCounter
-from tests.clocks import ClockByHand
+from app.vehicles.mavlink.link import (
+    GONE_AFTER_S,
+    MAX_QUEUED_MESSAGES,
+    UNATTENDED_AFTER_S,
+    Link,
+    LinkError,
+    LossCounter,
+)
+from tests.clocks import ManualClock
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (
     LOOPBACK,
     SOON_S,
-    Speaker,
+    FakeVehicleEndpoint,
     becomes,
     collect,
     heartbeat,
@@ -60,13 +67,13 @@ CLOCK = ScaledClock()
 
 
 @pytest.fixture
-def paparazzi() -> Iterator[Speaker]:
-    with Speaker(PAPARAZZI, component=190) as speaker:
+def paparazzi() -> Iterator[FakeVehicleEndpoint]:
+    with FakeVehicleEndpoint(PAPARAZZI, component=190) as speaker:
         yield speaker
 
 
 @pytest.fixture
-def link(paparazzi: Speaker) -> Iterator[Link]:
+def link(paparazzi: FakeVehicleEndpoint) -> Iterator[Link]:
     with Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31) as link:
         yield link
 
@@ -74,7 +81,9 @@ def link(paparazzi: Speaker) -> Iterator[Link]:
 # ---- hearing
 
 
-def test_messages_are_handed_over_in_order_with_the_time_of_their_receipt(paparazzi: Speaker, link: Link) -> None:
+def test_messages_are_handed_over_in_order_with_the_time_of_their_receipt(
+    paparazzi: FakeVehicleEndpoint, link: Link
+) -> None:
     before_s = CLOCK.now_s()
     for step in range(300):
         paparazzi.say("LOCAL_POSITION_NED", **position(20 * step, z=-0.01 * step))
@@ -103,14 +112,16 @@ class HurriedClock(ScaledClock):
         return 0.0
 
 
-def test_a_call_waits_no_longer_than_asked_by_the_clock(paparazzi: Speaker) -> None:
+def test_a_call_waits_no_longer_than_asked_by_the_clock(paparazzi: FakeVehicleEndpoint) -> None:
     clock = HurriedClock()
     with Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link:
         assert link.receive(3600.0) == []
     assert clock.asked_s == [3600.0]
 
 
-def test_another_system_at_the_vehicles_address_is_dropped_and_counted(paparazzi: Speaker, link: Link) -> None:
+def test_another_system_at_the_vehicles_address_is_dropped_and_counted(
+    paparazzi: FakeVehicleEndpoint, link: Link
+) -> None:
     other = PAPARAZZI.codec(system=7, component=1)
     paparazzi.send(other.pack(PAPARAZZI.message("LOCAL_POSITION_NED", position(20))))
     paparazzi.say("LOCAL_POSITION_NED", **position(40))
@@ -119,8 +130,10 @@ def test_another_system_at_the_vehicles_address_is_dropped_and_counted(paparazzi
     assert link.health.received == 1
 
 
-def test_another_sender_with_the_vehicles_system_id_is_dropped_and_counted(paparazzi: Speaker, link: Link) -> None:
-    with Speaker(PAPARAZZI, component=190) as impostor:
+def test_another_sender_with_the_vehicles_system_id_is_dropped_and_counted(
+    paparazzi: FakeVehicleEndpoint, link: Link
+) -> None:
+    with FakeVehicleEndpoint(PAPARAZZI, component=190) as impostor:
         impostor.ground = paparazzi.ground
         impostor.say("LOCAL_POSITION_NED", **position(20))
         paparazzi.say("LOCAL_POSITION_NED", **position(40))
@@ -128,8 +141,10 @@ def test_another_sender_with_the_vehicles_system_id_is_dropped_and_counted(papar
     assert link.health.foreign == 1
 
 
-def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(paparazzi: Speaker, link: Link) -> None:
-    with Speaker(PAPARAZZI, component=190) as other:
+def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(
+    paparazzi: FakeVehicleEndpoint, link: Link
+) -> None:
+    with FakeVehicleEndpoint(PAPARAZZI, component=190) as other:
         other.ground = paparazzi.ground
         paparazzi.send(heartbeat(paparazzi, autopilot=9))
         collect(link, 1)
@@ -139,11 +154,11 @@ def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(pa
     assert link.doubled == "Another vehicle with its system id speaks from another port."
 
 
-def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: Speaker) -> None:
-    clock = ClockByHand()
+def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: FakeVehicleEndpoint) -> None:
+    clock = ManualClock()
     with (
         Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
-        Speaker(PAPARAZZI, component=190) as again,
+        FakeVehicleEndpoint(PAPARAZZI, component=190) as again,
     ):
         paparazzi.send(heartbeat(paparazzi, autopilot=9))
         collect(link, 1)
@@ -158,7 +173,9 @@ def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(pap
         assert link.doubled == ""
 
 
-def test_another_component_is_handed_on_but_is_no_sign_of_the_autopilots_life(paparazzi: Speaker, link: Link) -> None:
+def test_another_component_is_handed_on_but_is_no_sign_of_the_autopilots_life(
+    paparazzi: FakeVehicleEndpoint, link: Link
+) -> None:
     paparazzi.send(heartbeat(paparazzi, autopilot=9))
     [beat] = collect(link, 1)
     companion = PAPARAZZI.codec(system=31, component=191)
@@ -171,9 +188,9 @@ def test_another_component_is_handed_on_but_is_no_sign_of_the_autopilots_life(pa
     assert link.health.last_heartbeat_s == beat.received_s
 
 
-def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(paparazzi: Speaker) -> None:
+def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(paparazzi: FakeVehicleEndpoint) -> None:
     with Link(paparazzi.address, PAPARAZZI, clock=CLOCK) as link:
-        station = Speaker(PAPARAZZI, system=255)
+        station = FakeVehicleEndpoint(PAPARAZZI, system=255)
         with station:
             paparazzi.send(heartbeat(station, autopilot=8, kind=6))
         paparazzi.say("LOCAL_POSITION_NED", **position(20))
@@ -190,8 +207,8 @@ def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(p
 
 def test_strangers_at_our_own_address_do_not_keep_the_vehicle_out() -> None:
     with (
-        Speaker(ARDUPILOTMEGA, system=1) as vehicle,
-        Speaker(ARDUPILOTMEGA, system=9) as stranger,
+        FakeVehicleEndpoint(ARDUPILOTMEGA, system=1) as vehicle,
+        FakeVehicleEndpoint(ARDUPILOTMEGA, system=9) as stranger,
         Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1) as link,
     ):
         stranger.ground = vehicle.ground
@@ -214,7 +231,7 @@ def command(number: int) -> dict[str, FieldValue]:
     return {"target_system": 1, "target_component": 1, "command": number, "confirmation": 0, **parameters}
 
 
-def test_noise_is_counted_and_what_follows_is_heard(paparazzi: Speaker, link: Link) -> None:
+def test_noise_is_counted_and_what_follows_is_heard(paparazzi: FakeVehicleEndpoint, link: Link) -> None:
     damaged = bytearray(paparazzi.frame("LOCAL_POSITION_NED", **position(20)))
     damaged[10] ^= 0x10
     paparazzi.send(bytes(damaged))
@@ -225,7 +242,7 @@ def test_noise_is_counted_and_what_follows_is_heard(paparazzi: Speaker, link: Li
     assert link.health.lost == 0
 
 
-def test_what_is_missing_in_the_sequence_is_counted_as_lost(paparazzi: Speaker, link: Link) -> None:
+def test_what_is_missing_in_the_sequence_is_counted_as_lost(paparazzi: FakeVehicleEndpoint, link: Link) -> None:
     frames = [paparazzi.frame("LOCAL_POSITION_NED", **position(20 * step)) for step in range(600)]
     for step, frame in enumerate(frames):
         if step % 100 != 50:
@@ -237,7 +254,7 @@ def test_what_is_missing_in_the_sequence_is_counted_as_lost(paparazzi: Speaker, 
 def test_a_newer_message_is_not_handed_over_yet_counts_in_the_sequence() -> None:
     """PX4 sends ids that the dialect does not know; their checksums cannot be judged, so they are no sign of life."""
     with (
-        Speaker(COMMON, system=1) as vehicle,
+        FakeVehicleEndpoint(COMMON, system=1) as vehicle,
         Link(vehicle.address, COMMON, clock=CLOCK, target_system=1) as link,
     ):
         vehicle.beat()
@@ -261,7 +278,7 @@ def test_paparazzis_other_counters_are_left_out_of_the_losses() -> None:
 
 @pytest.mark.parametrize("gains", FLOWN)
 def test_a_recorded_flight_of_the_real_paparazzi_is_heard_whole_with_nothing_lost(
-    gains: tuple[int, int, int], paparazzi: Speaker, link: Link
+    gains: tuple[int, int, int], paparazzi: FakeVehicleEndpoint, link: Link
 ) -> None:
     said = [each.message for each in recorded(gains) if each.is_from_vehicle]
     heard = []
@@ -283,10 +300,10 @@ def test_overtaken_and_repeated_packets_are_not_losses() -> None:
 
 
 def test_a_program_that_does_not_listen_loses_the_oldest_and_is_told(
-    paparazzi: Speaker, link: Link, monkeypatch: pytest.MonkeyPatch
+    paparazzi: FakeVehicleEndpoint, link: Link, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert INBOX >= 50 * 60  # a minute of telemetry at least
-    monkeypatch.setattr("app.vehicles.mavlink.link.INBOX", 5)
+    assert MAX_QUEUED_MESSAGES >= 50 * 60  # a minute of telemetry at least
+    monkeypatch.setattr("app.vehicles.mavlink.link.MAX_QUEUED_MESSAGES", 5)
     for step in range(8):
         paparazzi.say("LOCAL_POSITION_NED", **position(step))
     assert becomes(lambda: link.health.received == 8)
@@ -297,7 +314,7 @@ def test_a_program_that_does_not_listen_loses_the_oldest_and_is_told(
 # ---- sending
 
 
-def test_a_frame_of_mavlink_2_is_never_sent_to_paparazzi(paparazzi: Speaker, link: Link) -> None:
+def test_a_frame_of_mavlink_2_is_never_sent_to_paparazzi(paparazzi: FakeVehicleEndpoint, link: Link) -> None:
     """Not even after one was received, which is what switches other programs over."""
     newer = COMMON.codec(system=31, component=190)
     paparazzi.send(newer.pack(COMMON.message("LOCAL_POSITION_NED", position(20))))
@@ -313,7 +330,7 @@ def test_a_frame_of_mavlink_2_is_never_sent_to_paparazzi(paparazzi: Speaker, lin
 @pytest.mark.parametrize("dialect", [ARDUPILOTMEGA, COMMON], ids=lambda dialect: dialect.name)
 def test_others_are_sent_mavlink_2(dialect: Dialect) -> None:
     with (
-        Speaker(dialect, system=1) as vehicle,
+        FakeVehicleEndpoint(dialect, system=1) as vehicle,
         Link(vehicle.address, dialect, clock=CLOCK, target_system=1) as link,
     ):
         link.send("PARAM_SET", **GAIN)
@@ -343,7 +360,7 @@ def test_what_cannot_be_sent_is_refused_to_the_caller_at_once(
         link.send(kind, **fields)
 
 
-def test_many_threads_send_and_every_message_leaves_once(paparazzi: Speaker, link: Link) -> None:
+def test_many_threads_send_and_every_message_leaves_once(paparazzi: FakeVehicleEndpoint, link: Link) -> None:
     paparazzi.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
 
     def send(first: int) -> None:
@@ -358,7 +375,7 @@ def test_many_threads_send_and_every_message_leaves_once(paparazzi: Speaker, lin
     assert link.health.sent == 200
 
 
-def test_every_command_is_on_the_wire_while_telemetry_streams(paparazzi: Speaker, link: Link) -> None:
+def test_every_command_is_on_the_wire_while_telemetry_streams(paparazzi: FakeVehicleEndpoint, link: Link) -> None:
     done = threading.Event()
 
     def stream() -> None:
@@ -382,7 +399,7 @@ def test_every_command_is_on_the_wire_while_telemetry_streams(paparazzi: Speaker
 class Tapped:
     """A link on a clock that stands, and the heartbeats that reach the vehicle."""
 
-    def __init__(self, vehicle: Speaker, clock: ClockByHand, link: Link) -> None:
+    def __init__(self, vehicle: FakeVehicleEndpoint, clock: ManualClock, link: Link) -> None:
         self.vehicle, self.clock, self.link = vehicle, clock, link
         self.beats: list[Message] = []
 
@@ -400,9 +417,9 @@ class Tapped:
 
 @contextmanager
 def tapped(dialect: Dialect, system: int) -> Iterator[Tapped]:
-    clock = ClockByHand()
+    clock = ManualClock()
     with (
-        Speaker(dialect, system=system) as vehicle,
+        FakeVehicleEndpoint(dialect, system=system) as vehicle,
         Link(vehicle.address, dialect, clock=clock, target_system=system) as link,
     ):
         yield Tapped(vehicle, clock, link)
@@ -439,7 +456,7 @@ def test_paparazzi_is_not_bothered_with_heartbeats() -> None:
 # ---- the end
 
 
-def test_what_was_sent_before_closing_still_leaves(paparazzi: Speaker) -> None:
+def test_what_was_sent_before_closing_still_leaves(paparazzi: FakeVehicleEndpoint) -> None:
     link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
     for value in range(5):
         link.send("PARAM_SET", **GAIN | {"param_value": float(value)})
@@ -448,7 +465,7 @@ def test_what_was_sent_before_closing_still_leaves(paparazzi: Speaker) -> None:
     link.close()  # again is harmless
 
 
-def test_a_closed_link_hands_over_what_it_heard_and_then_says_that_it_is_closed(paparazzi: Speaker) -> None:
+def test_a_closed_link_hands_over_what_it_heard_and_then_says_that_it_is_closed(paparazzi: FakeVehicleEndpoint) -> None:
     link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
     paparazzi.say("LOCAL_POSITION_NED", **position(20))
     assert becomes(lambda: link.health.received == 1)
@@ -459,7 +476,7 @@ def test_a_closed_link_hands_over_what_it_heard_and_then_says_that_it_is_closed(
             call()
 
 
-def test_closing_ends_the_wait_of_another_thread(paparazzi: Speaker) -> None:
+def test_closing_ends_the_wait_of_another_thread(paparazzi: FakeVehicleEndpoint) -> None:
     link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
     closer = threading.Timer(0.05, link.close)
     closer.start()
@@ -479,7 +496,9 @@ class BrokenClock(ScaledClock):
         return super().now_s()
 
 
-def test_a_link_whose_thread_fails_says_so_to_everybody(paparazzi: Speaker, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_link_whose_thread_fails_says_so_to_everybody(
+    paparazzi: FakeVehicleEndpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
     reported: list[str] = []
     monkeypatch.setattr(threading, "excepthook", lambda failure: reported.append(str(failure.exc_value)))
     clock = BrokenClock()
@@ -499,7 +518,7 @@ def test_a_link_whose_thread_fails_says_so_to_everybody(paparazzi: Speaker, monk
 def test_a_link_over_tcp_outlives_the_connection() -> None:
     with (
         socket.create_server((LOOPBACK, 0)) as server,
-        Speaker(COMMON, system=1) as vehicle,
+        FakeVehicleEndpoint(COMMON, system=1) as vehicle,
         Link(TcpAddress(LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK) as link,
     ):
         server.settimeout(SOON_S)
@@ -520,7 +539,7 @@ def test_a_link_over_a_serial_line() -> None:
     vehicle_end, our_end = pty.openpty()
     tty.setraw(our_end)
     with (
-        Speaker(ARDUPILOTMEGA, system=1) as vehicle,
+        FakeVehicleEndpoint(ARDUPILOTMEGA, system=1) as vehicle,
         Link(SerialAddress(os.ttyname(our_end), 57600), ARDUPILOTMEGA, clock=CLOCK) as link,
     ):
         os.write(vehicle_end, b"\x00\x55" + heartbeat(vehicle))
@@ -531,7 +550,7 @@ def test_a_link_over_a_serial_line() -> None:
     os.close(our_end)
 
 
-def kinds_heard(vehicle: Speaker, descriptor: int) -> list[str]:
+def kinds_heard(vehicle: FakeVehicleEndpoint, descriptor: int) -> list[str]:
     """What arrives up to the first message that is no heartbeat."""
     kinds: list[str] = []
     while not kinds or kinds[-1] == "HEARTBEAT":
@@ -539,7 +558,7 @@ def kinds_heard(vehicle: Speaker, descriptor: int) -> list[str]:
     return kinds
 
 
-def test_a_folder_that_is_not_there_leaves_nothing_open(paparazzi: Speaker, tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_leaves_nothing_open(paparazzi: FakeVehicleEndpoint, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="telemetry log"):
         Link(paparazzi.address, PAPARAZZI, clock=CLOCK, tlog=tmp_path / "none" / "flight.tlog")
     with Link(paparazzi.address, PAPARAZZI, clock=CLOCK):

@@ -8,47 +8,47 @@ import pytest
 
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.machine import Plan
-from app.vehicles.mavlink.measurements import Breach, Heartbeat, Measurement, Parameter, Position
+from app.vehicles.mavlink.measurements import FenceBreach, Heartbeat, Measurement, Parameter, Position
 from app.vehicles.mavlink.signals import (
-    AbortWanted,
+    AbortRequested,
     Action,
-    Done,
-    Doubled,
-    Perform,
-    Refused,
+    ActionDone,
+    ActionRefused,
+    DuplicateVehicleDetected,
+    PerformAction,
     RestoreGains,
+    SecondaryAltitudeReceived,
     SendGain,
-    Sighted,
 )
 from app.vehicles.mavlink.states import MOVES, State
-from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, Walk
+from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 ABORT = "the operator pressed Abort"
 
 
-def arming() -> Walk:
-    return Walk().pass_s(0.2)
+def arming() -> TrialDriver:
+    return TrialDriver().pass_s(0.2)
 
 
-def baseline() -> Walk:
-    walk = Walk()
+def baseline() -> TrialDriver:
+    walk = TrialDriver()
     walk.armed = True
     return walk.pass_s(1.0)
 
 
-def taking_off() -> Walk:
-    return Walk().arm().pass_s(0.5)
+def taking_off() -> TrialDriver:
+    return TrialDriver().arm().pass_s(0.5)
 
 
-def recording() -> Walk:
-    return Walk().lift_off().pass_s(2.0)
+def recording() -> TrialDriver:
+    return TrialDriver().lift_off().pass_s(2.0)
 
 
-def landing() -> Walk:
-    return Walk().land()
+def landing() -> TrialDriver:
+    return TrialDriver().land()
 
 
-def aborting() -> Walk:
+def aborting() -> TrialDriver:
     """Landing for a reason that does not speak against the gains."""
     walk = recording()
     walk.voltage_v = 10.0
@@ -57,21 +57,21 @@ def aborting() -> Walk:
     return walk.pass_s(0.5)
 
 
-def lost() -> Walk:
+def lost() -> TrialDriver:
     walk = recording()
     walk.mute = True
     return walk.pass_s(1.5)
 
 
-def disarming() -> Walk:
-    return Walk().land().touch_down()
+def disarming() -> TrialDriver:
+    return TrialDriver().land().touch_down()
 
 
-def restoring() -> Walk:
+def restoring() -> TrialDriver:
     return disarming().disarm()
 
 
-STAGES: dict[State, Callable[[], Walk]] = {
+STAGES: dict[State, Callable[[], TrialDriver]] = {
     State.ARM: arming,
     State.TAKEOFF: taking_off,
     State.RECORD: recording,
@@ -86,23 +86,23 @@ STAGES: dict[State, Callable[[], Walk]] = {
 COPTER = replace(PLAN, climbs_from_ground=True)
 
 
-def armed(plan: Plan = COPTER, for_s: float = 0.2) -> Walk:
+def armed(plan: Plan = COPTER, for_s: float = 0.2) -> TrialDriver:
     """For so long, before its take-off command."""
-    walk = Walk(plan=plan)
-    walk.give(Done(Action.ARM, walk.now_s))
+    walk = TrialDriver(plan=plan)
+    walk.give(ActionDone(Action.ARM, walk.now_s))
     walk.armed = True
     while walk.trial.armed_s is None:
         walk.pass_s(STEP_S)
     return walk.pass_s(for_s)
 
 
-def commanded(walk: Walk) -> Walk:
+def commanded(walk: TrialDriver) -> TrialDriver:
     while walk.state is State.ARM:
         walk.pass_s(STEP_S)
     return walk
 
 
-def begun_anew(by_m: float = 0.5, plan: Plan = COPTER, after_s: float = 0.2) -> Walk:
+def begun_anew(by_m: float = 0.5, plan: Plan = COPTER, after_s: float = 0.2) -> TrialDriver:
     """To the take-off command of a vehicle whose altitude begins anew so long after it was armed."""
     walk = armed(plan, after_s)
     walk.altitude_m += by_m
@@ -135,36 +135,38 @@ def test_an_abort_before_the_command_stops_motors_where_it_stands_too() -> None:
     walk = armed()
     walk.altitude_m += 0.5
     walk.pass_s(0.4)
-    walk.give(AbortWanted(ABORT, walk.now_s))
+    walk.give(AbortRequested(ABORT, walk.now_s))
     assert walk.state is State.DISARM
     walk.pass_s(1.1)
     assert Action.MOTORS_OFF in walk.actions
 
 
-def rise(walk: Walk) -> None:
+def rise(walk: TrialDriver) -> None:
     """Really, and stand still in the air."""
     walk.climb_rate_m_s = 1.0
     walk.pass_s(0.4)
     walk.climb_rate_m_s = 0.0
 
 
-def leap_late(walk: Walk) -> None:
+def leap_late(walk: TrialDriver) -> None:
     walk.pass_s(0.7)
     walk.altitude_m -= 1.0
 
 
-def leap_and_say_that_it_flies(walk: Walk) -> None:
+def leap_and_say_that_it_flies(walk: TrialDriver) -> None:
     walk.landed = False
     walk.altitude_m += 0.5
 
 
-def leap_aside(walk: Walk) -> None:
+def leap_aside(walk: TrialDriver) -> None:
     walk.altitude_m += 0.5
     walk.north_m += 1.0
 
 
 @pytest.mark.parametrize("happens", [rise, leap_late, leap_and_say_that_it_flies, leap_aside])
-def test_what_else_its_altitude_does_before_the_command_is_no_new_ground(happens: Callable[[Walk], None]) -> None:
+def test_what_else_its_altitude_does_before_the_command_is_no_new_ground(
+    happens: Callable[[TrialDriver], None],
+) -> None:
     walk = armed()
     happens(walk)
     commanded(walk)
@@ -184,88 +186,88 @@ def test_a_second_source_goes_along_with_an_altitude_that_began_anew() -> None:
     walk = begun_anew()
     for _ in range(50):
         walk.pass_s(STEP_S)
-        walk.give(Sighted(GROUND_M, is_new=True, now_s=walk.now_s))
+        walk.give(SecondaryAltitudeReceived(GROUND_M, is_new=True, now_s=walk.now_s))
     assert walk.trial.failure is None
     assert walk.kept[-1].second_m == pytest.approx(GROUND_M + 0.5)
 
 
-def fall_silent(walk: Walk) -> None:
+def fall_silent(walk: TrialDriver) -> None:
     walk.mute = True
     walk.pass_s(1.1)
 
 
-def lose_heartbeats(walk: Walk) -> None:
+def lose_heartbeats(walk: TrialDriver) -> None:
     walk.heartless = True
     walk.pass_s(2.3)
 
 
-def fly_too_high(walk: Walk) -> None:
+def fly_too_high(walk: TrialDriver) -> None:
     walk.climb_rate_m_s = 3.0
     walk.pass_s(3.0)
 
 
-def swing(walk: Walk) -> None:
+def swing(walk: TrialDriver) -> None:
     for climb_rate_m_s in (1.2, -2.4, 2.4, -2.4, 2.4):
         walk.climb_rate_m_s = climb_rate_m_s
         walk.pass_s(0.5)
 
 
-def cross_its_fence(walk: Walk) -> None:
-    walk.hear(Breach())
+def cross_its_fence(walk: TrialDriver) -> None:
+    walk.hear(FenceBreach())
 
 
-def drain(walk: Walk) -> None:
+def drain(walk: TrialDriver) -> None:
     walk.voltage_v = 10.0
     walk.pass_s(2.5)
 
 
-def press_abort(walk: Walk) -> None:
-    walk.give(AbortWanted(ABORT, walk.now_s))
+def press_abort(walk: TrialDriver) -> None:
+    walk.give(AbortRequested(ABORT, walk.now_s))
 
 
-def freeze(walk: Walk) -> None:
+def freeze(walk: TrialDriver) -> None:
     walk.frozen = True
     walk.pass_s(0.4)
 
 
-def reboot(walk: Walk) -> None:
+def reboot(walk: TrialDriver) -> None:
     walk.boot_s = 0.1
     walk.pass_s(0.7)
 
 
-def go_astray(walk: Walk) -> None:
+def go_astray(walk: TrialDriver) -> None:
     walk.mode = "0"
     walk.pass_s(2.1)
 
 
-def be_taken_over(walk: Walk) -> None:
+def be_taken_over(walk: TrialDriver) -> None:
     walk.mode = "64"
     walk.pass_s(2.1)
 
 
-def stop_by_itself(walk: Walk) -> None:
+def stop_by_itself(walk: TrialDriver) -> None:
     walk.armed = False
     walk.pass_s(1.6)
 
 
-def lose_its_position(walk: Walk) -> None:
+def lose_its_position(walk: TrialDriver) -> None:
     """Beside a position that is no number, and so measures nothing, the rest is heard."""
     walk.blind = True
     walk.pass_s(0.6)
 
 
-def jump_about(walk: Walk) -> None:
+def jump_about(walk: TrialDriver) -> None:
     for _ in range(40):
         walk.pass_s(STEP_S)
         walk.boot_s += 0.01
         walk.hear(Position(round(walk.boot_s, 6), walk.altitude_m + 1.5, walk.climb_rate_m_s))
 
 
-def be_one_of_two(walk: Walk) -> None:
-    walk.give(Doubled("Its sequence numbers come twice, with other contents.", walk.now_s))
+def be_one_of_two(walk: TrialDriver) -> None:
+    walk.give(DuplicateVehicleDetected("Its sequence numbers come twice, with other contents.", walk.now_s))
 
 
-WALK: list[tuple[State, Callable[[Walk], None], State, Failure | None]] = [
+WALK: list[tuple[State, Callable[[TrialDriver], None], State, Failure | None]] = [
     (State.ARM, fall_silent, State.DISARM, Failure.LINK),
     (State.ARM, lose_heartbeats, State.DISARM, Failure.LINK),
     (State.ARM, drain, State.RESTORE, Failure.BATTERY),
@@ -320,7 +322,7 @@ WALK: list[tuple[State, Callable[[Walk], None], State, Failure | None]] = [
     ("state", "befall", "then", "failure"), WALK, ids=[f"{state}-{befall.__name__}" for state, befall, *_ in WALK]
 )
 def test_every_failure_in_every_state_leads_where_it_must(
-    state: State, befall: Callable[[Walk], None], then: State, failure: Failure | None
+    state: State, befall: Callable[[TrialDriver], None], then: State, failure: Failure | None
 ) -> None:
     walk = STAGES[state]()
     assert walk.state is state
@@ -352,7 +354,7 @@ def test_a_flight_goes_through_its_states_and_ends_idle() -> None:
 
 
 def test_the_record_begins_with_the_baseline_and_runs_33_s_from_the_command() -> None:
-    walk = Walk(plan=replace(PLAN, record_s=33.0)).land()
+    walk = TrialDriver(plan=replace(PLAN, record_s=33.0)).land()
     command_s = walk.trial.commanded_boot_s
     assert command_s is not None
     times = [kept.position.time_boot_s - command_s for kept in walk.kept]
@@ -438,7 +440,7 @@ def test_the_motors_are_never_stopped_above_the_ground() -> None:
     for stage in STAGES.values():
         walk = stage()
         for at_s, command in walk.told:
-            if command == Perform(Action.MOTORS_OFF):
+            if command == PerformAction(Action.MOTORS_OFF):
                 assert at_s <= walk.now_s
                 assert walk.altitude_m - GROUND_M < 0.15
 
@@ -454,7 +456,7 @@ def test_a_vehicle_that_does_not_lift_off_is_disarmed_after_1_5_s() -> None:
 
 
 def test_a_lift_off_that_cannot_be_seen_is_a_lost_link_not_a_missing_lift_off() -> None:
-    walk = Walk().arm().pass_s(0.6)
+    walk = TrialDriver().arm().pass_s(0.6)
     walk.mute = True
     walk.pass_s(1.2)
     assert (walk.state, walk.trial.failure, walk.gains_sent) == (State.LINK_LOST, Failure.LINK, [])
@@ -471,13 +473,13 @@ def test_a_vehicle_that_lifts_off_too_late_is_landed_on_its_safe_gains() -> None
 
 def test_a_refused_take_off_disarms_on_the_ground() -> None:
     walk = taking_off()
-    walk.give(Refused(Action.TAKE_OFF, "The vehicle refused to take off (result 4, failed).", walk.now_s))
+    walk.give(ActionRefused(Action.TAKE_OFF, "The vehicle refused to take off (result 4, failed).", walk.now_s))
     assert (walk.state, walk.actions[-1]) == (State.DISARM, Action.MOTORS_OFF)
 
 
 def test_a_refused_arming_disarms_restores_the_gains_and_says_why() -> None:
     walk = arming()
-    walk.give(Refused(Action.ARM, "The vehicle refused to arm (result 4, failed).", walk.now_s))
+    walk.give(ActionRefused(Action.ARM, "The vehicle refused to arm (result 4, failed).", walk.now_s))
     assert (walk.state, walk.actions) == (State.DISARM, [Action.ARM, Action.MOTORS_OFF])
     walk.disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "refused")
@@ -485,7 +487,7 @@ def test_a_refused_arming_disarms_restores_the_gains_and_says_why() -> None:
 
 
 def test_a_vehicle_that_does_not_say_that_it_is_armed_is_not_flown() -> None:
-    walk = Walk()
+    walk = TrialDriver()
     walk.pass_s(15.1)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NOT_ARMED)
     assert Action.TAKE_OFF not in walk.actions
@@ -531,7 +533,7 @@ def test_a_quarantine_tells_what_came_later_too() -> None:
 
 @pytest.mark.parametrize("befall", [reboot, go_astray, stop_by_itself, be_one_of_two])
 def test_a_vehicle_that_nobody_understands_is_told_to_land_again_and_again_and_its_motors_are_left_alone(
-    befall: Callable[[Walk], None],
+    befall: Callable[[TrialDriver], None],
 ) -> None:
     walk = recording()
     befall(walk)
@@ -615,7 +617,7 @@ def test_after_a_person_has_taken_over_nothing_more_is_sent() -> None:
     told = len(walk.told)
     be_taken_over(walk)
     walk.pass_s(5.0)
-    assert not [command for _, command in walk.told[told:] if isinstance(command, Perform | SendGain)]
+    assert not [command for _, command in walk.told[told:] if isinstance(command, PerformAction | SendGain)]
 
 
 def test_a_vehicle_that_disarms_itself_after_landing_has_landed() -> None:

@@ -16,17 +16,17 @@ from app.vehicles.mavlink.measurements import (
     Block,
     BlockCount,
     BlockEntered,
-    Breach,
+    CommandReply,
+    FenceBreach,
     Heartbeat,
     Measurement,
     Parameter,
     Position,
-    Reply,
     Version,
 )
 from app.vehicles.mavlink.parameters import settings
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Aim, Outgoing, Profile, check_gains
+from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Target, check_gains
 from app.vehicles.mavlink.signals import Action, Setting
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 
@@ -40,10 +40,10 @@ def measured(gains: tuple[int, int, int], kind: str) -> list[Measurement]:
     return [each for each in found if each is not None]
 
 
-def aim(gains: tuple[int, int, int] = FLOWN[0]) -> Aim:
+def aim(gains: tuple[int, int, int] = FLOWN[0]) -> Target:
     """The recorded vehicle, its blocks as it listed them."""
     blocks = {block.name: block.number for block in measured(gains, "SCRIPT_ITEM") if isinstance(block, Block)}
-    return Aim(system=VEHICLE, aircraft=VEHICLE, blocks=blocks)
+    return Target(system=VEHICLE, aircraft=VEHICLE, blocks=blocks)
 
 
 def heard(profile: Profile, kind: str, **fields: FieldValue) -> Measurement | None:
@@ -53,7 +53,7 @@ def heard(profile: Profile, kind: str, **fields: FieldValue) -> Measurement | No
     return profile.measure(message)
 
 
-def sent(profile: Profile, action: Action, aim: Aim) -> list[Outgoing]:
+def sent(profile: Profile, action: Action, aim: Target) -> list[Outgoing]:
     return [message for step in profile.steps(action, aim) for message in step.sends]
 
 
@@ -155,7 +155,7 @@ def test_land_comes_with_the_acknowledgement_that_frees_the_blocks() -> None:
 
 
 def test_blocks_go_by_the_system_id_and_the_rest_by_the_aircraft_id() -> None:
-    whom = Aim(system=7, aircraft=31, blocks=aim().blocks)
+    whom = Target(system=7, aircraft=31, blocks=aim().blocks)
     by_kind = {
         message.kind: message.fields["target_system"] for action in Action for message in sent(PAPARAZZI, action, whom)
     }
@@ -280,18 +280,20 @@ def test_modes_are_told_apart() -> None:
 
 def test_a_command_under_way_is_no_answer_yet() -> None:
     assert heard(PX4, "COMMAND_ACK", command=400, result=5) is None
-    assert heard(PX4, "COMMAND_ACK", command=400, result=0) == Reply("command 400", True, "result 0, accepted")
-    assert heard(ARDUPILOT, "COMMAND_ACK", command=400, result=4) == Reply("command 400", False, "result 4, failed")
+    assert heard(PX4, "COMMAND_ACK", command=400, result=0) == CommandReply("command 400", True, "result 0, accepted")
+    assert heard(ARDUPILOT, "COMMAND_ACK", command=400, result=4) == CommandReply(
+        "command 400", False, "result 4, failed"
+    )
 
 
 def test_a_breached_fence_is_told() -> None:
     known = {"breach_count": 1, "breach_type": 2, "breach_time": 0}
-    assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=1, **known) == Breach("its greatest altitude")
+    assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=1, **known) == FenceBreach("its greatest altitude")
     assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=0, **known) is None
 
 
 def commands(profile: Profile, action: Action) -> list[tuple[FieldValue, ...]]:
-    whom = Aim(system=1, aircraft=1)
+    whom = Target(system=1, aircraft=1)
     return [
         (message.fields["command"], *(message.fields[f"param{place}"] for place in range(1, 8)))
         for message in sent(profile, action, whom)
@@ -305,7 +307,7 @@ def test_arducopter_takes_off_in_guided_mode_and_lands_in_its_own() -> None:
 
 
 def test_px4_takes_off_by_its_mode_to_the_altitude_of_its_parameter() -> None:
-    assert PX4.take_off_settings(Aim(system=1, aircraft=1)) == (Setting("MIS_TAKEOFF_ALT", 3.0),)
+    assert PX4.take_off_settings(Target(system=1, aircraft=1)) == (Setting("MIS_TAKEOFF_ALT", 3.0),)
     assert commands(PX4, Action.ARM) == [(400, 1, 0, 0, 0, 0, 0, 0)]
     assert commands(PX4, Action.TAKE_OFF) == [(176, 1, 4, 2, 0, 0, 0, 0)]
     assert commands(PX4, Action.LAND) == [(176, 1, 4, 6, 0, 0, 0, 0)]
@@ -313,7 +315,7 @@ def test_px4_takes_off_by_its_mode_to_the_altitude_of_its_parameter() -> None:
 
 @pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
 def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Profile) -> None:
-    steps = profile.prepare(Aim(system=1, aircraft=1), 125.0)
+    steps = profile.prepare(Target(system=1, aircraft=1), 125.0)
     asked = [(step.sends[0].fields, step.needed) for step in steps]
     assert {fields["command"] for fields, _ in asked} == {511}
     assert [(fields["param1"], needed) for fields, needed in asked] == [
@@ -340,7 +342,7 @@ def test_everything_that_is_sent_can_be_packed(profile: Profile) -> None:
 
 
 def test_motors_off_at_any_height_is_the_one_command_that_is_forced() -> None:
-    whom = Aim(system=1, aircraft=1)
+    whom = Target(system=1, aircraft=1)
     for profile in (ARDUPILOT, PX4):
         [message] = sent(profile, Action.KILL, whom)
         assert (message.kind, [message.fields[f"param{place}"] for place in (1, 2)]) == ("COMMAND_LONG", [0.0, 21196.0])

@@ -15,13 +15,13 @@ from app.vehicles.mavlink.measurements import Position
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.signals import (
     Action,
+    ActionDone,
     Command,
-    Done,
     Event,
-    Heard,
-    Keep,
-    Perform,
-    Restored,
+    GainsRestored,
+    PacketReceived,
+    PerformAction,
+    RecordSample,
     RestoreGains,
     Setting,
     Tick,
@@ -70,7 +70,7 @@ class Replay:
         self.states = [State.ARM]
         self.trial: Trial
         self.trial, _ = begin(plan, watching.begin(arming, last=positions[-1], battery_v=12.4), arming)
-        self.give(Done(Action.ARM, arming))
+        self.give(ActionDone(Action.ARM, arming))
 
     def run(self) -> None:
         """To the end. The recorded ground station waited longer before it stopped the motors: that wait is left out."""
@@ -82,11 +82,11 @@ class Replay:
                 ahead_s = each.time_s - self.trial.since_s
             self.hear(replace(each, time_s=each.time_s - ahead_s))
             if self.trial.state is State.RESTORE:
-                self.give(Restored(each.time_s - ahead_s))
+                self.give(GainsRestored(each.time_s - ahead_s))
                 return
 
     def hear(self, each: Recorded) -> None:
-        self.give(Heard(PAPARAZZI.measure(each.message), each.time_s))
+        self.give(PacketReceived(PAPARAZZI.measure(each.message), each.time_s))
         self.give(Tick(each.time_s))
 
     def give(self, event: Event) -> None:
@@ -96,13 +96,13 @@ class Replay:
             self.states.append(self.trial.state)
 
     def when(self, action: Action) -> float:
-        return next(at_s for at_s, command in self.told if command == Perform(action))
+        return next(at_s for at_s, command in self.told if command == PerformAction(action))
 
     @property
     def trajectory(self) -> Trajectory:
         start_s = self.trial.commanded_boot_s
         assert start_s is not None
-        kept = [command.position for _, command in self.told if isinstance(command, Keep)]
+        kept = [command.position for _, command in self.told if isinstance(command, RecordSample)]
         time_s = np.array([position.time_boot_s - start_s for position in kept])
         return Trajectory(time_s, {"altitude_m": np.array([each.altitude_m for each in kept])}, "mavlink", "vehicle")
 

@@ -7,7 +7,7 @@ from app.core.errors import InputError
 from app.vehicles.mavlink import signing
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, BAD_DATA, PAPARAZZI, Codec, FieldValue, number
 from app.vehicles.mavlink.link import Link
-from tests.vehicles.mavlink.speaking import Speaker, becomes, collect, position
+from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, becomes, collect, position
 
 KEY = bytes(range(32))
 WRONG_KEY = bytes(32)
@@ -36,7 +36,7 @@ def telemetry(vehicle: Codec, time_boot_ms: int) -> bytearray:
 
 def test_a_signed_link_carries_commands_and_telemetry() -> None:
     with (
-        Speaker(ARDUPILOTMEGA, system=1, key=KEY) as vehicle,
+        FakeVehicleEndpoint(ARDUPILOTMEGA, system=1, key=KEY) as vehicle,
         Link(vehicle.address, ARDUPILOTMEGA, clock=CLOCK, target_system=1, signing_key=KEY) as link,
     ):
         vehicle.say("LOCAL_POSITION_NED", **position(20))
@@ -50,7 +50,7 @@ def test_a_signed_link_carries_commands_and_telemetry() -> None:
 @pytest.mark.parametrize("key", [None, WRONG_KEY], ids=["unsigned", "wrong key"])
 def test_what_is_not_signed_with_the_key_is_noise(key: bytes | None) -> None:
     with (
-        Speaker(ARDUPILOTMEGA, system=1, key=key) as vehicle,
+        FakeVehicleEndpoint(ARDUPILOTMEGA, system=1, key=key) as vehicle,
         Link(vehicle.ground_address, ARDUPILOTMEGA, clock=CLOCK, target_system=1, signing_key=KEY) as link,
     ):
         vehicle.say("LOCAL_POSITION_NED", **position(20))
@@ -89,7 +89,7 @@ def test_time_stamps_keep_up_with_time() -> None:
 
 def test_paparazzi_cannot_be_signed() -> None:
     with (
-        Speaker(PAPARAZZI) as vehicle,
+        FakeVehicleEndpoint(PAPARAZZI) as vehicle,
         pytest.raises(InputError, match="The dialect paparazzi cannot be signed") as refusal,
     ):
         Link(vehicle.address, PAPARAZZI, clock=CLOCK, signing_key=KEY)

@@ -6,7 +6,7 @@ from itertools import chain
 
 import pytest
 
-from app.vehicles.mavlink.speakers import Speakers
+from app.vehicles.mavlink.speakers import DuplicateDetector
 
 Packet = tuple[float, int, bytes, float]
 """When it comes, its sequence number, its frame, the vehicle's time that it tells."""
@@ -31,7 +31,7 @@ def said(
 
 def heard(packets: Iterable[Packet]) -> tuple[str, float]:
     """What is believed first that is not nothing, and when; nothing, and the end."""
-    speakers, at_s = Speakers(), 0.0
+    speakers, at_s = DuplicateDetector(), 0.0
     for at_s, number, frame, boot_s in sorted(packets, key=lambda packet: packet[0]):
         speakers.hear(frame, number, at_s, boot_s)
         if doubt := speakers.doubt(at_s):
@@ -83,7 +83,7 @@ def test_two_vehicles_are_noticed_within_two_seconds(ahead: int, older_s: float)
 
 
 def test_the_doubt_is_over_once_one_of_them_is_silent() -> None:
-    speakers = Speakers()
+    speakers = DuplicateDetector()
     packets = sorted([*said("one", seconds=30.0), *said("other", number=40, boot_s=7.0, at_s=3.0, seconds=5.0)])
     doubts = []
     for at_s, number, frame, boot_s in packets:

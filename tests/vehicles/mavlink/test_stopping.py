@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.vehicles.base import FlightOrder, FlightRecord, Stop
+from app.vehicles.base import FlightOptions, FlightRecord, StopRequest
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -16,7 +16,7 @@ from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import connected
 
-ORDER = FlightOrder(seed=1)
+ORDER = FlightOptions(seed=1)
 HARD_M_S = 2.0
 MESSAGE_ID, PARAM_SET, COMMAND_LONG = 5, 23, 76
 """Where a frame of MAVLink 1 has the number of its message, and two of these."""
@@ -97,8 +97,8 @@ def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_s
     with LockstepRig(make=of(kill_setting=setting)) as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)
 
-        def slide() -> Stop | None:
-            return Stop("people below", motors_off=True) if rig.drone.body.altitude_m > 1.0 else None
+        def slide() -> StopRequest | None:
+            return StopRequest("people below", motors_off=True) if rig.drone.body.altitude_m > 1.0 else None
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
         assert not rig.drone.autopilot.armed
@@ -117,10 +117,10 @@ def test_motors_off_that_the_vehicle_does_not_heed_is_not_said_to_have_stopped_t
     with LockstepRig(make=of(Heedless)) as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)
 
-        def slide() -> Stop | None:
+        def slide() -> StopRequest | None:
             if rig.drone.body.altitude_m > 1.0:
                 slid.append(rig.now_s())
-            return Stop("people below", motors_off=True) if slid else None
+            return StopRequest("people below", motors_off=True) if slid else None
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
         assert record.reason.startswith(

@@ -12,7 +12,7 @@ from app.core.clock import ScaledClock
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, PAPARAZZI, Dialect, FieldValue, Message, number, text
 from app.vehicles.mavlink.link import Link, LinkError
 from app.vehicles.mavlink.tlog import TlogWriter, record
-from tests.vehicles.mavlink.speaking import Speaker, becomes, collect, heartbeat, position
+from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, becomes, collect, heartbeat, position
 
 GAIN: dict[str, FieldValue] = {
     "target_system": 31,
@@ -43,7 +43,7 @@ def test_both_directions_are_read_back_in_order_with_their_times(
 ) -> None:
     path = tmp_path / "flight.tlog"
     started_s = time.time()
-    with Speaker(dialect) as vehicle:
+    with FakeVehicleEndpoint(dialect) as vehicle:
         with Link(vehicle.address, dialect, clock=ScaledClock(), target_system=31, tlog=path) as link:
             for step in range(200):
                 vehicle.say("LOCAL_POSITION_NED", **position(20 * step, z=-0.5))
@@ -69,7 +69,7 @@ def test_both_directions_are_read_back_in_order_with_their_times(
 
 def test_what_was_dropped_is_not_in_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "flight.tlog"
-    with Speaker(PAPARAZZI) as vehicle:
+    with FakeVehicleEndpoint(PAPARAZZI) as vehicle:
         other = PAPARAZZI.codec(system=7, component=1)
         with Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=path) as link:
             vehicle.send(other.pack(PAPARAZZI.message("LOCAL_POSITION_NED", position(20))) + b"noise")
@@ -83,7 +83,7 @@ def test_a_log_runs_in_vehicle_time(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     clock = ScaledClock(100.0)
     heard = []
     with (
-        Speaker(PAPARAZZI) as vehicle,
+        FakeVehicleEndpoint(PAPARAZZI) as vehicle,
         Link(vehicle.address, PAPARAZZI, clock=clock, target_system=31, tlog=path) as link,
     ):
         for step in range(2):
@@ -122,7 +122,7 @@ def test_a_disk_that_stalls_keeps_nothing_waiting(tmp_path: Path, monkeypatch: p
     path = tmp_path / "stalled.tlog"
     os.mkfifo(path)
     nobody = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    with Speaker(PAPARAZZI) as vehicle:
+    with FakeVehicleEndpoint(PAPARAZZI) as vehicle:
         link = Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=path)
         for step in range(3000):
             vehicle.say("LOCAL_POSITION_NED", **position(step))
@@ -159,7 +159,7 @@ def test_what_a_full_disk_did_not_take_is_stored_when_there_is_room(
 
 def test_a_full_disk_is_told_and_does_not_end_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
     with (
-        Speaker(PAPARAZZI) as vehicle,
+        FakeVehicleEndpoint(PAPARAZZI) as vehicle,
         Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=Path("/dev/full")) as link,
     ):
         for step in range(3):

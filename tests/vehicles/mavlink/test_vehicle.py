@@ -7,7 +7,7 @@ import pytest
 
 from app.core.errors import InputError
 from app.core.experiments.takeoff import Takeoff
-from app.vehicles.base import FlightOrder, FlightRecord, OptionValue, Sample, Stop
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, StopRequest
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.kind import MAVLINK
@@ -17,7 +17,7 @@ from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
 
-ORDER = FlightOrder(seed=1)
+ORDER = FlightOptions(seed=1)
 TAKEOFF = Takeoff()
 
 
@@ -152,7 +152,7 @@ def test_a_flight_aborted_before_it_starts_leaves_one_instant_and_arms_nothing()
     with LockstepRig() as rig:
         vehicle = rig.vehicle()
         vehicle.stage(TUNED)
-        record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=lambda: Stop("changed my mind"))
+        record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=lambda: StopRequest("changed my mind"))
         assert (record.ending, record.reason) == ("aborted", "changed my mind")
         assert record.trajectory.time_s.tolist() == [0.0]
         assert not rig.told("SCRIPT_ITEM")

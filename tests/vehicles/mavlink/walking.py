@@ -5,16 +5,24 @@ from dataclasses import dataclass, field
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.measurements import DISARMING, Battery, Heartbeat, LandedState, Measurement, Position, Reply
+from app.vehicles.mavlink.measurements import (
+    DISARMING,
+    Battery,
+    CommandReply,
+    Heartbeat,
+    LandedState,
+    Measurement,
+    Position,
+)
 from app.vehicles.mavlink.signals import (
     Action,
+    ActionDone,
     Command,
-    Done,
     Event,
-    Heard,
-    Keep,
-    Perform,
-    Restored,
+    GainsRestored,
+    PacketReceived,
+    PerformAction,
+    RecordSample,
     SendGain,
     Setting,
     Tick,
@@ -36,7 +44,7 @@ PLAN = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=GROUND_M, record_s=8.
 
 
 @dataclass
-class Walk:
+class TrialDriver:
     """Feeds a trial at 50 Hz with what its vehicle does; `told` are the commands with the time of each."""
 
     plan: Plan = PLAN
@@ -71,28 +79,28 @@ class Walk:
 
     @property
     def actions(self) -> list[Action]:
-        return [command.action for _, command in self.told if isinstance(command, Perform)]
+        return [command.action for _, command in self.told if isinstance(command, PerformAction)]
 
     @property
     def gains_sent(self) -> list[Setting]:
         return [command.setting for _, command in self.told if isinstance(command, SendGain)]
 
     @property
-    def kept(self) -> list[Keep]:
-        return [command for _, command in self.told if isinstance(command, Keep)]
+    def kept(self) -> list[RecordSample]:
+        return [command for _, command in self.told if isinstance(command, RecordSample)]
 
     def when(self, action: Action) -> list[float]:
-        return [at_s for at_s, command in self.told if isinstance(command, Perform) and command.action is action]
+        return [at_s for at_s, command in self.told if isinstance(command, PerformAction) and command.action is action]
 
-    def give(self, event: Event) -> "Walk":
+    def give(self, event: Event) -> "TrialDriver":
         self.trial, commands = advance(self.trial, event)
         self._note(commands)
         return self
 
-    def hear(self, measurement: Measurement | None) -> "Walk":
-        return self.give(Heard(measurement, self.now_s))
+    def hear(self, measurement: Measurement | None) -> "TrialDriver":
+        return self.give(PacketReceived(measurement, self.now_s))
 
-    def pass_s(self, seconds: float) -> "Walk":
+    def pass_s(self, seconds: float) -> "TrialDriver":
         """Let time pass, the vehicle saying what it does; altitude follows the climb rate."""
         for _ in range(round(seconds / STEP_S)):
             self.steps += 1
@@ -121,15 +129,15 @@ class Walk:
 
     # ---- as a flight goes
 
-    def arm(self) -> "Walk":
+    def arm(self) -> "TrialDriver":
         """To the take-off command."""
-        self.give(Done(Action.ARM, self.now_s))
+        self.give(ActionDone(Action.ARM, self.now_s))
         self.armed = True
         while self.state is State.ARM:
             self.pass_s(STEP_S)
         return self
 
-    def lift_off(self) -> "Walk":
+    def lift_off(self) -> "TrialDriver":
         """Until it hovers at 3 m, on record."""
         self.arm()
         self.climb_rate_m_s = 1.0
@@ -137,7 +145,7 @@ class Walk:
         self.climb_rate_m_s = 0.0
         return self
 
-    def land(self) -> "Walk":
+    def land(self) -> "TrialDriver":
         """To the end of the record, and half a second of descent."""
         self.lift_off()
         while self.state is State.RECORD:
@@ -145,7 +153,7 @@ class Walk:
         self.climb_rate_m_s = -0.8
         return self.pass_s(0.5)
 
-    def touch_down(self) -> "Walk":
+    def touch_down(self) -> "TrialDriver":
         """Down from wherever it is, then at rest until something happens."""
         self.climb_rate_m_s = -0.8
         while self.altitude_m > GROUND_M + 0.02:
@@ -156,11 +164,11 @@ class Walk:
             self.pass_s(STEP_S)
         return self
 
-    def disarm(self) -> "Walk":
+    def disarm(self) -> "TrialDriver":
         """From the landed vehicle to its gains being restored: it answers, and its next heartbeat agrees."""
-        self.hear(Reply(DISARMING, accepted=True))
+        self.hear(CommandReply(DISARMING, accepted=True))
         self.armed = False
         return self.pass_s(0.6)
 
-    def restore(self, problem: str = "") -> "Walk":
-        return self.give(Restored(self.now_s, problem))
+    def restore(self, problem: str = "") -> "TrialDriver":
+        return self.give(GainsRestored(self.now_s, problem))

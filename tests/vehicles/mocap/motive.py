@@ -6,18 +6,18 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
-from app.vehicles.mavlink.sources import Source, SourceSample
+from app.vehicles.mavlink.sources import AltitudeSource, SourceSample
 from app.vehicles.mocap.addresses import SourceAddress
-from app.vehicles.simdrone.cameras import Cameras, Outlet, open_outlet
+from app.vehicles.simdrone.cameras import MocapOutput, MotionCapture, open_outlet
 
 LOOPBACK: Final = "127.0.0.1"
 
 
-class Motive:
+class FakeMotive:
     """Streams in real time what is `altitude_m` high, from its beginning to its end; its clock begins at `clock_s`."""
 
-    def __init__(self, address: SourceAddress, outlet: Outlet | None = None, *, clock_s: float = 0.0) -> None:
-        self.cameras = Cameras()
+    def __init__(self, address: SourceAddress, outlet: MocapOutput | None = None, *, clock_s: float = 0.0) -> None:
+        self.cameras = MotionCapture()
         self.altitude_m = 0.0
         self._clock_s = clock_s
         self._outlet = outlet or open_outlet(address)
@@ -48,7 +48,7 @@ def comes_true(condition: Callable[[], bool], within_s: float = 10.0) -> bool:
     return held
 
 
-def news(source: Source, count: int = 10, within_s: float = 10.0) -> list[SourceSample]:
+def news(source: AltitudeSource, count: int = 10, within_s: float = 10.0) -> list[SourceSample]:
     """What comes from now on, at least so many samples."""
     source.take()
     heard: list[SourceSample] = []

@@ -14,8 +14,8 @@ from app.vehicles.errors import VehicleError
 from app.vehicles.mocap import natnet
 from app.vehicles.mocap.addresses import NatNetAddress
 from app.vehicles.mocap.natnet import NatNetSource
-from app.vehicles.simdrone.cameras import Glimpse, NatNetServer, frame_packet
-from tests.vehicles.mocap.motive import LOOPBACK, Motive, comes_true, news
+from app.vehicles.simdrone.cameras import MocapFrame, NatNetServer, frame_packet
+from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
 from tests.vehicles.simdrone.ground import free_port
 
 CLOCK = ScaledClock()
@@ -35,13 +35,13 @@ def unicast() -> NatNetAddress:
 
 
 @pytest.fixture
-def motive(unicast: NatNetAddress) -> Iterator[Motive]:
-    with Motive(unicast) as running:
+def motive(unicast: NatNetAddress) -> Iterator[FakeMotive]:
+    with FakeMotive(unicast) as running:
         yield running
 
 
 def test_the_body_s_altitude_is_heard_and_dated(address: NatNetAddress) -> None:
-    with Motive(address) as motive, closing(NatNetSource(address, CLOCK)) as source:
+    with FakeMotive(address) as motive, closing(NatNetSource(address, CLOCK)) as source:
         motive.altitude_m = 1.5
         assert comes_true(lambda: any(sample.altitude_m > 1.4 for sample in source.take()))
         begun_s = CLOCK.now_s()
@@ -56,14 +56,14 @@ def test_the_body_s_altitude_is_heard_and_dated(address: NatNetAddress) -> None:
 
 def test_the_axis_that_is_up_is_as_motive_streams_it(unicast: NatNetAddress) -> None:
     z_up = replace(unicast, up="z")
-    with Motive(z_up) as motive, closing(NatNetSource(z_up, CLOCK)) as right:
+    with FakeMotive(z_up) as motive, closing(NatNetSource(z_up, CLOCK)) as right:
         motive.altitude_m = 2.0
         assert comes_true(lambda: any(sample.altitude_m > 1.9 for sample in right.take()))
         with closing(NatNetSource(unicast, CLOCK)) as wrong:
             assert max(abs(sample.altitude_m) for sample in news(wrong)) < 0.1
 
 
-def test_lost_tracking_is_told(unicast: NatNetAddress, motive: Motive) -> None:
+def test_lost_tracking_is_told(unicast: NatNetAddress, motive: FakeMotive) -> None:
     with closing(NatNetSource(unicast, CLOCK)) as source:
         motive.cameras.blind = True
         assert comes_true(lambda: "do not see rigid body 3" in source.trouble)
@@ -73,14 +73,14 @@ def test_lost_tracking_is_told(unicast: NatNetAddress, motive: Motive) -> None:
         assert all(sample.tracking_valid for sample in news(source))
 
 
-def test_frames_that_are_sent_again_do_not_advance(unicast: NatNetAddress, motive: Motive) -> None:
+def test_frames_that_are_sent_again_do_not_advance(unicast: NatNetAddress, motive: FakeMotive) -> None:
     with closing(NatNetSource(unicast, CLOCK)) as source:
         motive.cameras.stuck = True
         time.sleep(0.1)
         assert not any(sample.advances for sample in news(source))
 
 
-def test_a_body_that_is_not_streamed_is_named_with_those_that_are(unicast: NatNetAddress, motive: Motive) -> None:
+def test_a_body_that_is_not_streamed_is_named_with_those_that_are(unicast: NatNetAddress, motive: FakeMotive) -> None:
     with pytest.raises(VehicleError, match=r"streams no rigid body 4; it streams these ids: 3\. Take the streaming id"):
         NatNetSource(replace(unicast, body=4), CLOCK)
 
@@ -88,7 +88,7 @@ def test_a_body_that_is_not_streamed_is_named_with_those_that_are(unicast: NatNe
 def test_frames_on_another_group_than_the_one_listened_to_are_missed_in_words(unicast: NatNetAddress) -> None:
     streamed = replace(unicast, multicast="239.255.42.99", data_port=free_port())
     listened = replace(streamed, multicast="239.255.42.98")
-    with Motive(streamed), pytest.raises(VehicleError, match=r"answers, but no frames came .* &multicast=GROUP"):
+    with FakeMotive(streamed), pytest.raises(VehicleError, match=r"answers, but no frames came .* &multicast=GROUP"):
         NatNetSource(listened, CLOCK)
 
 
@@ -100,7 +100,7 @@ def test_nobody_there_is_said_with_address_and_port(monkeypatch: pytest.MonkeyPa
 
 def test_a_server_too_old_to_tell_whether_it_tracks_is_refused(unicast: NatNetAddress) -> None:
     old = NatNetServer(unicast, (2, 5, 0, 0))
-    with Motive(unicast, old), pytest.raises(VehicleError, match=r"NatNet 2\.5\.0\.0, which does not tell whether"):
+    with FakeMotive(unicast, old), pytest.raises(VehicleError, match=r"NatNet 2\.5\.0\.0, which does not tell whether"):
         NatNetSource(unicast, CLOCK)
 
 
@@ -108,11 +108,11 @@ def test_a_system_that_was_switched_off_is_troubled_and_heard_again_when_it_is_b
     monkeypatch: pytest.MonkeyPatch, unicast: NatNetAddress
 ) -> None:
     monkeypatch.setattr(natnet, "SILENT_S", 0.2)
-    with Motive(unicast, clock_s=900.0):
+    with FakeMotive(unicast, clock_s=900.0):
         source = NatNetSource(unicast, CLOCK)
     with closing(source):
         assert comes_true(lambda: "Nothing has come of rigid body 3" in source.trouble)
-        with Motive(unicast):
+        with FakeMotive(unicast):
             assert comes_true(lambda: source.trouble == "")
             assert all(sample.advances for sample in news(source))
     assert "not listened to any more" in source.trouble
@@ -121,9 +121,13 @@ def test_a_system_that_was_switched_off_is_troubled_and_heard_again_when_it_is_b
 @pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 def test_rubbish_on_its_port_does_not_end_it(capfd: pytest.CaptureFixture[str], unicast: NatNetAddress) -> None:
     group = replace(unicast, multicast="239.255.42.99", local=LOOPBACK, data_port=free_port())
-    whole = frame_packet(Glimpse(7, 1.0, (0.0, 0.0, 0.5), tracked=True), 3, up="y")
+    whole = frame_packet(MocapFrame(7, 1.0, (0.0, 0.0, 0.5), tracked=True), 3, up="y")
     endless = struct.pack("<HHIII", 7, 12, 7, 0xFFFFFFFF, 0)
-    with Motive(group), closing(NatNetSource(group, CLOCK)) as source, socket.socket(type=socket.SOCK_DGRAM) as radio:
+    with (
+        FakeMotive(group),
+        closing(NatNetSource(group, CLOCK)) as source,
+        socket.socket(type=socket.SOCK_DGRAM) as radio,
+    ):
         radio.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(LOOPBACK))
         for rubbish in (b"\x07", whole[:60], whole[:-20], endless, b"\xff" * 200):
             radio.sendto(rubbish, (group.multicast, group.data_port))
@@ -132,6 +136,6 @@ def test_rubbish_on_its_port_does_not_end_it(capfd: pytest.CaptureFixture[str], 
         assert source.trouble == ""
 
 
-def test_a_second_server_on_its_port_is_refused(unicast: NatNetAddress, motive: Motive) -> None:
+def test_a_second_server_on_its_port_is_refused(unicast: NatNetAddress, motive: FakeMotive) -> None:
     with pytest.raises(VehicleError, match="could not be opened"):
         NatNetServer(unicast)

@@ -17,7 +17,7 @@ from app.vehicles.mocap import odometry
 from app.vehicles.mocap.addresses import StreamAddress
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource
 from app.vehicles.mocap.opening import open_source
-from tests.vehicles.mocap.motive import LOOPBACK, Motive, comes_true, news
+from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
 from tests.vehicles.simdrone.ground import free_port
 
 CLOCK = ScaledClock()
@@ -88,7 +88,7 @@ def test_a_link_without_odometry_is_troubled(monkeypatch: pytest.MonkeyPatch, ow
 
 def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
     port = free_port()
-    with Motive(StreamAddress(UdpAddress(LOOPBACK, port))) as motive:
+    with FakeMotive(StreamAddress(UdpAddress(LOOPBACK, port))) as motive:
         motive.altitude_m = 1.2
         with closing(open_source(f"mavlink:udpin:{LOOPBACK}:{port}", CLOCK)) as source:
             assert comes_true(lambda: any(sample.altitude_m > 1.1 for sample in source.take()))
@@ -106,7 +106,7 @@ def test_a_stranger_on_the_port_is_not_taken_for_the_motion_capture() -> None:
     port = free_port()
     with socket.socket(type=socket.SOCK_DGRAM) as stranger:
         chatter = COMMON.codec(system=9, component=9).pack(COMMON.message("STATUSTEXT", {"severity": 6, "text": "hi"}))
-        with Motive(StreamAddress(UdpAddress(LOOPBACK, port))):
+        with FakeMotive(StreamAddress(UdpAddress(LOOPBACK, port))):
             stranger.sendto(chatter, (LOOPBACK, port))
             with closing(StreamSource(StreamAddress(UdpInAddress(LOOPBACK, port)), CLOCK)) as source:
                 stranger.sendto(b"\xff" * 40, (LOOPBACK, port))

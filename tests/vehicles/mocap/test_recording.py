@@ -8,7 +8,7 @@ import pytest
 from app.core.experiments.takeoff import Takeoff
 from app.core.glitches import find_glitches
 from app.core.trajectory import Samples, Trajectory
-from app.vehicles.mocap.recording import with_second
+from app.vehicles.mocap.recording import add_secondary_altitude
 
 ZERO_S = 700.0
 """The record's time 0 on the ground's clock."""
@@ -46,7 +46,7 @@ def unseen(seen: Sequence[tuple[float, float]], from_s: float, until_s: float) -
 
 def test_the_vehicle_s_altitude_is_scored_and_the_cameras_are_beside_it() -> None:
     own = own_record()
-    both = with_second(own, sightings(), name="motion capture", zero_s=ZERO_S, scored="vehicle")
+    both = add_secondary_altitude(own, sightings(), name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert both.remark == ""
     assert both.trajectory["altitude_m"] is own["altitude_m"]
     np.testing.assert_allclose(both.trajectory["altitude_2_m"], own["altitude_m"], atol=0.02)
@@ -56,7 +56,9 @@ def test_the_vehicle_s_altitude_is_scored_and_the_cameras_are_beside_it() -> Non
 
 
 def test_the_cameras_altitude_is_scored_on_their_own_times_and_the_vehicle_is_beside_it() -> None:
-    both = with_second(own_record(), sightings(), name="motion capture", zero_s=ZERO_S, scored="mocap").trajectory
+    both = add_secondary_altitude(
+        own_record(), sightings(), name="motion capture", zero_s=ZERO_S, scored="mocap"
+    ).trajectory
     np.testing.assert_allclose(np.diff(both.time_s), 0.01, atol=2e-6)
     assert both.time_s[0] == pytest.approx(-1.0, abs=0.01)
     assert both.time_s[-1] == pytest.approx(33.0, abs=0.04)
@@ -68,7 +70,9 @@ def test_the_cameras_altitude_is_scored_on_their_own_times_and_the_vehicle_is_be
 
 def test_a_source_that_drifts_away_is_told_in_words_and_numbers_and_shown_as_a_glitch() -> None:
     drift_m = np.interp(np.arange(-2.5, 35.0, 0.01), (10.0, 14.0, 14.1), (0.0, 0.5, 0.0))
-    both = with_second(own_record(), sightings(drift_m), name="motion capture", zero_s=ZERO_S, scored="vehicle")
+    both = add_secondary_altitude(
+        own_record(), sightings(drift_m), name="motion capture", zero_s=ZERO_S, scored="vehicle"
+    )
     assert "The vehicle and motion capture disagree: up to 0.5" in both.remark
     assert "at 14.0 s" in both.remark
     assert both.settings["second_largest_m"] == pytest.approx(0.5, abs=0.02)
@@ -77,16 +81,16 @@ def test_a_source_that_drifts_away_is_told_in_words_and_numbers_and_shown_as_a_g
 
 def test_what_the_cameras_did_not_see_is_missing_where_they_are_scored_and_told_where_they_are_not() -> None:
     seen = unseen(sightings(), 20.0, 21.2)
-    beside = with_second(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="vehicle")
+    beside = add_secondary_altitude(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert beside.remark == "Motion capture saw nothing for 1.2 s from 20.0 s on."
     np.testing.assert_allclose(beside.trajectory["altitude_2_m"], climb_m(TIME_S), atol=0.02)
-    scored = with_second(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
+    scored = add_secondary_altitude(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert [glitch.kind for glitch in find_glitches(Takeoff(), scored.trajectory)] == ["gap"]
 
 
 def test_a_flight_that_hardly_moved_is_aligned_by_receipt_and_says_so() -> None:
     low = sightings(top_m=0.1)
-    both = with_second(own_record(0.1), low, name="motion capture", zero_s=ZERO_S, scored="vehicle")
+    both = add_secondary_altitude(own_record(0.1), low, name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert "aligned by its receipt alone: the two moved by less than 0.3 m" in both.remark
     assert both.settings["second_delay_s"] == 0.0
     np.testing.assert_allclose(both.trajectory["altitude_2_m"], climb_m(TIME_S) / 30.0, atol=0.02)
@@ -97,6 +101,6 @@ def test_a_flight_that_hardly_moved_is_aligned_by_receipt_and_says_so() -> None:
 )
 def test_a_source_that_saw_nothing_leaves_the_record_as_it_is(seen: list[tuple[float, float]]) -> None:
     own = own_record()
-    both = with_second(own, seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
+    both = add_secondary_altitude(own, seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert both.trajectory is own
     assert both.remark.startswith("Nothing was seen by motion capture, the second source of altitude;")

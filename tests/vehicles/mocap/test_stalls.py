@@ -3,22 +3,24 @@
 import numpy as np
 
 from app.vehicles.mavlink.measurements import Position
-from app.vehicles.mavlink.signals import Heard, Sighted
+from app.vehicles.mavlink.signals import PacketReceived, SecondaryAltitudeReceived
 from app.vehicles.mavlink.states import State
 from app.vehicles.mavlink.trial import in_order
-from tests.vehicles.mavlink.walking import Walk
+from tests.vehicles.mavlink.walking import TrialDriver
 
 
 def test_sources_that_agreed_throughout_a_climb_are_held_against_each_other_in_the_order_in_which_they_spoke() -> None:
-    walk = Walk().arm()
+    walk = TrialDriver().arm()
     walk.climb_rate_m_s = 2.0
     walk.pass_s(0.5)
-    walk.give(Sighted(walk.altitude_m, True, walk.now_s))
+    walk.give(SecondaryAltitudeReceived(walk.altitude_m, True, walk.now_s))
     missed_s = np.arange(0.02, 0.8, 0.02).tolist()
     up_m = [walk.altitude_m + walk.climb_rate_m_s * at_s for at_s in missed_s]
     both = list(zip(missed_s, up_m, strict=True))
-    heard = [Heard(Position(walk.boot_s + at_s, m, walk.climb_rate_m_s), walk.now_s + at_s) for at_s, m in both]
-    sighted = [Sighted(m, True, walk.now_s + at_s) for at_s, m in both]
+    heard = [
+        PacketReceived(Position(walk.boot_s + at_s, m, walk.climb_rate_m_s), walk.now_s + at_s) for at_s, m in both
+    ]
+    sighted = [SecondaryAltitudeReceived(m, True, walk.now_s + at_s) for at_s, m in both]
     for event in in_order(heard, sighted):
         walk.give(event)
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.vehicles.mocap.stream import Arrivals, PoseStream
+from app.vehicles.mocap.stream import ClockOffset, PoseStream
 
 
 def put(stream: PoseStream, time_s: float, altitude_m: float, *, arrived_s: float | None = None) -> None:
@@ -10,7 +10,7 @@ def put(stream: PoseStream, time_s: float, altitude_m: float, *, arrived_s: floa
 
 
 def test_a_frame_that_was_held_up_is_dated_as_if_it_had_not_been() -> None:
-    arrivals = Arrivals()
+    arrivals = ClockOffset()
     held_up_s = (0.003, 0.001, 0.004, 0.050, 0.041, 0.002)
     sent_s = [100.0 + 0.01 * place for place in range(len(held_up_s))]
     dated_s = [arrivals.seen_s(at, at - 60.0 + late) for at, late in zip(sent_s, held_up_s, strict=True)]
@@ -18,20 +18,20 @@ def test_a_frame_that_was_held_up_is_dated_as_if_it_had_not_been() -> None:
 
 
 def test_a_source_whose_messages_wait_for_seconds_is_dated_by_its_own_clock_all_the_while() -> None:
-    arrivals = Arrivals()
+    arrivals = ClockOffset()
     waited_s = np.interp(np.arange(2000), (0, 500, 1000, 2000), (0.0, 0.0, 3.0, 3.0))
     dated_s = [arrivals.seen_s(0.01 * place, 70.0 + 0.01 * place + late) for place, late in enumerate(waited_s)]
     np.testing.assert_allclose(dated_s, 70.0 + 0.01 * np.arange(2000))
 
 
 def test_the_clocks_of_a_long_day_may_drift_apart() -> None:
-    arrivals = Arrivals()
+    arrivals = ClockOffset()
     dated_s = [arrivals.seen_s(at_s, at_s * (1.0 + 5e-5)) for at_s in np.arange(0.0, 7200.0, 0.5)]
     assert 7199.5 * (1.0 + 5e-5) - dated_s[-1] < 0.01
 
 
 def test_a_source_that_starts_anew_is_dated_by_its_new_clock() -> None:
-    arrivals = Arrivals()
+    arrivals = ClockOffset()
     arrivals.seen_s(5000.0, 10.0)
     assert arrivals.seen_s(0.5, 12.0) == 12.0
     assert arrivals.seen_s(0.6, 12.3) == pytest.approx(12.1)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.vehicles.base import FlightOrder, OptionValue, Vehicle
+from app.vehicles.base import FlightOptions, OptionValue, Vehicle
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.machine import Plan
@@ -21,7 +21,7 @@ from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
 
 TUNED = {"MPC_Z_P": 1.25, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.05, "MPC_Z_VEL_I_ACC": 1.7}
 RECORD_S = 6.0
-ORDER = FlightOrder(seed=1)
+ORDER = FlightOptions(seed=1)
 
 
 @pytest.fixture(autouse=True)

@@ -18,7 +18,7 @@ from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.simdrone.autopilots.registry import Make, get_autopilot
 from app.vehicles.simdrone.body import TICK_S, new_body
-from app.vehicles.simdrone.cameras import Outlet
+from app.vehicles.simdrone.cameras import MocapOutput
 from app.vehicles.simdrone.drone import Drone
 from app.vehicles.simdrone.faults import parse_fault
 from app.vehicles.simdrone.lockstep import Lockstep
@@ -196,7 +196,7 @@ def switched_on(
     options: Mapping[str, OptionValue] = STILL,
     faults: Sequence[str] = (),
     seed: int = 1,
-    outlet: Outlet | None = None,
+    outlet: MocapOutput | None = None,
     make: Make | None = None,
 ) -> Drone:
     """`make` takes the place of what the autopilot of that name is made by."""

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from app.core.errors import InputError
-from app.vehicles.simdrone.faults import FAULTS, Planned, parse_fault
+from app.vehicles.simdrone.faults import FAULTS, PlannedFault, parse_fault
 from tests.vehicles.simdrone import copters
 from tests.vehicles.simdrone.ground import Heard, flying
 from tests.vehicles.simdrone.paparazzi import START_ENGINE, Pilot, from_vehicle
@@ -30,13 +30,13 @@ def test_every_fault_says_what_it_does(name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "planned"),
     [
-        ("link-lost:8@6", Planned("link-lost", 6.0, 8.0)),
-        ("reboot@5.5", Planned("reboot", 5.5)),
-        ("no-heartbeat@connect", Planned("no-heartbeat", None)),
-        ("arm-refused:3@connect", Planned("arm-refused", None, 3.0)),
+        ("link-lost:8@6", PlannedFault("link-lost", 6.0, 8.0)),
+        ("reboot@5.5", PlannedFault("reboot", 5.5)),
+        ("no-heartbeat@connect", PlannedFault("no-heartbeat", None)),
+        ("arm-refused:3@connect", PlannedFault("arm-refused", None, 3.0)),
     ],
 )
-def test_a_fault_is_written_with_its_time_and_duration(text: str, planned: Planned) -> None:
+def test_a_fault_is_written_with_its_time_and_duration(text: str, planned: PlannedFault) -> None:
     assert parse_fault(text) == planned
 
 

@@ -17,7 +17,7 @@ from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.simdrone.autopilots.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, new_body, throttle_command
 from app.vehicles.simdrone.server import LARGEST_LAG_S
-from tests.clocks import ClockByHand
+from tests.clocks import ManualClock
 from tests.vehicles.simdrone.ground import (
     Ground,
     UdpWire,
@@ -82,7 +82,7 @@ def test_nothing_that_a_ground_station_can_say_ends_it(autopilot: str) -> None:
 
 
 def test_its_time_follows_the_clock_and_never_overtakes_it() -> None:
-    clock = ClockByHand()
+    clock = ManualClock()
     with served("paparazzi", f"udp:127.0.0.1:{free_port()}@{free_port()}", clock=clock) as drone:
         for clock.time_s in (0.0, 0.5, 1.75):
             eventually(lambda: drone.time_s > clock.time_s - TICK_S)
@@ -90,7 +90,7 @@ def test_its_time_follows_the_clock_and_never_overtakes_it() -> None:
 
 
 def test_what_a_drone_cannot_catch_up_with_is_lost() -> None:
-    clock = ClockByHand()
+    clock = ManualClock()
     with served("paparazzi", f"udp:127.0.0.1:{free_port()}@{free_port()}", clock=clock) as drone:
         clock.time_s = 60.0
         eventually(lambda: drone.time_s > LARGEST_LAG_S - TICK_S)

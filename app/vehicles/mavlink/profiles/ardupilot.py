@@ -7,7 +7,7 @@ from typing import Final
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
 from app.vehicles.mavlink.measurements import DISARMING, Measurement
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 from app.vehicles.mavlink.signals import Action, Setting
 
 GUIDED: Final = 4
@@ -76,26 +76,26 @@ class ArduPilot:
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
+    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
         return {}
 
-    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
         return ()
 
-    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
         """A direct link is told nothing but heartbeats unless it asks."""
         return request_telemetry(aim, telemetry_hz)
 
-    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
-    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
+    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
         return ()
 
-    def ask_version(self, aim: Aim) -> Outgoing:
+    def ask_version(self, aim: Target) -> Outgoing:
         return request_version(aim)
 
-    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
                 return (
@@ -112,14 +112,14 @@ class ArduPilot:
             case Action.KILL:
                 return (Step((base.disarm(aim, forced=True),)),)
 
-    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
+    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
 
-    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
+    def read_parameter(self, aim: Target, parameter: str) -> Outgoing:
         return base.read_parameter(aim, parameter)
 
 
-def request_telemetry(aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+def request_telemetry(aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
     """Every message that a trial listens to, positions at this rate. Not every autopilot has the last ones."""
     return (
         _request(aim, _LOCAL_POSITION_NED, telemetry_hz),
@@ -129,12 +129,12 @@ def request_telemetry(aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
     )
 
 
-def _request(aim: Aim, message: int, rate_hz: float, *, needed: bool = True) -> Step:
+def _request(aim: Target, message: int, rate_hz: float, *, needed: bool = True) -> Step:
     asked = base.command(aim, _SET_MESSAGE_INTERVAL, message, round(1e6 / rate_hz))
     return Step((asked,), awaits="command 511", attempts=5 if needed else 2, needed=needed)
 
 
-def request_version(aim: Aim) -> Outgoing:
+def request_version(aim: Target) -> Outgoing:
     """AUTOPILOT_VERSION, once."""
     return base.command(aim, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
 

@@ -21,14 +21,14 @@ from app.vehicles.mavlink.dialects import (
 )
 from app.vehicles.mavlink.measurements import (
     Battery,
-    Breach,
+    CommandReply,
+    FenceBreach,
     Heartbeat,
     LandedState,
     Measurement,
     Parameter,
     Position,
-    Reply,
-    Spoken,
+    StatusText,
     Version,
 )
 from app.vehicles.mavlink.signals import Action, Setting
@@ -140,7 +140,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Aim:
+class Target:
     """Whom messages go to, and what is known about it: `component` is its autopilot's, 0 until it is known; `aircraft`
     is the number that Paparazzi matches most messages with, `blocks` are its flight plan's by name, `stop_settings`
     those settings that stop its motors which it was found to have, `stops_by_command` whether it was heard to obey the
@@ -234,39 +234,39 @@ class Profile(Protocol):
     @property
     def requirements(self) -> tuple[Requirement, ...]: ...
     def measure(self, message: Message) -> Measurement | None: ...
-    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:
+    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:
         """The blocks of the flight plan, where there is one. Raises VehicleError when one is missing that is needed."""
         ...
 
-    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:
+    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:
         """What ends an exploration, however it went."""
         ...
 
-    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
         """Ask for telemetry, which changes nothing that lasts."""
         ...
 
-    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:
+    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:
         """What brings a disarmed vehicle out of a mode in which it does not arm; nothing for other modes."""
         ...
 
-    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:
+    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:
         """Parameters that have to be so for a take-off to the altitude of `aim`."""
         ...
 
-    def ask_version(self, aim: Aim) -> Outgoing | None:
+    def ask_version(self, aim: Target) -> Outgoing | None:
         """None where it tells unasked, or never."""
         ...
 
-    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         """Raises KeyError when it takes a block of the flight plan that `aim` does not have."""
         ...
 
-    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing: ...
-    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing: ...
+    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing: ...
+    def read_parameter(self, aim: Target, parameter: str) -> Outgoing: ...
 
 
-def set_parameter(aim: Aim, parameter: str, value: float, *, component: int = 0) -> Outgoing:
+def set_parameter(aim: Target, parameter: str, value: float, *, component: int = 0) -> Outgoing:
     """A floating-point parameter, the only type that gains have. Some vehicles heed no PARAM_SET to all components (0),
     among them MAVSDK's."""
     return Outgoing(
@@ -281,18 +281,18 @@ def set_parameter(aim: Aim, parameter: str, value: float, *, component: int = 0)
     )
 
 
-def read_parameter(aim: Aim, parameter: str) -> Outgoing:
+def read_parameter(aim: Target, parameter: str) -> Outgoing:
     return Outgoing(
         "PARAM_REQUEST_READ",
         {"target_system": aim.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
     )
 
 
-def list_parameters(aim: Aim) -> Outgoing:
+def list_parameters(aim: Target) -> Outgoing:
     return Outgoing("PARAM_REQUEST_LIST", {"target_system": aim.aircraft, "target_component": 0})
 
 
-def read_place(aim: Aim, place: int) -> Outgoing:
+def read_place(aim: Target, place: int) -> Outgoing:
     """A parameter by its place in the vehicle's list, never past its end: Paparazzi reads on behind its table."""
     return Outgoing(
         "PARAM_REQUEST_READ",
@@ -300,7 +300,7 @@ def read_place(aim: Aim, place: int) -> Outgoing:
     )
 
 
-def command(aim: Aim, code: int, *parameters: float) -> Outgoing:
+def command(aim: Target, code: int, *parameters: float) -> Outgoing:
     """COMMAND_LONG; what is not given is 0."""
     filled = (*parameters, *(0.0 for _ in range(7 - len(parameters))))
     return Outgoing(
@@ -355,31 +355,31 @@ def parameter(message: Message) -> Parameter:
     return Parameter(text(message, "param_id"), number(message, "param_value"), in_list, count)
 
 
-def answer(message: Message) -> Reply | None:
+def answer(message: Message) -> CommandReply | None:
     """COMMAND_ACK; None while the vehicle is still at it."""
     result = int(number(message, "result"))
     if result == _IN_PROGRESS:
         return None
     known = _RESULTS[result] if result < len(_RESULTS) else "unknown"
-    return Reply(f"command {number(message, 'command'):.0f}", result == _ACCEPTED, f"result {result}, {known}")
+    return CommandReply(f"command {number(message, 'command'):.0f}", result == _ACCEPTED, f"result {result}, {known}")
 
 
-def disarm(aim: Aim, *, forced: bool = False) -> Outgoing:
+def disarm(aim: Target, *, forced: bool = False) -> Outgoing:
     """`forced`: in the air too, where an autopilot would refuse it."""
     return command(aim, ARM_DISARM, 0.0, FORCED if forced else 0.0)
 
 
-def spoken(message: Message) -> Spoken:
+def parse_status_text(message: Message) -> StatusText:
     """STATUSTEXT; in MAVLink 2 a long one comes in pieces, the last of which is not full."""
     said = text(message, "text")
     number_of, place = (int(getattr(message, field, 0)) for field in ("id", "chunk_seq"))
-    return Spoken(said, number_of, place, is_last=not number_of or len(said) < _TEXT_LENGTH)
+    return StatusText(said, number_of, place, is_last=not number_of or len(said) < _TEXT_LENGTH)
 
 
-def breach(message: Message) -> Breach | None:
+def breach(message: Message) -> FenceBreach | None:
     """FENCE_STATUS."""
     kind = int(number(message, "breach_type"))
-    return Breach(_FENCES.get(kind, "")) if number(message, "breach_status") else None
+    return FenceBreach(_FENCES.get(kind, "")) if number(message, "breach_status") else None
 
 
 def landed_state(message: Message) -> LandedState | None:
@@ -411,7 +411,7 @@ READERS: Final[Readers] = MappingProxyType(
         "SYS_STATUS": battery,
         "PARAM_VALUE": parameter,
         "COMMAND_ACK": answer,
-        "STATUSTEXT": spoken,
+        "STATUSTEXT": parse_status_text,
         "FENCE_STATUS": breach,
         "EXTENDED_SYS_STATE": landed_state,
         "AUTOPILOT_VERSION": version,

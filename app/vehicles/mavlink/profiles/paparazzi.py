@@ -7,9 +7,9 @@ from typing import Final
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.dialects import PAPARAZZI as DIALECT
 from app.vehicles.mavlink.dialects import Message, number, text
-from app.vehicles.mavlink.measurements import Block, BlockCount, BlockEntered, Measurement, Reply, Version
+from app.vehicles.mavlink.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 from app.vehicles.mavlink.signals import Action, Setting
 
 HOLDING: Final = "Holding point"
@@ -59,7 +59,7 @@ class Paparazzi:
         """Only LOCAL_POSITION_NED tells the altitude: the other messages of it mix their units."""
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:
+    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:
         """The list is asked for once; the acknowledgement that ends it comes before every change of block."""
         request = Outgoing("SCRIPT_REQUEST_LIST", _to(aim))
         counted = ask(request, lambda heard: isinstance(heard, BlockCount))
@@ -76,23 +76,23 @@ class Paparazzi:
             raise _without_blocks(f"Its flight plan has no block {', '.join(missing)}.")
         return blocks
 
-    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:
+    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:
         """Ends the listing of blocks, which else keeps every change of block away for 15 s."""
         return (_acknowledge(aim),)
 
-    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
+    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
         return ()
 
-    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
-    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
+    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
         return ()
 
-    def ask_version(self, aim: Aim) -> None:
+    def ask_version(self, aim: Target) -> None:
         """It tells every few seconds."""
 
-    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
                 return (
@@ -108,28 +108,28 @@ class Paparazzi:
                 settings = aim.stop_settings or self.stop_settings
                 return (Step((base.disarm(aim), *(self.set_parameter(aim, name, 1.0) for name in settings))),)
 
-    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
+    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value)
 
-    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
+    def read_parameter(self, aim: Target, parameter: str) -> Outgoing:
         return base.read_parameter(aim, parameter)
 
 
-def _to(aim: Aim) -> dict[str, float]:
+def _to(aim: Target) -> dict[str, float]:
     """Blocks and waypoints go by the MAVLink system id, all else by the aircraft's own."""
     return {"target_system": aim.system, "target_component": 0}
 
 
-def _acknowledge(aim: Aim) -> Outgoing:
+def _acknowledge(aim: Target) -> Outgoing:
     return Outgoing("MISSION_ACK", _to(aim) | {"type": 0})
 
 
-def _block(aim: Aim, name: str) -> tuple[Outgoing, ...]:
+def _block(aim: Target, name: str) -> tuple[Outgoing, ...]:
     activate = Outgoing("SCRIPT_ITEM", {**_to(aim), "seq": aim.blocks[name], "name": ""})
     return (_acknowledge(aim), activate)
 
 
-def _climb_here(aim: Aim) -> Outgoing:
+def _climb_here(aim: Target) -> Outgoing:
     """The waypoint that the take-off climbs to, straight above the vehicle."""
     fields = {
         "seq": aim.waypoint,
@@ -159,7 +159,7 @@ def _heartbeat(message: Message) -> Measurement | None:
 
 def _taken(message: Message) -> Measurement:
     result = int(number(message, "type"))
-    return Reply("waypoint", result == 0, f"result {result}")
+    return CommandReply("waypoint", result == 0, f"result {result}")
 
 
 def _count(message: Message) -> Measurement:

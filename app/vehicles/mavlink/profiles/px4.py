@@ -9,7 +9,7 @@ from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.measurements import DISARMING, Measurement, Parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.ardupilot import request_telemetry, request_version
-from app.vehicles.mavlink.profiles.base import Aim, Ask, GainParameter, Outgoing, Requirement, Step
+from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 from app.vehicles.mavlink.signals import Action, Setting
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
@@ -67,28 +67,28 @@ class Px4:
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, aim: Aim) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
+    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
         return {}
 
-    def conclude(self, aim: Aim) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
         return ()
 
-    def prepare(self, aim: Aim, telemetry_hz: float) -> tuple[Step, ...]:
+    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
         return request_telemetry(aim, telemetry_hz)
 
-    def make_armable(self, aim: Aim, mode: str) -> tuple[Step, ...]:
+    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:
         """Told to land when it has landed and disarmed already, it stays in that mode, and does not arm in it."""
         if mode not in self.landing_modes:
             return ()
         return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
 
-    def take_off_settings(self, aim: Aim) -> tuple[Setting, ...]:
+    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:
         return (Setting(TAKE_OFF_ALTITUDE, aim.altitude_m),)
 
-    def ask_version(self, aim: Aim) -> Outgoing:
+    def ask_version(self, aim: Target) -> Outgoing:
         return request_version(aim)
 
-    def steps(self, action: Action, aim: Aim) -> tuple[Step, ...]:
+    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
                 return (Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),)
@@ -102,10 +102,10 @@ class Px4:
             case Action.KILL:
                 return (Step((base.disarm(aim, forced=True),)),)
 
-    def set_parameter(self, aim: Aim, parameter: str, value: float) -> Outgoing:
+    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
 
-    def read_parameter(self, aim: Aim, parameter: str) -> Outgoing:
+    def read_parameter(self, aim: Target, parameter: str) -> Outgoing:
         return base.read_parameter(aim, parameter)
 
 

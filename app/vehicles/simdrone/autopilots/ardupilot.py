@@ -13,7 +13,7 @@ from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message
 from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED
 from app.vehicles.simdrone.autopilots.copter.cascade import ThreeStage
 from app.vehicles.simdrone.autopilots.copter.copter import Copter
-from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FlightMode, Manners, Reaction
+from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FirmwareProfile, FlightMode, Reaction
 from app.vehicles.simdrone.autopilots.copter.parameters import BY_VALUE, Kind, Parameter, real
 from app.vehicles.simdrone.body import Body
 
@@ -71,7 +71,7 @@ def _gains(names: Mapping[str, str], scale: float) -> tuple[Parameter, ...]:
     return tuple(real(name, _DEFAULTS[gain] * scales[gain]) for gain, name in names.items())
 
 
-_MANNERS: Final = Manners(
+_FIRMWARE: Final = FirmwareProfile(
     dialect=ARDUPILOTMEGA,
     autopilot=3,
     version=0x040600FF,
@@ -113,7 +113,7 @@ _MANNERS: Final = Manners(
 class ArduPilot(Copter):
     """Up to 4.6. Return-to-launch only lands here: the vehicle never leaves its place."""
 
-    manners: ClassVar[Manners] = _MANNERS
+    manners: ClassVar[FirmwareProfile] = _FIRMWARE
     names: ClassVar[Mapping[str, str]] = NAMES_4_6
     scale: ClassVar[float] = 1.0
 
@@ -166,8 +166,8 @@ class ArduPilot(Copter):
 class ArduPilot47(ArduPilot):
     """From 4.7 on: other names, and acceleration gains of a tenth."""
 
-    manners: ClassVar[Manners] = replace(
-        _MANNERS, version=0x040700FF, parameters=_COMMON + _gains(NAMES_4_7, SCALE_4_7)
+    manners: ClassVar[FirmwareProfile] = replace(
+        _FIRMWARE, version=0x040700FF, parameters=_COMMON + _gains(NAMES_4_7, SCALE_4_7)
     )
     names: ClassVar[Mapping[str, str]] = NAMES_4_7
     scale: ClassVar[float] = SCALE_4_7

@@ -21,7 +21,7 @@ FAILED: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Letter:
+class OutgoingMessage:
     """A message on its way out, not yet packed. `counter` names the sequence counter that numbers it: Paparazzi has
     one for each of its source files. `system` is the sender's id where it is not the vehicle's own."""
 
@@ -59,7 +59,7 @@ class Autopilot(Protocol):
         """Take over what outlives a reboot from itself as it was."""
         ...
 
-    def tick(self) -> list[Letter]:
+    def tick(self) -> list[OutgoingMessage]:
         """Let one tick of TICK_S pass: answer what was heard, fly the body on, and return what is to be sent."""
         ...
 

@@ -8,11 +8,11 @@ from types import MappingProxyType
 from typing import ClassVar, Final
 
 from app.vehicles.mavlink.dialects import COMMON
-from app.vehicles.simdrone.autopilots.base import ACCEPTED, TEMPORARILY_REJECTED, Letter
+from app.vehicles.simdrone.autopilots.base import ACCEPTED, TEMPORARILY_REJECTED, OutgoingMessage
 from app.vehicles.simdrone.autopilots.copter.cascade import TwoStage
 from app.vehicles.simdrone.autopilots.copter.copter import Copter
 from app.vehicles.simdrone.autopilots.copter.flyer import Phase
-from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FlightMode, Manners, Reaction
+from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FirmwareProfile, FlightMode, Reaction
 from app.vehicles.simdrone.autopilots.copter.parameters import BYTEWISE, Kind, Parameter, real
 from app.vehicles.simdrone.autopilots.copter.telemetry import HOME_AMSL_M
 from app.vehicles.simdrone.body import Body
@@ -32,7 +32,7 @@ def custom_mode(main: int, sub: int = 0) -> int:
 class Px4(Copter):
     """Return-to-launch and termination only land here: the vehicle never leaves its place."""
 
-    manners: ClassVar[Manners] = Manners(
+    manners: ClassVar[FirmwareProfile] = FirmwareProfile(
         dialect=COMMON,
         autopilot=12,
         version=0x011000FF,
@@ -95,7 +95,7 @@ class Px4(Copter):
         self._cascade = TwoStage()
         super().__init__(body, self._cascade, system=system)
 
-    def tick(self) -> list[Letter]:
+    def tick(self) -> list[OutgoingMessage]:
         """Once at its height of takeoff it waits there. Once it has landed and stopped its motors it is ready to hold;
         told to land once more then, it stays in that mode, and does not arm."""
         was_armed = self.armed

@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, Self
 
 from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
-from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, Letter, Timetable, whole_ticks
+from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, OutgoingMessage, Timetable, whole_ticks
 from app.vehicles.simdrone.autopilots.copter import telemetry
 from app.vehicles.simdrone.autopilots.copter.cascade import Cascade
-from app.vehicles.simdrone.autopilots.copter.flyer import Flyer, Phase
-from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FlightMode, Manners, Reaction
+from app.vehicles.simdrone.autopilots.copter.flyer import AltitudeGuidance, Phase
+from app.vehicles.simdrone.autopilots.copter.manners import Behaviour, FirmwareProfile, FlightMode, Reaction
 from app.vehicles.simdrone.autopilots.copter.parameters import Parameters
 from app.vehicles.simdrone.body import TICK_S, Body
 
@@ -44,7 +44,7 @@ REQUEST_CAPABILITIES: Final = 520
 class Copter(ABC):
     """One autopilot from switching on; see `Autopilot`."""
 
-    manners: ClassVar[Manners]
+    manners: ClassVar[FirmwareProfile]
 
     def __init__(self, body: Body, cascade: Cascade, *, system: int) -> None:
         self.dialect = self.manners.dialect
@@ -56,7 +56,7 @@ class Copter(ABC):
         self.armed = False
         self.mode = self.manners.modes[0]
         self.parameters = Parameters(self.manners.parameters)
-        self.flyer = Flyer(body, cascade)
+        self.flyer = AltitudeGuidance(body, cascade)
         self._body = body
         self._codec = self.dialect.codec(system=system, component=COMPONENT)
         self._ticks = 0
@@ -67,7 +67,7 @@ class Copter(ABC):
         self._listing: int | None = None
         self._texts = 0
         self._timetable = Timetable.of(self.manners.periods_s)
-        self._out: list[Letter] = []
+        self._out: list[OutgoingMessage] = []
         self.tune()
 
     # ------------------------------------------------------------ what differs
@@ -123,7 +123,7 @@ class Copter(ABC):
             if handler is not None and getattr(message, "target_system", 0) in (0, self.system):
                 handler(self, message)
 
-    def tick(self) -> list[Letter]:
+    def tick(self) -> list[OutgoingMessage]:
         self._ticks += 1
         was_flying = self.flyer.flies
         self.flyer.tick()
@@ -229,11 +229,13 @@ class Copter(ABC):
         for chunk, start in enumerate(range(0, len(words), _TEXT_LENGTH)):
             number = self._texts if len(words) > _TEXT_LENGTH else 0
             text = words[start : start + _TEXT_LENGTH]
-            self._out.append(Letter("STATUSTEXT", {"severity": 2, "text": text, "id": number, "chunk_seq": chunk}))
+            self._out.append(
+                OutgoingMessage("STATUSTEXT", {"severity": 2, "text": text, "id": number, "chunk_seq": chunk})
+            )
 
     def send(self, kind: str) -> None:
         """One of the reports, now."""
-        self._out.append(Letter(kind, telemetry.REPORTS[kind].fields(self._snapshot())))
+        self._out.append(OutgoingMessage(kind, telemetry.REPORTS[kind].fields(self._snapshot())))
 
     def _report(self) -> None:
         if self._listing is not None and self._ticks % _LIST_EVERY_TICKS == 0:
@@ -242,7 +244,7 @@ class Copter(ABC):
         due = [kind for kind in self._timetable.due(self._ticks) if self._has_estimate or kind not in _ESTIMATED]
         if due:
             now = self._snapshot()
-            self._out += [Letter(kind, telemetry.REPORTS[kind].fields(now)) for kind in due]
+            self._out += [OutgoingMessage(kind, telemetry.REPORTS[kind].fields(now)) for kind in due]
 
     def _snapshot(self) -> telemetry.Snapshot:
         body, manners = self._body, self.manners
@@ -274,12 +276,12 @@ class Copter(ABC):
             "param_count": len(self.parameters),
             "param_index": place,
         }
-        self._out.append(Letter("PARAM_VALUE", fields))
+        self._out.append(OutgoingMessage("PARAM_VALUE", fields))
 
     def _acknowledge(self, message: Message, command: int, result: int) -> None:
         sender = {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
         fields = {"command": command, "result": result, "progress": 0, "result_param2": 0, **sender}
-        self._out.append(Letter("COMMAND_ACK", fields))
+        self._out.append(OutgoingMessage("COMMAND_ACK", fields))
 
     # ------------------------------------------------------------ hearing
 

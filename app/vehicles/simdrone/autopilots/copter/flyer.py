@@ -12,7 +12,7 @@ _DEEPEST_SET_POINT_M: Final = 1.0
 """How far below the vehicle the set point of a landing may be: on the ground it presses down, and no more."""
 _GENTLE_M_S2: Final = 1.5
 """How fast the set point of a takeoff gains and loses speed."""
-_THERE_M: Final = 0.002
+_ARRIVED_WITHIN_M: Final = 0.002
 
 
 class Phase(Enum):
@@ -24,7 +24,7 @@ class Phase(Enum):
     LANDING = "down to the ground"
 
 
-class Flyer:
+class AltitudeGuidance:
     """Flies a body in altitude above the ground, metres up."""
 
     def __init__(self, body: Body, cascade: Cascade) -> None:
@@ -96,7 +96,7 @@ class Flyer:
 
     def _climb_on(self, left_m: float) -> SetPoint:
         """Gather speed, and shed it in time for the goal."""
-        if left_m <= _THERE_M:
+        if left_m <= _ARRIVED_WITHIN_M:
             self._target_m = self._goal_m
             self.phase = Phase.HOLDING
             return SetPoint(self._target_m)

@@ -37,7 +37,7 @@ class FlightMode:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Manners:
+class FirmwareProfile:
     """What is data in an autopilot. `modes` holds every mode, the first being that after the start, and those that the
     services need by name; `refused` is the result of a refusal, `texts` what is said with one."""
 

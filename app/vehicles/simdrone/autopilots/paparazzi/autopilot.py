@@ -17,7 +17,7 @@ from app.vehicles.simdrone.autopilots.base import (
     ARMED,
     FAILED,
     UNSUPPORTED,
-    Letter,
+    OutgoingMessage,
     Timetable,
     whole_ticks,
 )
@@ -106,7 +106,7 @@ class Paparazzi:
         self._timetable = Timetable.of(telemetry.PERIODS_S)
         if not tuned_telemetry:
             self._timetable.set("LOCAL_POSITION_NED", telemetry.BARE_POSITION_PERIOD_S)
-        self._out: list[Letter] = []
+        self._out: list[OutgoingMessage] = []
         self._set_motors(on=False)
 
     # ------------------------------------------------------------ time
@@ -117,7 +117,7 @@ class Paparazzi:
     def survive(self, before: Self) -> None:
         """Its settings are those that were compiled in."""
 
-    def tick(self) -> list[Letter]:
+    def tick(self) -> list[OutgoingMessage]:
         self._ticks += 1
         if self._ticks % _POLL_TICKS == 0:
             self._listen()
@@ -232,7 +232,7 @@ class Paparazzi:
         due = self._timetable.due(self._ticks)
         if due:
             now = self._snapshot()
-            self._out += [Letter(kind, telemetry.MESSAGES[kind](now)) for kind in due]
+            self._out += [OutgoingMessage(kind, telemetry.MESSAGES[kind](now)) for kind in due]
 
     def _snapshot(self) -> telemetry.Snapshot:
         body = self._body
@@ -247,7 +247,7 @@ class Paparazzi:
         )
 
     def _send(self, kind: str, *, counter: str = "", **fields: FieldValue) -> None:
-        self._out.append(Letter(kind, fields, counter))
+        self._out.append(OutgoingMessage(kind, fields, counter))
 
     def _send_setting(self, index: int) -> None:
         """A number past the end shows whatever lies behind the table."""
