@@ -30,7 +30,7 @@ def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) ->
     """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(niceness)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_shut_down_with_parent, daemon=True).start()
     prepare()
     with suppress(EOFError, OSError):  # the parent is gone
         while True:
@@ -45,7 +45,7 @@ def _outcome(task: Callable[[], T]) -> TaskResult[T] | TaskError:
         return TaskError(error)
 
 
-def _end_with_parent() -> None:
+def _shut_down_with_parent() -> None:
     if (parent := parent_process()) is not None:
         parent.join()
         os._exit(0)

@@ -111,7 +111,7 @@ class Connections:
 
 
 def room_for_connections(descriptors: int) -> int:
-    """How many connections there may be beside `FOR_STOPPING`, where the process may have so many open files."""
+    """How many connections there may be beside `RESERVED_FOR_ABORTS`, where the process may have so many open files."""
     return min(
         MAX_CONNECTIONS,
         max(descriptors - RESERVED_DESCRIPTORS, descriptors // 2) - RESERVED_FOR_ABORTS - RESERVED_FOR_ARRIVING,

@@ -20,7 +20,7 @@ from app.processes import process_context
 P = ParamSpec("P")
 T = TypeVar("T")
 
-AT_ONCE: Final = 2
+MAX_CONCURRENT: Final = 2
 WAITS_S: Final = 20.0
 """For one of those that are being read."""
 
@@ -37,7 +37,7 @@ class Limits:
 FILE: Final = Limits()
 """For a file of the size that is taken over HTTP."""
 
-_places = threading.BoundedSemaphore(AT_ONCE)
+_places = threading.BoundedSemaphore(MAX_CONCURRENT)
 
 
 def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
@@ -48,7 +48,7 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
     """
     if not _places.acquire(timeout=WAITS_S):
         raise UnavailableError(
-            f"{AT_ONCE} files are being read already.",
+            f"{MAX_CONCURRENT} files are being read already.",
             hint="Send this one again once they are done; nothing was stored.",
         )
     try:

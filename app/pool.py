@@ -90,13 +90,13 @@ class _ComputeProcess:
         self._running: tuple[BaseProcess, Connection] | None = None
 
     def perform(self, task: Callable[[], T]) -> T:
-        """Raises what the task raises, _DiedError, and CancelledError once it is closed."""
+        """Raises what the task raises, _ProcessDiedError, and CancelledError once it is closed."""
         pipe = self._pipe()
         try:
             pipe.send(task)
             outcome: TaskResult[T] | TaskError = pipe.recv()
         except (EOFError, OSError) as error:
-            self._bury()
+            self._discard()
             raise _ProcessDiedError from error
         if isinstance(outcome, TaskError):
             raise outcome.error
@@ -125,7 +125,7 @@ class _ComputeProcess:
         theirs.close()
         return process, ours
 
-    def _bury(self) -> None:
+    def _discard(self) -> None:
         with self._lock:
             if self._closed:
                 raise CancelledError

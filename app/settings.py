@@ -74,7 +74,7 @@ def read_settings(given: Mapping[str, str | int | Path]) -> Settings:
     try:
         return Settings.model_validate(given)
     except ValidationError as error:
-        problems = tuple(Problem(_spoken(str(entry["loc"][0]), given), entry["msg"]) for entry in error.errors())
+        problems = tuple(Problem(_setting_name(str(entry["loc"][0]), given), entry["msg"]) for entry in error.errors())
         raise InputError(
             "These settings cannot be used.",
             problems=problems,
@@ -82,5 +82,5 @@ def read_settings(given: Mapping[str, str | int | Path]) -> Settings:
         ) from error
 
 
-def _spoken(field: str, given: Mapping[str, str | int | Path]) -> str:
+def _setting_name(field: str, given: Mapping[str, str | int | Path]) -> str:
     return f"--{field.replace('_', '-')}" if field in given else f"GAINLINE_{field.upper()}"

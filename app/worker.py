@@ -68,7 +68,7 @@ class ShutdownRequest:
         self.event = threading.Event()
         self.reason = ""
 
-    def ask(self, reason: str) -> None:
+    def set(self, reason: str) -> None:
         self.reason = self.reason or reason
         self.event.set()
 
@@ -126,8 +126,8 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
     def heed() -> None:
         while True:
             reason = asked.get()
-            ending.ask(reason)
-            airspace.close(reason)
+            ending.set(reason)
+            airspace.abort_all(reason)
 
     threading.Thread(target=heed, name="signals", daemon=True).start()
     for number in signals:
@@ -137,7 +137,7 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
 def _shut_down_with_parent(ending: ShutdownRequest) -> None:
     if (parent := parent_process()) is not None:
         parent.join()
-        ending.ask("the web process is gone")
+        ending.set("the web process is gone")
 
 
 class Worker:
@@ -157,7 +157,7 @@ class Worker:
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
-            sessions, deck, live = self._decks(database)
+            sessions, deck, live = self._build_runners(database)
             stack.callback(deck.close)
             self._until_stored(deck.recover)
             self._until_stored(sessions.recover)
@@ -170,16 +170,16 @@ class Worker:
             surveying = stack.enter_context(
                 ComputePool(LANDSCAPES_AT_ONCE, prepare=warm_up, niceness=LANDSCAPE_NICENESS)
             )
-            desks = self._desks(database, pool, surveying)
+            desks = self._build_job_runners(database, pool, surveying)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
-            stack.callback(self._ending.ask, "the worker failed; its log says why")
+            stack.callback(self._ending.set, "the worker failed; its log says why")
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid)
             _log.info("worker ready", worker=self._name)
             self._loop(database, lambda: self._claim(deck, flying, sessions, acting, desks, computing))
-            _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trials())
+            _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trial_ids())
 
-    def _decks(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
+    def _build_runners(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
         def publish(message: PublishedMessage) -> None:
             live.publish(message)
 
@@ -207,7 +207,9 @@ class Worker:
         )
         return sessions, deck, live
 
-    def _desks(self, database: Database, pool: ComputePool, surveying: ComputePool) -> tuple[JobRunner, ...]:
+    def _build_job_runners(
+        self, database: Database, pool: ComputePool, surveying: ComputePool
+    ) -> tuple[JobRunner, ...]:
         proposer = ProposalJob(database, pool, worker=self._name)
         reproducer = ReproductionJob(
             database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event
@@ -249,11 +251,11 @@ class Worker:
         desks: Sequence[JobRunner],
         computing: Executor,
     ) -> None:
-        while len(self._airspace.trials()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:
+        while len(self._airspace.trial_ids()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:
             flying.submit(deck.carry_out, task)
         while (act := sessions.claim()) is not None:
             acting.submit(sessions.carry_out, act)
-        sessions.tend()
+        sessions.maintain()
         for desk in desks:
             while (job := desk.claim()) is not None:
                 computing.submit(desk.carry_out, job)
@@ -270,4 +272,4 @@ class Worker:
                 return
 
     def _hello(self) -> WorkerHello:
-        return WorkerHello(pid=os.getpid(), version=__version__, flying=self._airspace.trials())
+        return WorkerHello(pid=os.getpid(), version=__version__, flying=self._airspace.trial_ids())

@@ -28,7 +28,7 @@ QUICK_VEHICLES: Final = 12
 QUICK_FLIGHTS: Final = 3
 LIMITS: Final[Mapping[str, float]] = {"four-parameter": 0.75, "further-physics": 0.75, "twin": 0.75}
 """The share of vehicles that Gainline must bring within 5 % by the third flight, loose enough for a dozen."""
-MOST_UNSAFE: Final = 0.05
+MAX_UNSAFE: Final = 0.05
 INSTALL: Final = "./dev exec uv pip install --require-hashes -r requirements/bench.txt"
 
 
@@ -93,10 +93,8 @@ def is_within_limits(found: Mapping[str, Mapping[str, Outcome]]) -> bool:
         if outcome is None:
             continue
         reached, unsafe = outcome.reached(0.05, 3), outcome.unsafe_flights
-        print(
-            f"{name}: within 5 % by flight 3 {reached} (limit {limit:.0%}); unsafe {unsafe} (limit {MOST_UNSAFE:.0%})"
-        )
-        passed &= reached.value >= limit and not unsafe.value > MOST_UNSAFE
+        print(f"{name}: within 5 % by flight 3 {reached} (limit {limit:.0%}); unsafe {unsafe} (limit {MAX_UNSAFE:.0%})")
+        passed &= reached.value >= limit and not unsafe.value > MAX_UNSAFE
     return passed
 
 

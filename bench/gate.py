@@ -70,7 +70,7 @@ def after_a_flight() -> ParameterDistribution:
 
 def harm(gains: Vector, spread: ParameterDistribution, takeoffs: int, seed: int) -> str:
     """What the first harmful takeoff does, or nothing."""
-    models = spread.draws(TAKEOFF, takeoffs, seed)
+    models = spread.draw_random(TAKEOFF, takeoffs, seed)
     for first in range(0, takeoffs, BATCH):
         curves = TAKEOFF.outputs(np.tile(gains, (len(models[first : first + BATCH]), 1)), models[first : first + BATCH])
         for curve in curves:

@@ -67,11 +67,11 @@ failed:
 
 Moves = Mapping[Any, frozenset[Any]]
 MACHINES: dict[str, tuple[Moves, str]] = {
-    "trial": (trials.MOVES, TRIAL),
+    "trial": (trials.TRANSITIONS, TRIAL),
     "campaign": (campaigns.TRANSITIONS, CAMPAIGN),
-    "job": (jobs.MOVES, JOB),
+    "job": (jobs.TRANSITIONS, JOB),
     "flight": (trials.FLIGHT_TRANSITIONS, FLIGHT),
-    "vehicle": (fleet.MOVES, VEHICLE),
+    "vehicle": (fleet.TRANSITIONS, VEHICLE),
     "act": (fleet.ACT_TRANSITIONS, ACT),
 }
 

@@ -73,7 +73,7 @@ class Upload:
         self.file.seek(0)
         return self.file.read()
 
-    def beside(self) -> bytes | None:
+    def read_companion(self) -> bytes | None:
         """All of the companion, if there is one."""
         if self.companion is None:
             return None

@@ -98,7 +98,7 @@ def fly_campaign(
                 return HeadlessCampaign(
                     trials=tuple(trials), stopped_because=f"All {len(gains)} gain sets that were given are flown."
                 )
-            proposal = _by_hand(gains[number - 1], history)
+            proposal = _manual_proposal(gains[number - 1], history)
         overruled = _require_flyable(definition, experiment, proposal, history, overrule, is_real)
         if overruled:
             get_kind(vehicle).check_gains(options, proposal.gains)
@@ -111,7 +111,7 @@ def fly_campaign(
         history.extend(_flight_of(trial, proposal, record))
 
 
-def _by_hand(gains: Gains, history: Sequence[Flight]) -> Proposal:
+def _manual_proposal(gains: Gains, history: Sequence[Flight]) -> Proposal:
     """What a person or a script has chosen promises nothing."""
     return Proposal(
         kind="repeat" if was_flown(gains, history) else "manual",

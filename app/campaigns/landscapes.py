@@ -67,7 +67,7 @@ def request_landscape(session: Session, campaign_id: int) -> None:
 
 
 def read_plan(session: Session, campaign_id: int, order: JsonObject) -> LandscapePlan:
-    """What the job's proposal was computed from. Raises OvertakenError once the campaign's flights are others."""
+    """What the job's proposal was computed from. Raises SupersededError once the campaign's flights are others."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
     proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None

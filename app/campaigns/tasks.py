@@ -64,7 +64,7 @@ class LandscapeJob:
             raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
         points = survey.points()
         parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
-        errors = np.concatenate([self._pool.run(predict_points, survey.foresee, part) for part in parts])
+        errors = np.concatenate([self._pool.run(predict_points, survey.predict_errors, part) for part in parts])
         result = landscapes.as_json(survey.landscape(errors), job.order)
         with self._database.write() as session:
             jobs.finish_job(session, job.id, worker=self._worker, result=result)

@@ -20,7 +20,7 @@ from app.fleet import service as fleet
 from app.trials import history
 
 LABELS: Final = "ABCDEFGHIJKLMNOPQRST"
-MOST_FLIGHTS: Final = len(LABELS)
+MAX_FLIGHTS: Final = len(LABELS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

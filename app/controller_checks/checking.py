@@ -23,7 +23,7 @@ from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
 from app.logs.paparazzi import is_paparazzi, read_loop_log
 
 _HEAD_BYTES: Final = 4096
-_MOST_DIGITS: Final = 9
+_MAX_DIGITS: Final = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,4 +120,4 @@ def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
 
 
 def _is_whole(text: str) -> bool:
-    return text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS
+    return text.isascii() and text.isdecimal() and len(text) <= _MAX_DIGITS

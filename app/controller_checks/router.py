@@ -35,7 +35,7 @@ def check_controller(
 ) -> ControllerCheck:
     """Hold a recording of the vertical loop against the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
     form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept."""
-    result = service.check_upload(record.content(), name=record.name, companion=record.beside(), gains=gains)
+    result = service.check_upload(record.content(), name=record.name, companion=record.read_companion(), gains=gains)
     return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
 
 

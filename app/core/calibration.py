@@ -28,7 +28,7 @@ from app.core.trajectory import Samples
 
 EXPERIMENTS: Final = frozenset({"takeoff"})
 """Those whose model parameters can be told from one flight."""
-MOST_FLIGHTS: Final = 4
+MAX_FLIGHTS: Final = 4
 """The best and the latest of the valid flights are fitted, so many in all: enough, and the time stays bounded."""
 
 _RATE_HZ: Final = 10.0
@@ -99,7 +99,7 @@ def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Cali
     """The model by the best and the latest valid flights, of which there must be one; the others are passed over."""
     valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
     best = min(valid, key=lambda flight: (flight.error, flight.number))
-    fitted = [flight for flight in valid[-MOST_FLIGHTS:] if flight is not best][1 - MOST_FLIGHTS :]
+    fitted = [flight for flight in valid[-MAX_FLIGHTS:] if flight is not best][1 - MAX_FLIGHTS :]
     fitted = sorted((best, *fitted), key=lambda flight: flight.number)
     numbers = tuple(flight.number for flight in fitted)
     fit = _Fit(experiment, fitted)
@@ -188,7 +188,7 @@ class _Fit:
             covariance=tuple(tuple(row) for row in np.diag(self.sd**2).tolist()),
             origin="",
         )
-        likely = prior.samples(self.experiment, _STARTS)
+        likely = prior.sample(self.experiment, _STARTS)
         misses = (self._outputs(np.tile(self.gains[0], (_STARTS, 1)), likely) - self.measured[0]) / self.noise[1]
         cost = np.sum(misses**2, axis=1) + np.sum(((likely - self.mean) / self.sd) ** 2, axis=1)
         return np.concatenate((likely[np.argmin(cost)], np.zeros(len(self.gains) * len(self.own))))

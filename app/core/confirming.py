@@ -107,7 +107,11 @@ def confirm(
 
 def _inside(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Sequence[Flight]:
     space = experiment.space.narrowed(definition.bounds)
-    return [flight for flight in flights if all(gain.outside(flight.gains[gain.name]) is None for gain in space.gains)]
+    return [
+        flight
+        for flight in flights
+        if all(gain.refusal_by_bounds(flight.gains[gain.name]) is None for gain in space.gains)
+    ]
 
 
 def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:

@@ -29,7 +29,7 @@ from app.core.transfer import transfer
 
 POINTS: Final = 17
 """Values of a gain in a slice, at most: whole counts may leave fewer."""
-MOST_SLICES: Final = 3
+MAX_SLICES: Final = 3
 _MARGIN: Final = 0.35
 _LEAST_WIDTH: Final = 1.5
 """A slice goes beyond what it has to hold by this share of its width, and is at least so many scales wide."""
@@ -74,7 +74,7 @@ class LandscapeGrid:
     (n,), the pairs that are varied, and each gain's values."""
 
     space: PolicySpace
-    foresee: ErrorsOf
+    predict_errors: ErrorsOf
     centre: Vector
     pairs: tuple[tuple[int, int], ...]
     values: tuple[Vector, ...]
@@ -122,7 +122,7 @@ def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
     marks = np.array([space.vector(gains) for gains in (*plan.marks, space.mapping(centre))])
     return LandscapeGrid(
         space=space,
-        foresee=foresee,
+        predict_errors=foresee,
         centre=centre,
         pairs=tuple(_pairs(space, centre, foresee)),
         values=tuple(_values(gain, column) for gain, column in zip(space.gains, marks.T, strict=True)),
@@ -153,17 +153,17 @@ def _error_model(definition: Definition, flights: Sequence[Flight], donor: Fligh
         experiment = transfer(definition, experiment, flights, donor).experiment
     if all(flight.outcome != "valid" for flight in flights):
         return (uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)).errors
-    return STRATEGIES[definition.strategy].foresee(definition, experiment, flights)
+    return STRATEGIES[definition.strategy].predict_errors(definition, experiment, flights)
 
 
 def _pairs(space: PolicySpace, centre: Vector, foresee: ErrorsOf) -> list[tuple[int, int]]:
     """The pairs of free gains, the largest shares of the gradient first, each pair in the gains' own order."""
     free = [place for place, gain in enumerate(space.gains) if gain.span > 0.0]
     pairs = list(combinations(free, 2))
-    if len(pairs) <= MOST_SLICES:
+    if len(pairs) <= MAX_SLICES:
         return pairs
     shares = _shares(space, centre, foresee)
-    return sorted(pairs, key=lambda pair: -(shares[pair[0]] + shares[pair[1]]))[:MOST_SLICES]
+    return sorted(pairs, key=lambda pair: -(shares[pair[0]] + shares[pair[1]]))[:MAX_SLICES]
 
 
 def _shares(space: PolicySpace, centre: Vector, foresee: ErrorsOf) -> Vector:

@@ -42,8 +42,8 @@ _ROUNDING: Final = 1
 _TILT_ROUNDING: Final = 3
 _NEAR: Final = 4
 _FEWEST_TO_INFER: Final = 20
-_MOST_TO_INFER: Final = 2000
-_MOST_STEPS: Final = loop.RATE_HZ * 120
+_MAX_TO_INFER: Final = 2000
+_MAX_STEPS: Final = loop.RATE_HZ * 120
 
 Counts = NDArray[np.int64]
 
@@ -195,7 +195,7 @@ def infer_gains(log: LoopLog) -> dict[str, float] | None:
     active = np.flatnonzero(~log.idle)
     if len(active) < _FEWEST_TO_INFER:
         return None
-    active = active[:: max(1, len(active) // _MOST_TO_INFER)]
+    active = active[:: max(1, len(active) // _MAX_TO_INFER)]
     sample = LoopLog(log.time_s[active], log.values[active])
     ez, ev = _errors(sample)
     parts = np.column_stack([-ez / 2**7, -sample["z_sum_err"] / 2**16, -ev / 2**16, np.ones(len(sample))])
@@ -288,7 +288,7 @@ def _first_command(log: LoopLog) -> tuple[int, int] | None:
     idle = log.idle
     for first in np.flatnonzero(idle[:-1] & ~idle[1:]).tolist():
         same = (log["z_sp"] == log["z_sp"][first + 1]) & ~idle
-        same &= log.time_s <= log.time_s[first] + _MOST_STEPS / loop.RATE_HZ
+        same &= log.time_s <= log.time_s[first] + _MAX_STEPS / loop.RATE_HZ
         broken = np.flatnonzero(~same[first + 1 :])
         last = first + int(broken[0]) if broken.size else len(log) - 1
         if log.time_s[last] - log.time_s[first] >= _FIT_S:

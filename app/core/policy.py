@@ -49,7 +49,7 @@ class Gain:
         """Width of the range; zero for a gain that its bounds pin."""
         return self.upper - self.lower
 
-    def impossible(self, value: object) -> str | None:
+    def refusal_by_controller(self, value: object) -> str | None:
         """Why no controller can hold `value` as this gain, whatever the bounds, or None when it can."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             return "must be a number"
@@ -61,7 +61,7 @@ class Gain:
             return f"must be a number that 32 bits hold, got {shortened(value)}"
         return None
 
-    def outside(self, value: float) -> str | None:
+    def refusal_by_bounds(self, value: float) -> str | None:
         """Why the bounds refuse a number, or None when they do not."""
         if self.lower <= value <= self.upper:
             return None
@@ -103,7 +103,7 @@ class PolicySpace:
         refused = [
             Problem(f"{field}.{gain.name}", reason)
             for gain in self.gains
-            if (reason := gain.outside(complete[gain.name])) is not None
+            if (reason := gain.refusal_by_bounds(complete[gain.name])) is not None
         ]
         if refused:
             raise GainsError("These gains cannot be flown.", hint=_HINT, problems=tuple(refused))
@@ -123,7 +123,7 @@ class PolicySpace:
         refused = [
             Problem(f"{field}.{gain.name}", reason)
             for gain in self.gains
-            if gain.name in gains and (reason := gain.impossible(gains[gain.name])) is not None
+            if gain.name in gains and (reason := gain.refusal_by_controller(gains[gain.name])) is not None
         ]
         if problems := (*unknown, *missing, *refused):
             raise GainsError("These gains cannot be flown.", hint=_HINT, problems=problems)

@@ -194,7 +194,7 @@ def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: V
         covariance=tuple(map(tuple, np.diag([parameter.prior_sd**2 for parameter in parameters]).tolist())),
         origin="the priors of a fit",
     )
-    models = prior.samples(experiment, MODELS)
+    models = prior.sample(experiment, MODELS)
     proposed = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
     if base is None:
         return proposed

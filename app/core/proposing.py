@@ -53,7 +53,7 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     scatter = pool_scatter(groups_of(flights), experiment.scatter)
     strategy = STRATEGIES[definition.strategy]
     proposal = strategy.propose(definition, experiment, space, flights)
-    number = proposal.explanation.base_flight if strategy.learns else None
+    number = proposal.explanation.base_flight if strategy.corrects_model else None
     base = next((flight for flight in flights if flight.number == number), None)
     proposal = with_interval(experiment, space, flights, proposal, scatter, base=base)
     return _with_notes(_confirmed(definition, experiment, space, flights, proposal), flights, warm)

@@ -24,12 +24,12 @@ class ParameterDistribution:
     covariance: tuple[tuple[float, ...], ...]
     origin: str
 
-    def samples(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
+    def sample(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
         """The mean, then `count` − 1 quasi-random models, shape (count, m); the same every time."""
         unit = halton(len(self.mean), count)[1:]
         return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
 
-    def draws(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
+    def draw_random(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
         """Random models of the same distribution, shape (count, m)."""
         return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
 

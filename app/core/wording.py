@@ -3,7 +3,7 @@
 import math
 from typing import Final, Literal
 
-_MOST_DIGITS: Final = 6
+_MAX_DIGITS: Final = 6
 _SHORT_DIGITS: Final = 4
 _TWO_DIGITS_BELOW: Final = 3.55
 """An uncertainty that begins with less carries a second digit: rounding 0.012 to 0.01 would cost too much."""
@@ -15,7 +15,7 @@ def decimals(uncertainty: float | None) -> int:
         return 3
     power = math.floor(math.log10(uncertainty))
     digits = 1 - power if uncertainty / 10.0**power < _TWO_DIGITS_BELOW else -power
-    return min(_MOST_DIGITS, max(0, digits))
+    return min(_MAX_DIGITS, max(0, digits))
 
 
 def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal["-", "+"] = "-") -> str:

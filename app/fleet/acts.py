@@ -1,12 +1,12 @@
 """What a registered vehicle is asked beside its flights: a person asks, the worker that has its link carries it out.
 
     request_act → claim_act → finish_act
-                     └ in the same transaction what came of it: vehicle_connected, vehicle_gone, quarantine_vehicle,
-                       vehicle_released, record_held, record_checks
+                     └ in the same transaction what came of it: record_connected, record_disconnected,
+                       quarantine_vehicle, record_released, record_held, record_checks
 
-Landing and motors off go another way, past the database; `record_order` writes them down afterwards. At a worker's
-start: `withdraw_acts`, then `forget_connections`, then `request_reconnections`; later `wanted_links` are those that
-still are not there, until `vehicle_found` again.
+Landing and motors off go another way, past the database; `record_command` writes them down afterwards. At a worker's
+start: `withdraw_acts`, then `forget_connections`, then `request_reconnections`; later
+`list_vehicles_to_reconnect` gives those that are not connected yet, until `record_reconnected`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -90,7 +90,7 @@ def require_may_stop_motors(session: Session, vehicle_id: int, asker: RequestCon
 
 def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: RequestContext) -> Vehicle:
     """Out of quarantine, on a person's word; a registered vehicle once the worker has seen it disarmed and holding its
-    safe gains. Raises as `ask_vehicle` does."""
+    safe gains. Raises as `request_act` does."""
     row = repository.get_one(session, vehicle_id)
     if row.registered:
         _requested(session, row, ActKind.RELEASE, asker, reason=statement)

@@ -135,7 +135,7 @@ async def _order(
     live: Live, vehicle_id: int, order: Literal["land", "motors off"], body: VehicleOrder | None, sentence: str
 ) -> OrderAnswer:
     reason = (body or VehicleOrder()).reason
-    accepted = live.worker_running and (await live.order(vehicle_id, order, reason)).accepted
+    accepted = live.worker_running and (await live.send_vehicle_command(vehicle_id, order, reason)).accepted
     return OrderAnswer(accepted=accepted, sentence=sentence if accepted else _NO_LINK)
 
 

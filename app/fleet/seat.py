@@ -68,23 +68,23 @@ class WorkerPipe:
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
 
-    def hear(self) -> ToVehicleProcess | None:
-        """The next message; None when there is none. Raises WorkerGoneError."""
+    def receive(self) -> ToVehicleProcess | None:
+        """The next message; None when there is none. Raises PipeClosedError."""
         try:
             return self._pipe.recv() if self._pipe.poll() else None
         except (EOFError, OSError) as error:
             raise PipeClosedError from error
 
     def is_open(self) -> bool:
-        """To be asked while nothing is to be heard. Raises WorkerGoneError rather than say no."""
-        self.hear()
+        """To be asked while nothing is to be heard. Raises PipeClosedError rather than say no."""
+        self.receive()
         return True
 
-    def say(self, message: FromVehicleProcess) -> None:
+    def send(self, message: FromVehicleProcess) -> None:
         with suppress(OSError):
             self._pipe.send(message)
 
-    def show(self, message: FromVehicleProcess) -> None:
+    def send_if_ready(self, message: FromVehicleProcess) -> None:
         """Say it if it can be said at once."""
         with suppress(OSError, ValueError):
             if select.select([], [self._pipe], [], 0.0)[1]:
@@ -100,15 +100,15 @@ def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
         with hold_vehicle_lock(call.lock, within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock):
             seat = VehicleProcess(line, call)
             try:
-                seat.work()
+                seat.run()
             finally:
-                seat.leave()
+                seat.close()
     except PipeClosedError:
         pass
     except GainlineError as error:
-        line.say(failure_from(error))
+        line.send(failure_from(error))
     except Exception as error:  # noqa: BLE001 - the edge of the process; the worker's log says it
-        line.say(internal_error(error))
+        line.send(internal_error(error))
     finally:
         pipe.close()
         os._exit(0)
@@ -122,39 +122,39 @@ class VehicleProcess:
         self._line, self._call = line, call
         self._speed = float(call.options.get("clock_speed", 1.0))
         self._identity = call.identity
-        self._vehicle = self._found()
+        self._vehicle = self._open_vehicle()
         self._show_due_s = 0.0
         self._trial_id: int | None = None
         self._stop: StopRequest | None = None
         self._is_worker_gone = False
-        line.say(ConnectionOpened(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
+        line.send(ConnectionOpened(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
 
-    def work(self) -> None:
-        """Do what is asked, one thing after the other. Raises WorkerGoneError at the end, VehicleError when the link
+    def run(self) -> None:
+        """Do what is asked, one thing after the other. Raises PipeClosedError at the end, VehicleError when the link
         fails."""
         while True:
             match self._next():
                 case FlightRequest() as orders:
                     self._fly(orders)
                 case VehicleRequest() as asked:
-                    self._line.say(self._act(asked))
+                    self._line.send(self._act(asked))
                 case _:
                     continue  # of a flight that is over
 
-    def leave(self) -> None:
+    def close(self) -> None:
         self._vehicle.close()
 
     # ---- between flights
 
-    def _found(self) -> ConnectedVehicle:
+    def _open_vehicle(self) -> ConnectedVehicle:
         while True:
             try:
                 return self._connect(self._call.safe_gains)
             except VehicleError as error:
-                if not self._call.patient or isinstance(error, SafeGainsError):
+                if not self._call.keep_retrying or isinstance(error, SafeGainsError):
                     raise
             for _ in range(round(RECONNECT_INTERVAL_S / POLL_INTERVAL_S)):
-                self._line.hear()
+                self._line.receive()
                 self._call.clock.wait_s(POLL_INTERVAL_S)
 
     def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
@@ -171,38 +171,38 @@ class VehicleProcess:
 
     def _next(self) -> ToVehicleProcess:
         """The worker's next message that is no order, listening to the vehicle meanwhile."""
-        while (message := self._heed()) is None:
+        while (message := self._poll_commands()) is None:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
-            self._show()
+            self._publish_status()
         return message
 
-    def _heed(self) -> ToVehicleProcess | None:
+    def _poll_commands(self) -> ToVehicleProcess | None:
         """Pass an order on at once; any other message is returned."""
-        message = self._line.hear()
+        message = self._line.receive()
         if not isinstance(message, VehicleCommand):
             return message
-        self._obey(message)
+        self._forward_command(message)
         return None
 
-    def _obey(self, ordered: VehicleCommand) -> None:
-        problem = _EXPIRED if self._is_late(ordered) else ""
+    def _forward_command(self, ordered: VehicleCommand) -> None:
+        problem = _EXPIRED if self._has_expired(ordered) else ""
         if not problem:
             try:
                 act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
                 act(ordered.reason)
             except VehicleError as error:
                 problem = str(error)
-        self._line.say(CommandForwarded(ordered.order, ordered.reason, problem))
+        self._line.send(CommandForwarded(ordered.order, ordered.reason, problem))
 
     @staticmethod
-    def _is_late(ordered: VehicleCommand) -> bool:
+    def _has_expired(ordered: VehicleCommand) -> bool:
         return time.monotonic() > ordered.by_s
 
-    def _show(self) -> None:
+    def _publish_status(self) -> None:
         now_s = self._call.clock.now_s()
         if now_s >= self._show_due_s:
             self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
-            self._line.show(self._status())
+            self._line.send_if_ready(self._status())
 
     def _status(self) -> VehicleStatus:
         condition = self._vehicle.condition()
@@ -225,13 +225,13 @@ class VehicleProcess:
         try:
             if self._vehicle.condition().armed:  # whatever takes time would keep Land waiting
                 raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
-            self._have(asked.safe_gains)
-            answer = self._acted(asked.kind)
+            self._require_vehicle(asked.safe_gains)
+            answer = self._perform(asked.kind)
         except VehicleError as error:
             return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
         return answer
 
-    def _acted(self, kind: ActKind) -> VehicleResponse:
+    def _perform(self, kind: ActKind) -> VehicleResponse:
         checks, parameters = None, None
         match kind:
             case ActKind.CHECK:
@@ -254,10 +254,10 @@ class VehicleProcess:
         )
 
     def _progress(self, _count: int, _of: int) -> None:
-        self._heed()
-        self._show()
+        self._poll_commands()
+        self._publish_status()
 
-    def _have(self, safe_gains: Mapping[str, float]) -> None:
+    def _require_vehicle(self, safe_gains: Mapping[str, float]) -> None:
         """A vehicle whose safe gains a person has changed is connected anew, which writes them once it is pinned."""
         if dict(self._vehicle.safe_gains) != dict(safe_gains):
             self._vehicle.close()
@@ -268,23 +268,23 @@ class VehicleProcess:
     def _fly(self, orders: FlightRequest) -> None:
         self._trial_id, self._stop = orders.trial_id, None
         try:
-            self._have(orders.safe_gains)
+            self._require_vehicle(orders.safe_gains)
             with self._logged(orders):
                 try:
-                    self._line.say(GainsStaged(self._vehicle.stage(orders.gains)))
-                    if self._is_cleared():
-                        self._line.say(FlightLanded(self._take_off(orders)))
+                    self._line.send(GainsStaged(self._vehicle.stage(orders.gains)))
+                    if self._await_takeoff_clearance():
+                        self._line.send(FlightLanded(self._take_off(orders)))
                 finally:
-                    self._line.say(SafeGainsRestored(restore_safe_gains(self._vehicle)))
+                    self._line.send(SafeGainsRestored(restore_safe_gains(self._vehicle)))
         except GainlineError as error:
-            self._line.say(failure_from(error))
+            self._line.send(failure_from(error))
         except PipeClosedError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
-            self._line.say(internal_error(error))
+            self._line.send(internal_error(error))
         finally:
             self._trial_id = None
-        self._line.say(FlightFinished())
+        self._line.send(FlightFinished())
 
     @contextmanager
     def _logged(self, orders: FlightRequest) -> Iterator[None]:
@@ -294,8 +294,8 @@ class VehicleProcess:
         finally:
             self._vehicle.log_to(None)
 
-    def _is_cleared(self) -> bool:
-        """Wait for the worker's word, attending the vehicle. Raises WorkerGoneError."""
+    def _await_takeoff_clearance(self) -> bool:
+        """Wait for the worker's word, attending the vehicle. Raises PipeClosedError."""
         while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
             self._note(answer)
         return isinstance(answer, TakeOffCommand)
@@ -318,13 +318,13 @@ class VehicleProcess:
         return mark_if_requested(record, asked)
 
     def _publish(self, message: Telemetry | FlightPhase | VehicleStatus) -> None:
-        (self._line.say if isinstance(message, FlightPhase) else self._line.show)(message)
+        (self._line.send if isinstance(message, FlightPhase) else self._line.send_if_ready)(message)
 
     def _should_stop(self) -> StopRequest | None:
         """Asked every few milliseconds in the air."""
-        self._show()
+        self._publish_status()
         try:
-            while not self._is_worker_gone and (message := self._line.hear()) is not None:
+            while not self._is_worker_gone and (message := self._line.receive()) is not None:
                 self._note(message)
         except PipeClosedError:
             self._is_worker_gone = True
@@ -336,12 +336,12 @@ class VehicleProcess:
         match message:
             case CancelFlight(trial_id, reason) if trial_id == self._trial_id:
                 self._stop = self._stop or StopRequest(reason)
-            case VehicleCommand(order, reason) if self._is_late(message):
-                self._line.say(CommandForwarded(order, reason, _EXPIRED))
+            case VehicleCommand(order, reason) if self._has_expired(message):
+                self._line.send(CommandForwarded(order, reason, _EXPIRED))
             case VehicleCommand(order, reason):
                 if order == "motors off":
                     self._stop = StopRequest(reason, motors_off=True)
                 self._stop = self._stop or StopRequest(reason)
-                self._line.say(CommandForwarded(order, reason))
+                self._line.send(CommandForwarded(order, reason))
             case _:
                 pass

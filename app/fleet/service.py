@@ -17,7 +17,7 @@ from app.errors import BusyError, ConflictError, InputError, Problem
 from app.fleet import repository
 from app.fleet.kinds import can_fly, experiments_of, is_registered_one_by_one, needs_staging
 from app.fleet.schemas import Vehicle, VehicleChoice
-from app.fleet.states import ACTIONS, MOVES, VehicleState
+from app.fleet.states import ACTIONS, TRANSITIONS, VehicleState
 from app.fleet.views import campaign_vehicle, options_of, vehicle_view
 from app.moves import check_action, check_transition
 from app.schemas import Page
@@ -137,7 +137,7 @@ def require_idle(session: Session, row: VehicleRow) -> None:
 
 def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:
     """Raises ConflictError when the states' table does not lead there."""
-    row.state = check_transition(MOVES, row.state, to, row.name)
+    row.state = check_transition(TRANSITIONS, row.state, to, row.name)
 
 
 def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:

@@ -53,7 +53,7 @@ class ConnectionRequest:
     identity: Identity | None
     lock: Path
     trial_parameters: Path
-    patient: bool = False
+    keep_retrying: bool = False
     clock: Clock = REAL_TIME
 
 
@@ -143,7 +143,7 @@ class VehicleConnection:
     def pid(self) -> int | None:
         return self._process.pid
 
-    def connected(self) -> ConnectionOpened:
+    def wait_until_open(self) -> ConnectionOpened:
         """Wait until the link is open. Raises VehicleError when it cannot be, SafeGainsError when the vehicle's gains
         are in doubt; the process has ended then."""
         match self._next():
@@ -157,7 +157,7 @@ class VehicleConnection:
 
     def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> VehicleResponse:
         """Have an act carried out and wait for what came of it. Raises VehicleError when the process dies."""
-        self._tell(VehicleRequest(kind=kind, safe_gains=dict(safe_gains)))
+        self._post(VehicleRequest(kind=kind, safe_gains=dict(safe_gains)))
         said = self._next()
         assert isinstance(said, VehicleResponse), said
         return said
@@ -166,7 +166,7 @@ class VehicleConnection:
         """As `Crew.fly` says."""
         self.trial_id = orders.trial_id
         try:
-            self._tell(orders)
+            self._post(orders)
             while not isinstance(said := self._next(), FlightFinished):
                 assert isinstance(
                     said, GainsStaged | Telemetry | FlightPhase | FlightLanded | SafeGainsRestored | FlightFailure
@@ -176,26 +176,26 @@ class VehicleConnection:
             self.trial_id = None
 
     def take_off(self) -> None:
-        self._tell(TakeOffCommand())
+        self._post(TakeOffCommand())
 
-    def decline(self) -> None:
-        self._tell(CancelTakeOff())
+    def cancel_take_off(self) -> None:
+        self._post(CancelTakeOff())
 
-    def stand_down(self, trial_id: int, reason: str) -> None:
-        self._tell(CancelFlight(trial_id, reason))
+    def cancel_flight(self, trial_id: int, reason: str) -> None:
+        self._post(CancelFlight(trial_id, reason))
 
-    def order(self, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
+    def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
         """Whether the process was told; it passes the order on at once. False while there is no link."""
-        return self._open and self.alive and self._tell(VehicleCommand(order, reason, by_s))
+        return self._open and self.alive and self._post(VehicleCommand(order, reason, by_s))
 
-    def hang_up(self) -> None:
+    def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
         with suppress(OSError), socket.socket(fileno=os.dup(self._pipe.fileno())) as end:
             end.shutdown(socket.SHUT_RDWR)  # unlike closing the pipe, it wakes who listens to it
 
     def close(self) -> None:
         """Hang up and see the process end, unless it takes long."""
-        self.hang_up()
+        self.request_close()
         self._process.join(SHUTDOWN_TIMEOUT_S)
 
     def _next(self) -> FromVehicleProcess:
@@ -221,7 +221,7 @@ class VehicleConnection:
             with self._sending:
                 self._pipe.close()
 
-    def _tell(self, message: ToVehicleProcess) -> bool:
+    def _post(self, message: ToVehicleProcess) -> bool:
         try:
             self._send(message)
         except OSError:  # it is dead, which whoever listens to it learns

@@ -23,7 +23,7 @@ class VehicleState(StrEnum):
     QUARANTINED = "quarantined"
 
 
-MOVES: Final[Mapping[VehicleState, frozenset[VehicleState]]] = {
+TRANSITIONS: Final[Mapping[VehicleState, frozenset[VehicleState]]] = {
     VehicleState.DISCONNECTED: frozenset({VehicleState.READY, VehicleState.QUARANTINED}),
     VehicleState.READY: frozenset({VehicleState.STAGED, VehicleState.DISCONNECTED, VehicleState.QUARANTINED}),
     VehicleState.STAGED: frozenset({VehicleState.FLYING, VehicleState.READY, VehicleState.QUARANTINED}),

@@ -47,7 +47,7 @@ class VehicleSlot:
 
     busy: threading.Lock = field(default_factory=threading.Lock)
     session: VehicleConnection | None = None
-    seeking: VehicleConnection | None = None
+    reconnecting: VehicleConnection | None = None
     """One that waits for a vehicle that does not answer."""
     concern: str = ""
 
@@ -83,8 +83,8 @@ class VehicleConnectionManager:
         self._clock = clock
         self._berths: dict[int, VehicleSlot] = {}
         self._look_due_s = 0.0
-        self._seekers = ThreadPoolExecutor(MAX_CONCURRENT, thread_name_prefix="link")
-        self._books = ThreadPoolExecutor(1, thread_name_prefix="books")
+        self._reconnect_executor = ThreadPoolExecutor(MAX_CONCURRENT, thread_name_prefix="link")
+        self._record_executor = ThreadPoolExecutor(1, thread_name_prefix="books")
 
     def recover(self) -> None:
         """After a start, and after the flights' own recovery: nobody has a link to any vehicle. Raises StorageError."""
@@ -97,12 +97,12 @@ class VehicleConnectionManager:
     def close(self) -> None:
         """When nothing is carried out any more: every vehicle is let go, with its safe gains."""
         berths = tuple(self._berths.values())
-        for session in [each for berth in berths for each in (berth.session, berth.seeking) if each is not None]:
-            session.hang_up()
-        self._seekers.shutdown()
+        for session in [each for berth in berths for each in (berth.session, berth.reconnecting) if each is not None]:
+            session.request_close()
+        self._reconnect_executor.shutdown()
         for session in [berth.session for berth in berths if berth.session is not None]:
             session.close()
-        self._books.shutdown()
+        self._record_executor.shutdown()
 
     # ---- from any thread
 
@@ -111,7 +111,7 @@ class VehicleConnectionManager:
         berth = self._berths.get(vehicle_id)
         if berth is None or (session := berth.live) is None:
             return False
-        told = session.order(order, reason, by_s)
+        told = session.send_command(order, reason, by_s)
         if (trial_id := session.trial_id) is not None:
             self._airspace.abort(trial_id, reason)
         return told
@@ -142,9 +142,9 @@ class VehicleConnectionManager:
     def _connect(self, task: ActTask) -> None:
         berth = self._berth(task.vehicle.vehicle_id)
         try:
-            self._take(berth)
+            self._acquire_slot(berth)
             try:
-                said = self._opened(berth, task.vehicle)
+                said = self._open_connection(berth, task.vehicle)
             finally:
                 berth.busy.release()
         except GainlineError as error:
@@ -153,16 +153,16 @@ class VehicleConnectionManager:
                 task, str(error), also=lambda t: acts.record_disconnected(t, task.vehicle.vehicle_id, concern=concern)
             )
             return
-        self._store_patiently(partial(_connected, task=task, said=said))
+        self._store_with_retry(partial(_connected, task=task, said=said))
 
     def _disconnect(self, task: ActTask) -> None:
         self._close(task.vehicle.vehicle_id)
-        self._store_patiently(partial(_disconnected, task=task))
+        self._store_with_retry(partial(_disconnected, task=task))
 
     def _close(self, vehicle_id: int, *, only: VehicleConnection | None = None) -> None:
         """The vehicle's session, whichever it is or `only` that one."""
         berth = self._berth(vehicle_id)
-        self._take(berth)
+        self._acquire_slot(berth)
         try:
             if only is not None and berth.session is not only:
                 return
@@ -171,13 +171,13 @@ class VehicleConnectionManager:
                 session.close()
         finally:
             berth.busy.release()
-        self._show(vehicle_id, "gone")
+        self._publish_state(vehicle_id, "gone")
 
-    def _take(self, berth: VehicleSlot) -> None:
+    def _acquire_slot(self, berth: VehicleSlot) -> None:
         """The berth for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
         while not berth.busy.acquire(timeout=self._clock.wall_s(YIELD_POLL_S)):
-            if (seeking := berth.seeking) is not None:
-                seeking.hang_up()
+            if (seeking := berth.reconnecting) is not None:
+                seeking.request_close()
 
     def _ask(self, task: ActTask) -> None:
         try:
@@ -186,7 +186,7 @@ class VehicleConnectionManager:
             self._fail(task, str(error))
             return
         self._berth(task.vehicle.vehicle_id).concern = answered.concern
-        self._store_patiently(partial(_answered, task=task, answered=answered))
+        self._store_with_retry(partial(_answered, task=task, answered=answered))
 
     def _fail(self, task: ActTask, problem: str, *, also: Callable[[Transaction], None] = lambda _: None) -> None:
         _log.warning("act failed", act=task.kind, why=problem)
@@ -195,25 +195,25 @@ class VehicleConnectionManager:
             acts.finish_act(transaction, task.act_id, problem=problem)
             also(transaction)
 
-        self._store_patiently(store)
+        self._store_with_retry(store)
 
     # ---- links
 
-    def tend(self) -> None:
+    def maintain(self) -> None:
         """To be called every second or so: sessions that ended by themselves are taken out of the books, and vehicles
         that are wanted connected are looked for. Raises StorageError."""
         for vehicle_id, berth in tuple(self._berths.items()):
             if (session := berth.session) is not None and not session.alive:
-                self._let_go(vehicle_id, berth, session)
+                self._release_ended(vehicle_id, berth, session)
         if not self._links or self._clock.now_s() < self._look_due_s:
             return
         self._look_due_s = self._clock.now_s() + RECONNECT_INTERVAL_S
         with self._database.read() as transaction:
             wanted = acts.list_vehicles_to_reconnect(transaction)
         for vehicle in wanted:
-            self._look_for(vehicle)
+            self._schedule_reconnect(vehicle)
 
-    def _let_go(self, vehicle_id: int, berth: VehicleSlot, gone: VehicleConnection) -> None:
+    def _release_ended(self, vehicle_id: int, berth: VehicleSlot, gone: VehicleConnection) -> None:
         try:
             with self._database.write() as transaction:
                 acts.record_disconnected(transaction, vehicle_id)
@@ -222,27 +222,27 @@ class VehicleConnectionManager:
         _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
         if berth.session is gone:  # and not one that was opened meanwhile
             berth.session = None
-        self._show(vehicle_id, "gone")
+        self._publish_state(vehicle_id, "gone")
 
-    def _look_for(self, vehicle: LinkedVehicle) -> None:
+    def _schedule_reconnect(self, vehicle: LinkedVehicle) -> None:
         berth = self._berth(vehicle.vehicle_id)
-        seeking = berth.seeking
+        seeking = berth.reconnecting
         if seeking is not None and seeking.call.options != vehicle.options:
-            seeking.hang_up()
+            seeking.request_close()
         if berth.session is None and seeking is None and berth.busy.acquire(blocking=False):
-            self._seekers.submit(self._seek, berth, vehicle)
+            self._reconnect_executor.submit(self._reconnect, berth, vehicle)
 
-    def _seek(self, berth: VehicleSlot, vehicle: LinkedVehicle) -> None:
+    def _reconnect(self, berth: VehicleSlot, vehicle: LinkedVehicle) -> None:
         """With `busy` held. Raises nothing that matters: who is wanted is looked for again."""
         try:
-            said = self._opened(berth, vehicle, patient=True)
+            said = self._open_connection(berth, vehicle, patient=True)
             found = berth.session
         except GainlineError as error:
             _log.info("not connected", vehicle_id=vehicle.vehicle_id, why=str(error))
             return
         finally:
             berth.busy.release()
-        kept = self._store_patiently(
+        kept = self._store_with_retry(
             lambda t: acts.record_reconnected(
                 t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held
             )
@@ -250,12 +250,14 @@ class VehicleConnectionManager:
         if kept is False:
             self._close(vehicle.vehicle_id, only=found)
 
-    def _opened(self, berth: VehicleSlot, vehicle: LinkedVehicle, *, patient: bool = False) -> ConnectionOpened:
+    def _open_connection(
+        self, berth: VehicleSlot, vehicle: LinkedVehicle, *, patient: bool = False
+    ) -> ConnectionOpened:
         """With `busy` held. Raises VehicleError when there is no link in the end."""
         vehicle_id = vehicle.vehicle_id
         if berth.session is not None:
             berth.session.close()
-        self._show(vehicle_id, "connecting")
+        self._publish_state(vehicle_id, "connecting")
         call = ConnectionRequest(
             vehicle_id=vehicle_id,
             name=vehicle.name,
@@ -265,22 +267,22 @@ class VehicleConnectionManager:
             identity=vehicle.identity,
             lock=self._data_dir / f"vehicle-{vehicle_id}.lock",
             trial_parameters=self._data_dir / f"vehicle-{vehicle_id}.trial-parameters.json",
-            patient=patient,
+            keep_retrying=patient,
             clock=self._clock,
         )
-        session = berth.seeking = VehicleConnection(
-            call, run_vehicle_process, hear=partial(self._heard, berth, vehicle_id)
+        session = berth.reconnecting = VehicleConnection(
+            call, run_vehicle_process, hear=partial(self._on_message, berth, vehicle_id)
         )
         try:
             if self._closing.is_set():
                 raise _no_link_error()
-            said = session.connected()
+            said = session.wait_until_open()
         except BaseException:
             session.close()
-            self._show(vehicle_id, "gone")
+            self._publish_state(vehicle_id, "gone")
             raise
         finally:
-            berth.seeking = None
+            berth.reconnecting = None
         berth.concern, berth.session = said.concern, session
         _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(said.identity), concern=said.concern)
         return said
@@ -290,30 +292,30 @@ class VehicleConnectionManager:
 
     # ---- what sessions say by themselves
 
-    def _heard(self, berth: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
+    def _on_message(self, berth: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
         """On the session's own thread."""
         match news:
             case VehicleStatus(concern=concern):
                 self._publish(news)
                 if concern and not berth.concern:
-                    self._write_down(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
+                    self._record_in_background(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
                 berth.concern = concern
             case CommandForwarded(order, reason, problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
-                self._write_down(lambda t: acts.record_command(t, vehicle_id, kind, reason, problem=problem))
+                self._record_in_background(lambda t: acts.record_command(t, vehicle_id, kind, reason, problem=problem))
 
-    def _show(self, vehicle_id: int, state: VehicleLinkState) -> None:
+    def _publish_state(self, vehicle_id: int, state: VehicleLinkState) -> None:
         now = dt.datetime.now(dt.UTC).isoformat()
         self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=now, step=""))
 
     # ---- books
 
-    def _write_down(self, work: Callable[[Transaction], None]) -> None:
+    def _record_in_background(self, work: Callable[[Transaction], None]) -> None:
         """Afterwards, in its turn: whoever says it waits for nothing."""
         with suppress(RuntimeError):  # the worker has ended
-            self._books.submit(self._store_patiently, work)
+            self._record_executor.submit(self._store_with_retry, work)
 
-    def _store_patiently(self, work: Callable[[Transaction], T]) -> T | None:
+    def _store_with_retry(self, work: Callable[[Transaction], T]) -> T | None:
         """What `work` gives, tried until the database takes it; None when it does not fit, or the worker closes."""
         while True:
             try:

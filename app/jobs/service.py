@@ -1,7 +1,7 @@
 """Numeric work as rows: written in the transaction that needs it, carried out by a worker, and again after a crash.
 
 For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job`, `fail_job` or
-`withdraw_job`; `put_back_job` and `give_up_job` when it has to end before that.
+`cancel_superseded_job`; `requeue_job` and `requeue_or_fail_job` when it has to end before that.
 """
 
 from collections.abc import Collection
@@ -19,7 +19,7 @@ from app.db.types import utc_now
 from app.jobs import repository
 from app.jobs.logs import lines_of_job
 from app.jobs.schemas import Job, JobLog
-from app.jobs.states import ACTIONS, MOVES, JobState
+from app.jobs.states import ACTIONS, TRANSITIONS, JobState
 from app.moves import allowed, check_action, check_transition
 from app.schemas import Page, Trouble
 
@@ -278,7 +278,7 @@ def _end(row: JobRow, state: JobState, happened: str, hint: str, problems: list[
 
 
 def _move(row: JobRow, to: JobState) -> None:
-    row.state = check_transition(MOVES, row.state, to, _name(row))
+    row.state = check_transition(TRANSITIONS, row.state, to, _name(row))
 
 
 def _name(row: JobRow) -> str:

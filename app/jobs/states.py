@@ -22,7 +22,7 @@ class JobState(StrEnum):
     CANCELLED = "cancelled"
 
 
-MOVES: Final[Mapping[JobState, frozenset[JobState]]] = {
+TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = {
     JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED}),
     JobState.RUNNING: frozenset({JobState.DONE, JobState.FAILED, JobState.CANCELLED, JobState.QUEUED}),
     JobState.DONE: frozenset(),

@@ -39,7 +39,7 @@ class JobRunner:
     any.
 
     `perform(job)` does the work and stores what came of it. It may raise GainlineError, which is kept with the job for
-    a person, OvertakenError when nobody wants it any more, and CancelledError when the worker ends.
+    a person, SupersededError when nobody wants it any more, and CancelledError when the worker ends.
     """
 
     def __init__(
@@ -64,14 +64,14 @@ class JobRunner:
         self._beat_due_s = 0.0
 
     @property
-    def at_work(self) -> int:
+    def running_count(self) -> int:
         """How many jobs are claimed and not finished."""
         return len(self._at_work)
 
     def claim(self) -> ClaimedJob | None:
         """The job that has waited longest, now this worker's; None when none waits or the desk is full. Raises
         StorageError."""
-        if self.at_work >= self._room:
+        if self.running_count >= self._room:
             return None
         with self._database.write() as session:
             row = jobs.claim_job(session, worker=self._worker, kinds=(self._kind,), lease_s=self._lease_s)

@@ -87,7 +87,7 @@ class Hub:
         """A subscription to whatever comes from now on, and before it to how the vehicles are and what is in the air
         since its command; over at once when the hub is closed."""
         subscription = Subscription()
-        for known in self._memory.so_far():
+        for known in self._memory.snapshot():
             subscription.push(known)
         self._subscriptions.add(subscription)
         if not self._open:

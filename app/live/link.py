@@ -49,7 +49,7 @@ class Live:
         """Past the database, straight to the worker. Raises LinkDownError when it cannot be told."""
         return await self.client.abort(trial_id, reason)
 
-    async def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
+    async def send_vehicle_command(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
         """Land or motors off, the same way. Raises LinkDownError when the worker cannot be told."""
         return await self.client.order(vehicle_id, order, reason)
 

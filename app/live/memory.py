@@ -34,7 +34,7 @@ class LiveState:
         self._flights.clear()
         self._vehicles.clear()
 
-    def so_far(self) -> list[PublishedMessage]:
+    def snapshot(self) -> list[PublishedMessage]:
         """One message for each vehicle, and one for each flight with everything measured since its command, each with
         its age."""
         now_s = self._clock_s()

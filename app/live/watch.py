@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Final, Self
 from urllib.parse import quote
 
-LOOK_EVERY_S: Final = 0.02
+POLL_INTERVAL_S: Final = 0.02
 
 
 class DatabaseWatch:
@@ -41,5 +41,5 @@ class DatabaseWatch:
 
     def wait(self, stop: threading.Event, timeout_s: float) -> bool:
         """Sleep until something is committed (true), `stop` is set or the time is over (false)."""
-        looks = max(1, round(timeout_s / LOOK_EVERY_S))
-        return any(self.changed() for _ in range(looks) if not stop.wait(LOOK_EVERY_S))
+        looks = max(1, round(timeout_s / POLL_INTERVAL_S))
+        return any(self.changed() for _ in range(looks) if not stop.wait(POLL_INTERVAL_S))

@@ -23,7 +23,7 @@ HIGHEST_HOP_M: Final = 0.5
 LONGEST_S: Final = 600.0
 MIN_SAMPLES: Final = 20
 MAX_SAMPLES: Final = 200_000
-MOST_TAKEOFFS: Final = 200
+MAX_TAKEOFFS: Final = 200
 
 _RISE_S: Final = (0.5, 1.0, 2.0, 3.0)
 _STOOD_M: Final = 0.05
@@ -124,9 +124,9 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
             record = _Record(log, begin, end, is_commanded, ground_m, held)
             found.append(record.takeoff(len(found) + 1, time_s, channels, kept))
         free_from_s = float(time_s[down])
-        if len(found) > MOST_TAKEOFFS:
+        if len(found) > MAX_TAKEOFFS:
             raise TrajectoryError(
-                f"The log holds more than {MOST_TAKEOFFS} takeoffs.",
+                f"The log holds more than {MAX_TAKEOFFS} takeoffs.",
                 hint="Cut it to the flights of one day, or choose the log of one flight.",
                 problems=(Problem("file", "holds too many flights"),),
             )

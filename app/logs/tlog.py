@@ -337,9 +337,9 @@ class _Telemetry:
         )
         lands = number == _LAND or (number == _MOTORS and not message.param1)
         if takeoff:
-            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_spoken(number)}"), self._starts)
+            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_command_name(number)}"), self._starts)
         elif lands or number == _SET_MODE:
-            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_spoken(number)}"), self._ends)
+            self._sent[number] = _Sent(LogEvent(self._now_s, f"the command {_command_name(number)}"), self._ends)
 
     def _answer(self, message: _Message) -> None:
         sent = self._sent.pop(int(message.command), None) if self._is_vehicle(message) else None
@@ -353,5 +353,5 @@ class _Telemetry:
             self._activated.append((self._now_s, int(message.seq)))
 
 
-def _spoken(command: int) -> str:
+def _command_name(command: int) -> str:
     return {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}[command]

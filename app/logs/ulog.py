@@ -31,7 +31,7 @@ _SYNC: Final = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 _TYPES: Final = frozenset(b"BFIMPQARDLCSO")
 _LARGEST_MESSAGE: Final = 10_000
 _LARGEST_ARRAY: Final = 64
-_MOST_FIELDS: Final = 300
+_MAX_FIELDS: Final = 300
 _FIELD: Final = re.compile(r"(u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,3})\])? (\w+)")
 _APPENDED: Final = 0x01
 
@@ -70,7 +70,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
     if not is_ulog(data[:_HEADER_BYTES]) or len(data) < _HEADER_BYTES:
         raise refused("is no ULog", _HINT)
     sieve = _LogFilter()
-    sieve.sift(data)
+    sieve.filter(data)
     try:
         log = ULog(io.BytesIO(sieve.kept))
     except (ULogException, ValueError, KeyError, IndexError, TypeError) as error:
@@ -107,7 +107,7 @@ class _LogFilter:
     _subscribed: set[int] = field(default_factory=set)
     _appended: list[int] = field(default_factory=list)
 
-    def sift(self, data: Contents) -> None:
+    def filter(self, data: Contents) -> None:
         """Go through all messages; after damage, on from the next mark that the logger sets for that."""
         self.kept += _MAGIC + b"\x01" + data[len(_MAGIC) + 1 : _HEADER_BYTES]
         position, size = _HEADER_BYTES, len(data)
@@ -146,7 +146,7 @@ class _LogFilter:
         """Whether it is that of a wanted topic: flat, every name once, a time among them."""
         name, _, described = body.decode("ascii", "replace").partition(":")
         parts = [part for part in described.split(";") if part]
-        if name not in _TOPICS or len(parts) > _MOST_FIELDS:
+        if name not in _TOPICS or len(parts) > _MAX_FIELDS:
             return False
         found = [_FIELD.fullmatch(part) for part in parts]
         fields = [each.groups() for each in found if each is not None]

@@ -16,7 +16,7 @@ from app.errors import UnavailableError
 
 PRINTERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 TIMEOUT_S: Final = 60.0
-AT_ONCE: Final = 2
+MAX_CONCURRENT: Final = 2
 _FLAGS: Final = (
     "--headless",
     "--disable-gpu",
@@ -32,7 +32,7 @@ _FLAGS: Final = (
     "--proxy-server=http://127.0.0.1:9",
     "--virtual-time-budget=20000",
 )
-_places = threading.BoundedSemaphore(AT_ONCE)
+_places = threading.BoundedSemaphore(MAX_CONCURRENT)
 _log = structlog.get_logger(__name__)
 
 
@@ -42,7 +42,7 @@ def print_pdf(page: Callable[[], str]) -> bytes:
     browser = _browser()
     if not _places.acquire(blocking=False):
         raise UnavailableError(
-            f"{AT_ONCE} reports are being printed already.", hint="Try again in a few seconds, or take the HTML."
+            f"{MAX_CONCURRENT} reports are being printed already.", hint="Try again in a few seconds, or take the HTML."
         )
     try:
         with tempfile.TemporaryDirectory(prefix="gainline-print-", ignore_cleanup_errors=True) as folder:

@@ -10,7 +10,7 @@ from app.reports import repository
 from app.reports.content import Photo, Remark
 from app.trials.schemas import Trial
 
-MOST_BYTES: Final = 24 * 2**20
+MAX_BYTES: Final = 24 * 2**20
 """Of all photos together, as they were taken; in the file they take a third more."""
 
 
@@ -30,7 +30,7 @@ def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> I
 
 def _fitting(photos: dict[int, list[tuple[TrialPhotoRow, int]]]) -> set[int]:
     """Ids of those that fit: the first of each trial comes before the second of any."""
-    kept, room = set[int](), MOST_BYTES
+    kept, room = set[int](), MAX_BYTES
     turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
     for _, photo_id, size in turns:
         if size <= room:

@@ -48,7 +48,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
             *_landscape(session, campaign),
         ),
         remarks=tuple(remarks.remarks_on(session, campaign_id, trials)),
-        photo_bytes=remarks.MOST_BYTES,
+        photo_bytes=remarks.MAX_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
         version=__version__,
         made_at=utc_now(),

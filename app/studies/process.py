@@ -20,7 +20,7 @@ from app.studies.reproductions import get_reproduction
 from app.studies.results import Result
 
 NICENESS: Final = 10
-ENDS_WITHIN_S: Final = 5.0
+SHUTDOWN_TIMEOUT_S: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,16 +75,16 @@ class StudyProcess:
     ) -> None:
         self._pipe.close()
         self._process.kill()
-        self._process.join(ENDS_WITHIN_S)
+        self._process.join(SHUTDOWN_TIMEOUT_S)
 
     def listen(self, within_s: float) -> StudyMessage | None:
-        """What it says next, None when it says nothing for so long. Raises DiedError."""
+        """What it says next, None when it says nothing for so long. Raises ProcessDiedError."""
         try:
             if not self._pipe.poll(within_s):
                 return None
             said: StudyMessage = self._pipe.recv()
         except (EOFError, OSError) as error:
-            self._process.join(ENDS_WITHIN_S)
+            self._process.join(SHUTDOWN_TIMEOUT_S)
             raise ProcessDiedError(self._process.exitcode) from error
         return said
 

@@ -19,7 +19,7 @@ from app.studies.reproductions import REPRODUCTIONS, Reproduction
 from app.studies.results import Result, result_from_json
 
 REPRODUCTION_JOB: Final = "reproduction"
-UNDER_WAY: Final = (JobState.QUEUED, JobState.RUNNING)
+ACTIVE_STATES: Final = (JobState.QUEUED, JobState.RUNNING)
 CAME_TO_NOTHING: Final = (JobState.FAILED, JobState.CANCELLED)
 
 
@@ -67,7 +67,7 @@ def get_reproduction(session: Session, name: str) -> schemas.Reproduction:
 def request_run(session: Session, name: str, *, full: bool) -> Job:
     """Have it run; one that waits or runs already serves for this too. Raises NotFoundError."""
     _registered(name)
-    row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, UNDER_WAY) or jobs.enqueue_job(
+    row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, ACTIVE_STATES) or jobs.enqueue_job(
         session, REPRODUCTION_JOB, order={"name": name, "full": full}
     )
     return jobs.job_view(row)
@@ -115,7 +115,7 @@ def _summary(session: Session, each: Reproduction) -> dict[str, object]:
 
 def _open_job(session: Session, each: Reproduction, latest: JobRow | None) -> Job | None:
     """What a page has to show beside the result: the run under way, or a later one that came to nothing."""
-    if (row := jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, UNDER_WAY)) is None:
+    if (row := jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, ACTIVE_STATES)) is None:
         row = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, CAME_TO_NOTHING)
         if row is None or (latest is not None and row.id < latest.id):
             return None

@@ -36,9 +36,9 @@ from app.vehicles.base import FlightRecord, ShouldStop, StopRequest, Vehicle
 from app.vehicles.jsbsim.kind import prepare
 from app.vehicles.open import open_vehicle
 
-CONTROL_WITHIN_S: Final = 10.0
+LOCK_TIMEOUT_S: Final = 10.0
 """How long a flight waits for another process that still has the vehicle (one whose worker was killed, landing)."""
-ENDS_WITHIN_S: Final = 5.0
+SHUTDOWN_TIMEOUT_S: Final = 5.0
 
 
 class FlightProcess:
@@ -62,7 +62,7 @@ class FlightProcess:
             while not isinstance(said := self._pipe.recv(), FlightFinished):
                 yield said
         except (EOFError, OSError) as error:
-            self._process.join(ENDS_WITHIN_S)
+            self._process.join(SHUTDOWN_TIMEOUT_S)
             raise process_died_error(self._process.exitcode) from error
 
     @property
@@ -72,16 +72,16 @@ class FlightProcess:
     def take_off(self) -> None:
         self._tell(TakeOffCommand())
 
-    def decline(self) -> None:
+    def cancel_take_off(self) -> None:
         self._tell(CancelTakeOff())
 
-    def stand_down(self, trial_id: int, reason: str) -> None:
+    def cancel_flight(self, trial_id: int, reason: str) -> None:
         self._tell(CancelFlight(trial_id, reason))
 
     def close(self) -> None:
         """Let the process end; it is killed when it does not."""
         self._pipe.close()
-        self._process.join(ENDS_WITHIN_S)
+        self._process.join(SHUTDOWN_TIMEOUT_S)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
@@ -103,11 +103,11 @@ class FlightProcessPool:
         self._lock = threading.Lock()
         self._waiting = [FlightProcess() for _ in range(spare)]
 
-    def take(self) -> FlightProcess:
+    def acquire(self) -> FlightProcess:
         with self._lock:
             return self._waiting.pop() if self._waiting else FlightProcess()
 
-    def give_back(self, cockpit: FlightProcess) -> None:
+    def release(self, cockpit: FlightProcess) -> None:
         """One that is free again; of too many, one is closed."""
         with self._lock:
             if len(self._waiting) < self._spare:
@@ -142,7 +142,7 @@ def _work(pipe: Connection) -> None:
 def _fly(pipe: Connection, orders: FlightRequest) -> None:
     try:
         with (
-            hold_vehicle_lock(orders.lock, within_s=CONTROL_WITHIN_S, clock=orders.flight.clock),
+            hold_vehicle_lock(orders.lock, within_s=LOCK_TIMEOUT_S, clock=orders.flight.clock),
             open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
         ):
             pipe.send(GainsStaged(vehicle.stage(orders.gains)))

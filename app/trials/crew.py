@@ -1,9 +1,9 @@
 """What the worker and a process that flies say to each other, whoever that process is.
 
-    worker    Orders ───────────→ TakeOff | Decline ─────────────────────────────→
-    process            → Staged                      → Telemetry … Landed → Restored → Free
+    worker    FlightRequest →             → TakeOffCommand | CancelTakeOff →
+    process                   GainsStaged →   Telemetry … FlightLanded → SafeGainsRestored → FlightFinished
 
-`StandDown` may come at any moment; in place of what is missing comes `Trouble`.
+`CancelFlight` may come at any moment; in place of what is missing comes `FlightFailure`.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -39,7 +39,7 @@ class FlightRequest:
 
 @dataclass(frozen=True, slots=True)
 class GainsStaged:
-    """Said by the process, which then waits for TakeOff or Decline."""
+    """Said by the process, which then waits for TakeOffCommand or CancelTakeOff."""
 
     read_back: dict[str, float]
 
@@ -110,8 +110,8 @@ class FlightBackend(Protocol):
         ...
 
     def take_off(self) -> None: ...
-    def decline(self) -> None: ...
-    def stand_down(self, trial_id: int, reason: str) -> None: ...
+    def cancel_take_off(self) -> None: ...
+    def cancel_flight(self, trial_id: int, reason: str) -> None: ...
     def close(self) -> None:
         """Let the process end: what flies is aborted and left with its safe gains."""
         ...

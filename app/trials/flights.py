@@ -33,7 +33,7 @@ from app.trials.lifecycle import set_flight_state, set_trial_state
 from app.trials.states import FlightMode, FlightState, TrialState
 from app.vehicles.base import FlightRecord, OptionValue
 
-BEGINS_WITHIN: Final = timedelta(seconds=10)
+REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """How old a request may be when a worker takes it."""
 
 _WORKER_ENDED: Final = {True: "the worker ended while it flew", False: "the worker ended before lift-off"}
@@ -65,9 +65,9 @@ def claim_flight(session: Session, worker: str) -> FlightTask | None:
     A flight begins when its operator expects it or not at all: one that could not be begun at once is withdrawn.
     """
     while (flight := repository.first_requested(session)) is not None:
-        if utc_now() - flight.requested_at <= BEGINS_WITHIN:
+        if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
             return _claimed(session, flight, worker)
-        _withdraw(flight, f"it could not be begun within {BEGINS_WITHIN.total_seconds():g} s")
+        _withdraw(flight, f"it could not be begun within {REQUEST_TIMEOUT.total_seconds():g} s")
     return None
 
 
@@ -135,14 +135,14 @@ def stand_down_wanted(session: Session, flight_id: int) -> str | None:
     if flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
         return f"the trial is {flight.trial.state}"
     if flight.mode == "stage" and flight.take_off_at is not None and not _may_take_off(flight):
-        return f"it could not take off within {BEGINS_WITHIN.total_seconds():g} s of the operator's word"
+        return f"it could not take off within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's word"
     return None
 
 
 def _may_take_off(flight: FlightRow) -> bool:
     if flight.mode == "fly":
         return not fleet.needs_staging(flight.vehicle)
-    return flight.take_off_at is not None and utc_now() - flight.take_off_at <= BEGINS_WITHIN
+    return flight.take_off_at is not None and utc_now() - flight.take_off_at <= REQUEST_TIMEOUT
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:

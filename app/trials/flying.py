@@ -22,13 +22,13 @@ class AbortFlag:
         self.reason: str | None = None
         self._tell: Callable[[str], None] = lambda _reason: None
 
-    def put_up(self, reason: str) -> None:
+    def set(self, reason: str) -> None:
         """The first reason counts."""
         if self.reason is None:
             self.reason = reason or "aborted"
             self._tell(self.reason)
 
-    def tell(self, tell: Callable[[str], None]) -> None:
+    def add_listener(self, tell: Callable[[str], None]) -> None:
         """Who is to be told: of what comes, or of what is there already."""
         self._tell = tell
         if self.reason is not None:
@@ -42,30 +42,30 @@ class AbortRegistry:
         self._flags: dict[int, AbortFlag] = {}
         self._closed: str | None = None
 
-    def enter(self, trial_id: int) -> AbortFlag:
+    def register(self, trial_id: int) -> AbortFlag:
         """The trial's flag; it is up already in a closed airspace."""
         flag = self._flags.setdefault(trial_id, AbortFlag())
         if self._closed is not None:
-            flag.put_up(self._closed)
+            flag.set(self._closed)
         return flag
 
-    def leave(self, trial_id: int) -> None:
+    def unregister(self, trial_id: int) -> None:
         self._flags.pop(trial_id, None)
 
     def abort(self, trial_id: int, reason: str) -> bool:
         """Whether that trial is being flown here, and so ends now."""
         if (flag := self._flags.get(trial_id)) is None:
             return False
-        flag.put_up(reason)
+        flag.set(reason)
         return True
 
-    def close(self, reason: str) -> None:
+    def abort_all(self, reason: str) -> None:
         """End every flight, and those to come."""
         self._closed = reason
         for flag in tuple(self._flags.values()):
-            flag.put_up(reason)
+            flag.set(reason)
 
-    def trials(self) -> list[int]:
+    def trial_ids(self) -> list[int]:
         return sorted(self._flags)
 
 

@@ -65,7 +65,7 @@ def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[
 
 
 def check_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> GateDecision:
-    """A proposal that still holds: it was judged on this very history. Raises GainsError as `judge_gains` does."""
+    """A proposal that still holds: it was judged on this very history. Raises GainsError as `check_own_gains` does."""
     return _judged(campaign, proposal.gains, proposing.gate_of(proposal.gate), overrule)
 
 

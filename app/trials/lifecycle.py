@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from app.db.models import FlightRow, TrialRow
 from app.db.types import utc_now
 from app.moves import check_transition
-from app.trials.states import ACTIVE_STATES, FLIGHT_TRANSITIONS, MOVES, UNFLOWN, FlightState, TrialState
+from app.trials.states import ACTIVE_STATES, FLIGHT_TRANSITIONS, TRANSITIONS, UNFLOWN, FlightState, TrialState
 
 
 def set_trial_state(row: TrialRow, to: TrialState, *, reason: str | None = None) -> None:
     """Raises ConflictError when the states' table does not lead there. A reason replaces the one before."""
-    row.state = check_transition(MOVES, row.state, to, f"Trial {row.number}")
+    row.state = check_transition(TRANSITIONS, row.state, to, f"Trial {row.number}")
     if reason is not None:
         row.reason = reason
 

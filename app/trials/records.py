@@ -31,9 +31,10 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         return
     if not confirmed:
         raise UnconfirmedError(
-            f"The log was flown with {_spoken(flown.gains)}; trial {row.number} was planned with {_spoken(row.gains)}.",
+            f"The log was flown with {_format_gains(flown.gains)}; trial {row.number} was planned with "
+            f"{_format_gains(row.gains)}.",
             hint=f"Choose the log of this trial, or confirm that {_consequence(row.gains, flown.gains)}.",
-            problems=(Problem("confirm", f"the gains in the log, {_spoken(flown.gains)}, are not the trial's"),),
+            problems=(Problem("confirm", f"the gains in the log, {_format_gains(flown.gains)}, are not the trial's"),),
         )
     row.read_back = dict(flown.gains)
     if _alike(row.gains, flown.gains):
@@ -60,5 +61,5 @@ def _consequence(planned: Gains, flown: Gains) -> str:
     return "the flight shall count for the planned gains, which this log does not name"
 
 
-def _spoken(gains: Mapping[str, float]) -> str:
+def _format_gains(gains: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:g}" for name, value in gains.items())

@@ -225,7 +225,7 @@ def upload_trajectory(
     which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
     and optionally the other channels, at most 200 000 rows. It is scored and classed at once.
     """
-    flown = service.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.beside())
+    flown = service.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(Trial, lambda session: service.import_record(session, trial_id, flown, confirmed=confirm))
 
 

@@ -36,7 +36,7 @@ from app.trials.records import settle_gains
 from app.trials.schemas import AbortJudgement, Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
-from app.trials.states import ACTIONS, BUDGETED_STATES, HISTORY, MOVES, TrialKind, TrialState
+from app.trials.states import ACTIONS, BUDGETED_STATES, HISTORY, TRANSITIONS, TrialKind, TrialState
 from app.trials.telemetry_logs import log_of_trial, telemetry_log
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
@@ -122,7 +122,7 @@ def classify_trial(session: Session, trial_id: int, said: Classification, asker:
         {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)},
     )
     check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
-    check_transition(MOVES, row.state, outcome, f"Trial {row.number}")
+    check_transition(TRANSITIONS, row.state, outcome, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None

@@ -38,7 +38,7 @@ class Spool:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def claim(self, flight_id: int) -> None:
+    def reserve(self, flight_id: int) -> None:
         """Take the room for one record. Raises StorageError when the disk has not got it."""
         path = self._path(flight_id, _UNFINISHED)
         try:
@@ -53,7 +53,7 @@ class Spool:
                 hint=f"Free at least {2 * RESERVED_BYTES // 2**20} MB there, then fly again; nothing has moved.",
             ) from error
 
-    def keep(self, flight_id: int, record: FlightRecord) -> None:
+    def write(self, flight_id: int, record: FlightRecord) -> None:
         """Write a record into its room, from where on it survives a crash. Raises StorageError when it does not fit."""
         path = self._path(flight_id, _UNFINISHED)
         try:
@@ -69,7 +69,7 @@ class Spool:
                 hint="Free some space there; the worker keeps trying while it runs.",
             ) from error
 
-    def kept(self) -> list[int]:
+    def flight_ids(self) -> list[int]:
         """The flights whose records wait here."""
         return sorted(int(path.stem) for path in self._folder.glob(f"*{_FINISHED}"))
 
@@ -84,7 +84,7 @@ class Spool:
                 hint="Keep the file for inspection; the trial stays lost until somebody decides.",
             ) from error
 
-    def drop(self, flight_id: int) -> None:
+    def delete(self, flight_id: int) -> None:
         """Give the room back: the record is in the database, or the flight never began. What cannot be removed now is
         at the next start: to recover a record twice is harmless."""
         for suffix in (_UNFINISHED, _FINISHED):
@@ -100,7 +100,7 @@ class Spool:
         except FileNotFoundError:
             return None
 
-    def sweep(self) -> None:
+    def delete_unfinished(self) -> None:
         """Give back the rooms of flights that left no record. Only before anything flies."""
         for path in self._folder.glob(f"*{_UNFINISHED}"):
             path.unlink(missing_ok=True)

@@ -49,7 +49,7 @@ class TrialState(StrEnum):
     LOST = "lost"
 
 
-MOVES: Final[Mapping[TrialState, frozenset[TrialState]]] = {
+TRANSITIONS: Final[Mapping[TrialState, frozenset[TrialState]]] = {
     TrialState.PLANNED: frozenset({TrialState.STAGED, TrialState.CANCELLED, TrialState.CAPTURED}),
     TrialState.STAGED: frozenset({TrialState.FLYING, TrialState.PLANNED, TrialState.CANCELLED}),
     TrialState.FLYING: frozenset({TrialState.CAPTURED, TrialState.ABORTED, TrialState.LOST, TrialState.PLANNED}),

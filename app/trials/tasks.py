@@ -32,7 +32,7 @@ from app.vehicles.open import get_kind
 RETRY_S: Final = 1.0
 STAGED_FOR_S: Final = 600.0
 """How long a vehicle waits, with a trial's gains on it, for its operator's word."""
-LOOK_EVERY_S: Final = 0.05
+POLL_INTERVAL_S: Final = 0.05
 
 _log = structlog.get_logger(__name__)
 
@@ -87,11 +87,11 @@ class FlightRunner:
         self._worker = worker
         self._closing = closing
         self._clock = clock
-        self._hangar = FlightProcessPool()
+        self._process_pool = FlightProcessPool()
 
     def close(self) -> None:
         """When nothing flies any more."""
-        self._hangar.close()
+        self._process_pool.close()
 
     def recover(self) -> None:
         """After a start: what was flying is lost, unless its record is in the spool; what was asked for while nobody
@@ -101,17 +101,17 @@ class FlightRunner:
                 _log.warning("flight withdrawn: it was asked for before this worker began", flight_id=flight_id)
             for trial_id in flights.lose_running_flights(session):
                 _log.warning("flight lost: the worker ended while it was under way", trial_id=trial_id)
-        for flight_id in self._spool.kept():
+        for flight_id in self._spool.flight_ids():
             self._recover_record(flight_id)
-        self._spool.sweep()
+        self._spool.delete_unfinished()
 
     def claim(self) -> FlightTask | None:
         """The flight that has waited longest, now this worker's; None when none waits. Raises StorageError."""
         with ExitStack() as undo:
             with self._database.write() as session:
                 if (task := flights.claim_flight(session, self._worker)) is not None:
-                    self._airspace.enter(task.trial_id)  # before anybody can see that it runs, and abort it
-                    undo.callback(self._airspace.leave, task.trial_id)
+                    self._airspace.register(task.trial_id)  # before anybody can see that it runs, and abort it
+                    undo.callback(self._airspace.unregister, task.trial_id)
             undo.pop_all()
         return task
 
@@ -121,39 +121,39 @@ class FlightRunner:
             campaign_id=task.campaign_id, trial_id=task.trial_id, flight_id=task.flight_id
         ):
             try:
-                self._report(task, self._fly(task, self._airspace.enter(task.trial_id)))
+                self._store_outcome(task, self._fly(task, self._airspace.register(task.trial_id)))
             except Exception:  # noqa: BLE001 - the edge of the thread
                 _log.exception("the end of a flight cannot be stored; the trial is lost at the next start")
             finally:
-                self._airspace.leave(task.trial_id)
+                self._airspace.unregister(task.trial_id)
 
     def _fly(self, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
         if flag.reason is not None:
             return FlightOutcome(withdrawn=True, problem=flag.reason)
         try:
-            self._spool.claim(task.flight_id)
+            self._spool.reserve(task.flight_id)
             telemetry_log(self._data_dir, task.flight_id).parent.mkdir(exist_ok=True)
-            crew = self._crew(task)
+            crew = self._acquire_backend(task)
         except (GainlineError, OSError) as error:
             return FlightOutcome(problem=f"It was not begun: {error}")
         try:
-            return self._fly_with(crew, task, flag)
+            return self._fly_on_backend(crew, task, flag)
         finally:
-            flag.tell(lambda _reason: None)
+            flag.add_listener(lambda _reason: None)
 
-    def _crew(self, task: FlightTask) -> FlightBackend:
+    def _acquire_backend(self, task: FlightTask) -> FlightBackend:
         """Raises VehicleError when the vehicle keeps a link, and there is none."""
         if get_kind(task.vehicle_kind).connect is not None:
             return self._session(task.vehicle_id)
-        return self._hangar.take()
+        return self._process_pool.acquire()
 
-    def _fly_with(self, crew: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
+    def _fly_on_backend(self, crew: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
         """The part that the vehicle takes part in; whatever happens, its process is let go, and there is an end."""
         ended = FlightOutcome()
         try:
             self._phase(task, "staging")
-            flag.tell(lambda reason: crew.stand_down(task.trial_id, reason))
-            for said in crew.fly(self._orders(task)):
+            flag.add_listener(lambda reason: crew.cancel_flight(task.trial_id, reason))
+            for said in crew.fly(self._request(task)):
                 match said:
                     case Telemetry() | FlightPhase():
                         self._publish(said)
@@ -174,7 +174,7 @@ class FlightRunner:
             crew.close()
             return replace(ended, problem=_describe_error(error), unheard=True)
         if isinstance(crew, FlightProcess):
-            self._hangar.give_back(crew)
+            self._process_pool.release(crew)
         return ended
 
     def _staged(
@@ -186,7 +186,7 @@ class FlightRunner:
             self._store(lambda session: flights.record_staged(session, task.flight_id, read_back))
             if (problem := describe_mismatch(task.gains, read_back)) is not None:
                 ended = FlightOutcome(problem=problem)
-            elif (withdrawn := self._word(task, flag, crew)) is not None:
+            elif (withdrawn := self._await_takeoff_clearance(task, flag, crew)) is not None:
                 ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
                 self._store(lambda session: flights.record_lift_off(session, task.flight_id))
@@ -195,10 +195,10 @@ class FlightRunner:
         if ended.lifted_off:
             crew.take_off()
         else:
-            crew.decline()
+            crew.cancel_take_off()
         return ended
 
-    def _word(self, task: FlightTask, flag: AbortFlag, crew: FlightBackend) -> str | None:
+    def _await_takeoff_clearance(self, task: FlightTask, flag: AbortFlag, crew: FlightBackend) -> str | None:
         """None when the vehicle may take off, at once or at its operator's word; else why it is not to."""
         if task.mode == "fly":
             return flag.reason
@@ -218,10 +218,10 @@ class FlightRunner:
             except StorageError as error:
                 _log.error("the operator's word cannot be read", why=str(error))
                 self._clock.wait_s(RETRY_S)
-            self._clock.wait_s(LOOK_EVERY_S)
+            self._clock.wait_s(POLL_INTERVAL_S)
         return f"nobody asked for its take-off within {STAGED_FOR_S / 60:g} minutes"
 
-    def _orders(self, task: FlightTask) -> FlightRequest:
+    def _request(self, task: FlightTask) -> FlightRequest:
         return FlightRequest(
             campaign_id=task.campaign_id,
             trial_id=task.trial_id,
@@ -238,19 +238,19 @@ class FlightRunner:
     def _phase(self, task: FlightTask, phase: Phase, note: str = "") -> None:
         self._publish(FlightPhase(campaign_id=task.campaign_id, trial_id=task.trial_id, phase=phase, note=note))
 
-    def _report(self, task: FlightTask, ended: FlightOutcome) -> None:
+    def _store_outcome(self, task: FlightTask, ended: FlightOutcome) -> None:
         """Store the outcome. What the database refuses is put aside, and the flight is given up in its place: nothing
         but a worker's end leaves a flight running."""
         _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
         if ended.record is not None:
-            self._keep(task, ended.record)
+            self._spool_record(task, ended.record)
         try:
-            stored = self._store_patiently(task, lambda session: _record(session, task, ended))
+            stored = self._store_with_retry(task, lambda session: _record(session, task, ended))
         except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, the vehicle is not blocked by it
             problem = self._refused(task, ended, error)
-            stored = self._store_patiently(task, lambda session: _give_up(session, task, ended, problem))
+            stored = self._store_with_retry(task, lambda session: _give_up(session, task, ended, problem))
         if stored:
-            self._spool.drop(task.flight_id)
+            self._spool.delete(task.flight_id)
             self._phase(task, "ended")
 
     def _refused(self, task: FlightTask, ended: FlightOutcome, error: Exception) -> str:
@@ -260,7 +260,7 @@ class FlightRunner:
         kept_as = self._spool.set_aside(task.flight_id)
         return f"{why} The record is kept as {kept_as}." if kept_as else f"{why} The record could not be kept either."
 
-    def _store_patiently(self, task: FlightTask, work: Callable[[Session], None]) -> bool:
+    def _store_with_retry(self, task: FlightTask, work: Callable[[Session], None]) -> bool:
         """Try until the database takes it; false when the worker closes meanwhile (the spool keeps the record)."""
         while True:
             try:
@@ -273,9 +273,9 @@ class FlightRunner:
             else:
                 return True
 
-    def _keep(self, task: FlightTask, record: FlightRecord) -> None:
+    def _spool_record(self, task: FlightTask, record: FlightRecord) -> None:
         try:
-            self._spool.keep(task.flight_id, record)
+            self._spool.write(task.flight_id, record)
         except StorageError as error:  # it is still in memory, and goes into the database from there
             _log.error("record not spooled", why=str(error))
 
@@ -288,19 +288,19 @@ class FlightRunner:
         try:
             record = self._spool.read(flight_id).record
         except StorageError as error:
-            self._put_aside(flight_id, error)
+            self._set_record_aside(flight_id, error)
             return
         try:
             self._store(lambda session: flights.recover_record(session, flight_id, record))
         except StorageError:
             raise
         except GainlineError as error:
-            self._put_aside(flight_id, error)
+            self._set_record_aside(flight_id, error)
             return
-        self._spool.drop(flight_id)
+        self._spool.delete(flight_id)
         _log.info("record of a lost flight recovered", flight_id=flight_id)
 
-    def _put_aside(self, flight_id: int, error: GainlineError) -> None:
+    def _set_record_aside(self, flight_id: int, error: GainlineError) -> None:
         kept_as = self._spool.set_aside(flight_id)
         _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
 

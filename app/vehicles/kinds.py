@@ -53,18 +53,18 @@ class VehicleKind:
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains], Vehicle]
     connect: Callable[[Options, Gains, Identity | None, Path], ConnectedVehicle] | None = None
-    conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
-    simulates: Callable[[Options, Hosts], bool] = _never
-    suits: Callable[[Options], tuple[str, ...]] | None = None
+    find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
+    is_simulation: Callable[[Options, Hosts], bool] = _never
+    experiments_for: Callable[[Options], tuple[str, ...]] | None = None
     check_gains: Callable[[Options, Gains], None] = _accept_any_gains
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""
-        return self.experiments if self.suits is None else self.suits(options)
+        return self.experiments if self.experiments_for is None else self.experiments_for(options)
 
     def is_real_with(self, options: Options, simulation_hosts: Hosts = HERE) -> bool:
         """Whether a vehicle with these options, complete and checked, is REAL."""
-        return self.is_real and not self.simulates(options, simulation_hosts)
+        return self.is_real and not self.is_simulation(options, simulation_hosts)
 
     def completed(self, options: Options) -> dict[str, OptionValue]:
         """Options as any version of the program stored them: later ones at their defaults, none that are gone."""
@@ -88,7 +88,9 @@ class VehicleKind:
             if reason:
                 problems.append(Problem(f"{field}.{name}", reason))
         if not problems:
-            problems = [Problem(f"{field}.{p.field}", p.reason) for p in self.conflicts(complete, simulation_hosts)]
+            problems = [
+                Problem(f"{field}.{p.field}", p.reason) for p in self.find_conflicts(complete, simulation_hosts)
+            ]
         if problems:
             raise InputError(
                 f"These options do not suit the vehicle {self.name}.",

@@ -28,7 +28,7 @@ _LANDED_M: Final = 0.02
 _LANDING_SLICE: Final = RATE_HZ // 4
 
 STEPS: Final = round(FLIGHT_S * RATE_HZ) + 1
-MOST_STEPS: Final = STEPS + round(_LANDING_S * RATE_HZ)
+MAX_STEPS: Final = STEPS + round(_LANDING_S * RATE_HZ)
 """Steps of the longest flight: aborted at the last instant, then landed."""
 
 

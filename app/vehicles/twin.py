@@ -34,7 +34,7 @@ from app.vehicles.kernels import (
     fly_simple_model,
 )
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import FLIGHT_S, MOST_STEPS, SimulatedVehicle
+from app.vehicles.simulated import FLIGHT_S, MAX_STEPS, SimulatedVehicle
 
 _THRUST_SD: Final = 0.003
 _START_SD_S: Final = 0.060
@@ -57,7 +57,7 @@ _PLACES: Final = {
 class TwinFlight:
     """A simulation by the protocol of `app.vehicles.simulated`.
 
-    `options` are those of the kind, complete. What differs between flights depends on `seed` alone; after `MOST_STEPS`
+    `options` are those of the kind, complete. What differs between flights depends on `seed` alone; after `MAX_STEPS`
     its gusts come again. `autopilot` is the loop's memory, the state of app.core.control.vertical_loop first.
     """
 
@@ -71,7 +71,7 @@ class TwinFlight:
         for name, place in _PLACES.items():
             self._model[place] = options[name]
         self._datum_m = float(_DATUM_SD_M * datum)
-        self._gusts = gusts(gust, MOST_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=_GUST_CORRELATION_S)
+        self._gusts = gusts(gust, MAX_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=_GUST_CORRELATION_S)
         self._resting = round(max(options["start_latency_s"] + _START_SD_S * start, 0.0) * RATE_HZ)
         self.autopilot = np.zeros(AUTOPILOT_SIZE, dtype=np.int64)
         self._plant = np.zeros(3)
@@ -148,5 +148,5 @@ TWIN: Final = VehicleKind(
         _number("battery_sag", "Share of the thrust lost evenly over a flight", "of thrust", 0.0, 0.1),
     ),
     open=_open,
-    conflicts=_cannot_lift,
+    find_conflicts=_cannot_lift,
 )

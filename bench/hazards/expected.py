@@ -21,7 +21,7 @@ GROUND: Final = (Stage.PREFLIGHT, Stage.SET_GAINS)
 SILENT: Final = ("link-lost", "wrong-system", "reboot")
 DEAF: Final = ("link-lost", "reboot")
 """The vehicle hears nothing, either."""
-SUSPECT: Final = (ABORT, WILD_GAINS, "no-lift-off")
+GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off")
 HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "px4": 1.0}
 BATTERY_S: Final[Mapping[str, float]] = {"paparazzi": 1.2, "ardupilot": 0.5, "px4": 0.2}
 LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "px4": 8.0}
@@ -33,7 +33,7 @@ LAND_AGAIN_S: Final[Mapping[str, float]] = {"paparazzi": 6.0, "ardupilot": 1.0, 
 DRIFT_M_S: Final = 0.1
 SLACK_S: Final = 0.35
 """Of the rig's clock, and of a packet under way."""
-STAND_S: Final = 1.05
+STANDSTILL_S: Final = 1.05
 """Watched on the ground right before arming."""
 
 
@@ -118,7 +118,7 @@ class _Judgement:
         if self.began_in(ABORT, Stage.CONNECT, *GROUND) or self.began_in(MOTORS_OFF, Stage.CONNECT, *GROUND):
             yield Cause("F8", "aborted", had_to=self.armed_s is not None)
         for kind in (*SILENT, "frozen-position", "jumping-position", "low-battery"):
-            stale_s = STAND_S + (BATTERY_S[self.case.autopilot] if kind == "low-battery" else 0.0)
+            stale_s = STANDSTILL_S + (BATTERY_S[self.case.autopilot] if kind == "low-battery" else 0.0)
             if self.armed_s is not None and covers(self.of(kind), (self.armed_s - stale_s, self.armed_s)):
                 yield Cause(f"preflight ({kind})", "refused", had_to=True)
 
@@ -277,7 +277,7 @@ class _Judgement:
         first = following[0][1] if following else None
         if first is Order.MOTORS_OFF:
             return
-        may_be_suspect = any(each.kind in SUSPECT and each.begun_s <= max(left) for each in self.flown.struck)
+        may_be_suspect = any(each.kind in GAIN_FAILURES and each.begun_s <= max(left) for each in self.flown.struck)
         if first is Order.GAIN and not may_be_suspect:
             yield "gains were sent before Land, though nothing spoke against them"
         is_aborted = self.flown.outcome == "aborted" and not self.of(MOTORS_OFF)

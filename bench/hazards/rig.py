@@ -148,7 +148,7 @@ class Rig(Lockstep):
             case str(kind) if kind in (OTHER_MODE, OTHER_LANDING):
                 self._interfere(_INTERFERENCE[kind, self.case.autopilot])
             case str(kind) if kind != WILD_GAINS:
-                self.drone.afflict(kind, mishap.duration_s)
+                self.drone.inject_fault(kind, mishap.duration_s)
 
     @property
     def _is_stopping(self) -> bool:

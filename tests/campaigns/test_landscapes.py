@@ -41,7 +41,7 @@ def run_landscapes(database: Database) -> int:
             plan = landscapes.read_plan(session, campaign_id, order)
         survey = plan_grid(plan)
         assert survey is not None
-        landscape = survey.landscape(predict_points(survey.foresee, survey.points()))
+        landscape = survey.landscape(predict_points(survey.predict_errors, survey.points()))
         with database.write() as session:
             jobs.finish_job(session, job_id, worker=WORKER, result=landscapes.as_json(landscape, order))
         count += 1

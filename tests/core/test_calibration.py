@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.calibration import MOST_FLIGHTS, calibrate, known_distribution
+from app.core.calibration import MAX_FLIGHTS, calibrate, known_distribution
 from app.core.definition import Flight
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.spread import prior_distribution
@@ -121,5 +121,5 @@ def test_before_a_flight_the_data_sheet_is_what_is_known_afterwards_the_fit() ->
 
 
 def test_of_a_long_campaign_the_best_and_the_latest_flights_are_fitted() -> None:
-    flights = [fly(1, DEFAULT), fly(2, TUNED), *(fly(number, DEFAULT) for number in range(3, MOST_FLIGHTS + 4))]
-    assert calibrate(TAKEOFF, flights).numbers == (2, *range(5, MOST_FLIGHTS + 4))
+    flights = [fly(1, DEFAULT), fly(2, TUNED), *(fly(number, DEFAULT) for number in range(3, MAX_FLIGHTS + 4))]
+    assert calibrate(TAKEOFF, flights).numbers == (2, *range(5, MAX_FLIGHTS + 4))

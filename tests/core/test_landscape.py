@@ -32,7 +32,7 @@ def surveyed(definition: Definition, flights: Sequence[Flight], centre: Gains, *
         LandscapePlan(definition=definition, flights=tuple(flights), donor=None, centre=centre, marks=marks)
     )
     assert survey is not None
-    return survey.landscape(predict_points(survey.foresee, survey.points()))
+    return survey.landscape(predict_points(survey.predict_errors, survey.points()))
 
 
 def error_by_hand(gains: Gains, by: Flight) -> float:
@@ -106,7 +106,7 @@ def test_a_warm_start_s_landscape_is_that_of_the_vehicle_it_starts_from() -> Non
     )
     survey = plan_grid(LandscapePlan(definition=definition, flights=(), donor=donor, centre=tuned, marks=()))
     assert survey is not None
-    assert predict_points(survey.foresee, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
+    assert predict_points(survey.predict_errors, survey.centre[np.newaxis])[0] == pytest.approx(donor.error, abs=1e-6)
 
 
 @compiled_only

@@ -147,7 +147,7 @@ class States:
             plan = landscapes.read_plan(session, campaign_id, order)
         survey = plan_grid(plan)
         assert survey is not None, "there is nothing to draw"
-        found = survey.landscape(predict_points(survey.foresee, survey.points()))
+        found = survey.landscape(predict_points(survey.predict_errors, survey.points()))
 
         def store(session: Session) -> None:
             landscapes.request_landscape(session, campaign_id)

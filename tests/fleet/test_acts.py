@@ -316,27 +316,27 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
         def __init__(self, call: ConnectionRequest, *_: object, **__: object) -> None:
             self.call = call  # type: ignore[misc]
 
-        def connected(self) -> ConnectionOpened:
+        def wait_until_open(self) -> ConnectionOpened:
             ask(client, vehicle, "disconnect")
             with database.write() as session:
                 acts.withdraw_acts(session)
             events.append("found")
             return ConnectionOpened(identity=IDENTITY, concern="", held=dict(DEFAULT_GAINS))
 
-        def hang_up(self) -> None:
+        def request_close(self) -> None:
             pass
 
         def close(self) -> None:
             events.append("closed")
 
-    monkeypatch.setattr("app.fleet.tasks.Session", Found)
+    monkeypatch.setattr("app.fleet.tasks.VehicleConnection", Found)
     with database.write() as session:
         acts.record_disconnected(session, vehicle["id"])
     deck = VehicleConnectionManager(
         database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
     )
-    deck.tend()
-    deck._seekers.shutdown()
+    deck.maintain()
+    deck._reconnect_executor.shutdown()
     assert events == ["found", "closed"]
     assert not deck.order(vehicle["id"], "land", "a person asks", by_s=0.0)
     assert seen(client, vehicle)["state"] == "disconnected"
@@ -409,7 +409,7 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
         links=links,
     )
     deck.recover()
-    deck.tend()
+    deck.maintain()
     deck.close()
     after = [newest(client, vehicle)["id"] for vehicle in vehicles]
     assert [now != known for now, known in zip(after, before, strict=True)] == [links, links]

@@ -29,12 +29,12 @@ class RecordingPipe(WorkerPipe):
         self.said: list[FromVehicleProcess] = []
         self.on_staged: Callable[[], None] = lambda: None
 
-    def say(self, message: FromVehicleProcess) -> None:
+    def send(self, message: FromVehicleProcess) -> None:
         self.said.append(message)
         if isinstance(message, GainsStaged):
             self.on_staged()
 
-    def show(self, message: FromVehicleProcess) -> None: ...
+    def send_if_ready(self, message: FromVehicleProcess) -> None: ...
 
 
 @pytest.fixture

@@ -114,7 +114,7 @@ def test_what_is_told_once_more_says_how_old_it_is_so_that_a_worker_that_hangs_d
     now_s += 1.5
     memory.take(telemetry(0.1))
     now_s += 2.5
-    assert [(type(one), one.age_s) for one in memory.so_far() if not isinstance(one, FlightPhase)] == [
+    assert [(type(one), one.age_s) for one in memory.snapshot() if not isinstance(one, FlightPhase)] == [
         (VehicleStatus, 4.0), (Telemetry, 2.5)]  # fmt: skip
 
 

@@ -138,7 +138,7 @@ def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_e
     first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     for trial in (first, first, first, third):
         add(client, trial, png())
-    monkeypatch.setattr(remarks, "MOST_BYTES", 3 * len(png()) - 1)
+    monkeypatch.setattr(remarks, "MAX_BYTES", 3 * len(png()) - 1)
     page = read(client, campaign)
     assert [found["alt"] for tag, found in page.tags if tag == "img"] == [
         "Photo 1 of flight 1",
@@ -259,7 +259,7 @@ def test_prints_beyond_a_few_at_once_are_refused_before_any_work_is_done(
 ) -> None:
     in_path("exit 0", monkeypatch, tmp_path)
     monkeypatch.setattr(router, "render", lambda *_: pytest.fail("the page was made for nothing"))
-    taken = [printing._places.acquire(blocking=False) for _ in range(printing.AT_ONCE)]
+    taken = [printing._places.acquire(blocking=False) for _ in range(printing.MAX_CONCURRENT)]
     try:
         assert all(taken)
         answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")

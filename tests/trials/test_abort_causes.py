@@ -165,6 +165,6 @@ def test_a_flight_was_ended_on_request_only_where_no_limit_had_ended_it(
 
 def test_a_record_that_waits_on_the_disk_keeps_why_it_was_broken_off(tmp_path: Path) -> None:
     spool = Spool(tmp_path)
-    spool.claim(1)
-    spool.keep(1, create_record(ending="aborted", reason="enough", on_request=True))
+    spool.reserve(1)
+    spool.write(1, create_record(ending="aborted", reason="enough", on_request=True))
     assert spool.read(1).record.on_request

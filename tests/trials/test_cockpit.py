@@ -12,7 +12,7 @@ import pytest
 from app.core.experiments import get_experiment
 from app.live.messages import FlightPhase, Telemetry
 from app.locks import exclusive
-from app.trials.cockpit import CONTROL_WITHIN_S, FlightProcess
+from app.trials.cockpit import LOCK_TIMEOUT_S, FlightProcess
 from app.trials.crew import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.vehicles.base import FlightOptions
 from app.vehicles.errors import VehicleError
@@ -90,7 +90,7 @@ def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
 ) -> None:
     def abort(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            cockpit.stand_down(1, "too high")
+            cockpit.cancel_flight(1, "too high")
 
     (landed,) = only(fly(cockpit, orders(tmp_path, speed=1.0), abort), FlightLanded)
     assert isinstance(landed, FlightLanded)
@@ -114,7 +114,7 @@ def test_a_declined_flight_leaves_no_record(cockpit: FlightProcess, tmp_path: Pa
     heard = []
     for said in cockpit.fly(orders(tmp_path)):
         heard.append(said)
-        cockpit.decline()
+        cockpit.cancel_take_off()
     assert heard == [GainsStaged(GAINS)]
 
 
@@ -125,7 +125,7 @@ def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
     for said in cockpit.fly(orders(tmp_path, speed=1.0)):
         heard.append(said)
         if isinstance(said, GainsStaged):
-            cockpit.stand_down(1, "not today")
+            cockpit.cancel_flight(1, "not today")
             cockpit.take_off()
     (landed,) = only(heard, FlightLanded)
     assert isinstance(landed, FlightLanded)
@@ -177,6 +177,6 @@ def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_pa
         thread.start()
         thread.join(1.0)
         assert heard == []
-    thread.join(CONTROL_WITHIN_S)
+    thread.join(LOCK_TIMEOUT_S)
     assert len(only(heard, FlightLanded)) == 1
     cockpit.close()

@@ -25,10 +25,10 @@ def record() -> FlightRecord:
 
 def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
     spool, flown = Spool(tmp_path / "spool"), record()
-    spool.claim(7)
-    assert spool.kept() == []
-    spool.keep(7, flown)
-    assert spool.kept() == [7]
+    spool.reserve(7)
+    assert spool.flight_ids() == []
+    spool.write(7, flown)
+    assert spool.flight_ids() == [7]
     kept = spool.read(7)
     assert kept.flight_id == 7
     assert (kept.record.ending, kept.record.reason, kept.record.settings) == (
@@ -40,29 +40,29 @@ def test_a_record_comes_back_bit_for_bit(tmp_path: Path) -> None:
     assert list(kept.record.trajectory.channels) == ["altitude_m", "thrust"]
     for name, values in flown.trajectory.channels.items():
         np.testing.assert_array_equal(kept.record.trajectory[name], values)
-    spool.drop(7)
+    spool.delete(7)
     assert list((tmp_path / "spool").iterdir()) == []
 
 
 def test_the_room_is_really_taken_before_the_flight(tmp_path: Path) -> None:
-    Spool(tmp_path).claim(1)
+    Spool(tmp_path).reserve(1)
     (room,) = tmp_path.iterdir()
     assert room.stat().st_blocks * 512 >= RESERVED_BYTES
 
 
 def test_a_claim_without_a_record_is_swept_away_and_a_record_stays(tmp_path: Path) -> None:
     spool = Spool(tmp_path)
-    spool.claim(1)
-    spool.claim(2)
-    spool.keep(2, record())
-    spool.sweep()
+    spool.reserve(1)
+    spool.reserve(2)
+    spool.write(2, record())
+    spool.delete_unfinished()
     assert [path.name for path in tmp_path.iterdir()] == ["2.flight"]
 
 
 def test_a_damaged_record_is_refused_and_can_be_set_aside(tmp_path: Path) -> None:
     spool = Spool(tmp_path)
-    spool.claim(1)
-    spool.keep(1, record())
+    spool.reserve(1)
+    spool.write(1, record())
     path = tmp_path / "1.flight"
     content = bytearray(path.read_bytes())
     content[5000] ^= 1
@@ -72,4 +72,4 @@ def test_a_damaged_record_is_refused_and_can_be_set_aside(tmp_path: Path) -> Non
     aside = spool.set_aside(1)
     assert aside is not None
     assert Path(aside).read_bytes() == bytes(content)
-    assert spool.kept() == []
+    assert spool.flight_ids() == []

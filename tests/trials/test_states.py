@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.db.session import Database
 from app.errors import ConflictError
 from app.trials import flights
-from app.trials.states import MOVES, TrialState
+from app.trials.states import TRANSITIONS, TrialState
 from tests.builders import Json, create_csv, create_record, get, upload
 from tests.trials.states import create_trial_in
 
@@ -106,8 +106,8 @@ STEPS: dict[str, Step] = {
 
 def reachable(start: TrialState) -> set[TrialState]:
     """By one move, or through `captured` to its class in one step."""
-    one = set(MOVES[start])
-    return {start} | one | (set(MOVES[TrialState.CAPTURED]) if TrialState.CAPTURED in one else set())
+    one = set(TRANSITIONS[start])
+    return {start} | one | (set(TRANSITIONS[TrialState.CAPTURED]) if TrialState.CAPTURED in one else set())
 
 
 @pytest.mark.parametrize(

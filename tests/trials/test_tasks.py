@@ -16,7 +16,7 @@ from app.db.session import Database
 from app.live.messages import FlightPhase, PublishedMessage
 from app.settings import Settings
 from app.trials.crew import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
-from app.trials.flights import BEGINS_WITHIN
+from app.trials.flights import REQUEST_TIMEOUT
 from app.trials.flying import AbortRegistry
 from app.trials.states import FlightState, TrialState
 from app.trials.tasks import FlightRunner
@@ -50,8 +50,8 @@ class RunnerFixture:
         assert task is not None
         self.deck.carry_out(task)
 
-    def kill_cockpits(self) -> None:
-        for cockpit in self.deck._hangar._waiting:
+    def kill_processes(self) -> None:
+        for cockpit in self.deck._process_pool._waiting:
             os.kill(cockpit._process.pid or 0, signal.SIGKILL)
 
     def _hear(self, said: PublishedMessage) -> None:
@@ -125,7 +125,7 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
     assert (flown["state"], flown["flight"]["state"]) == ("valid", "landed")
     assert [said.phase for said in field.heard if isinstance(said, FlightPhase)] == [
         "staging", "flying", "landed", "ended"]  # fmt: skip
-    assert field.airspace.trials() == []
+    assert field.airspace.trial_ids() == []
     assert vehicle_state(client) == "ready"
 
 
@@ -164,7 +164,7 @@ def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
     when_changed_to(FlightState.RUNNING, fail, stored=False)
     with pytest.raises(RuntimeError, match="the power went"):
         field.deck.claim()
-    assert field.airspace.trials() == []
+    assert field.airspace.trial_ids() == []
 
 
 def test_a_flight_that_was_asked_for_while_the_worker_was_away_does_not_take_off(
@@ -183,7 +183,7 @@ def test_a_flight_that_waited_too_long_is_withdrawn_and_one_of_now_is_flown(
 ) -> None:
     with database.write() as session:
         for row in session.query(FlightRow):
-            row.requested_at -= BEGINS_WITHIN + timedelta(seconds=1)
+            row.requested_at -= REQUEST_TIMEOUT + timedelta(seconds=1)
     assert field.deck.claim() is None
     flight = get(client, f"/api/trials/{trial_id}")["flight"]
     assert flight["state"] == "cancelled"
@@ -201,7 +201,7 @@ def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothin
     assert f"kept as {kept}" in lost["reason"]
     assert kept.suffix == ".unusable"
     assert vehicle_state(client) == "ready"
-    assert field.airspace.trials() == []
+    assert field.airspace.trial_ids() == []
 
 
 def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
@@ -230,7 +230,7 @@ def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
 ) -> None:
     if real:
         make_vehicle_real(database)
-    field.kill_cockpits()
+    field.kill_processes()
     field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
@@ -284,7 +284,7 @@ def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
     client: TestClient, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(field.deck._hangar, "take", Refusing)
+        patched.setattr(field.deck._process_pool, "acquire", Refusing)
         field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
@@ -313,7 +313,7 @@ def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gain
     then: str,
 ) -> None:
     make_vehicle_real(database)
-    monkeypatch.setattr(field.deck._hangar, "take", crew)
+    monkeypatch.setattr(field.deck._process_pool, "acquire", crew)
     field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
@@ -327,17 +327,17 @@ def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
     assert task is not None
     with database.write() as session:
         session.query(FlightRow).one().trial.state = TrialState.FLYING
-    field.deck._spool.claim(task.flight_id)
-    field.deck._spool.keep(task.flight_id, create_record(1.0))
+    field.deck._spool.reserve(task.flight_id)
+    field.deck._spool.write(task.flight_id, create_record(1.0))
     field.deck.recover()
     assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
-    assert field.deck._spool.kept() == []
+    assert field.deck._spool.flight_ids() == []
 
 
 def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_gains_back(
     client: TestClient, database: Database, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.trials.tasks.LOOK_EVERY_S", 5.0)
+    monkeypatch.setattr("app.trials.tasks.POLL_INTERVAL_S", 5.0)
     with database.write() as session:
         row = session.query(FlightRow).one()
         row.mode, row.take_off_at = "stage", None

@@ -209,7 +209,7 @@ def _hazards(
 ) -> tuple[Check, ...]:
     takeoff = Takeoff(parameters)
     counts, safe_counts = _counts(np.array(gains)), _counts(np.array(safe_gains))
-    models = spread.samples(takeoff, MODELS)
+    models = spread.sample(takeoff, MODELS)
     baseline = gains == tuple(takeoff.space.default.tolist())
     return (
         *check_wrapping(counts, models[0], _TARGET),

@@ -20,7 +20,7 @@ def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
             NUMBERS, False, f"{gain.name} {reason}.", worst=_outside(gain, gains[gain.name]), limit=0.0, gain=gain.name
         )
         for gain in space.gains
-        if (reason := gain.impossible(gains[gain.name])) is not None
+        if (reason := gain.refusal_by_controller(gains[gain.name])) is not None
     )
 
 
@@ -37,7 +37,7 @@ def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
             offer={gain.name: min(max(gains[gain.name], gain.lower), gain.upper)},
         )
         for gain in space.gains
-        if (reason := gain.outside(gains[gain.name])) is not None
+        if (reason := gain.refusal_by_bounds(gains[gain.name])) is not None
     )
     return refused or (Check("bounds", True, "Every gain lies within its bounds.", worst=0.0, limit=0.0),)
 

@@ -127,7 +127,8 @@ def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samp
 
 
 def _fly(gains: Counts, models: Samples, guide: Samples) -> tuple[Samples, Samples]:
-    """Altitudes (k, n) and highest speeds (k,) of up to `LANES` runs; the last one fills up to a multiple of four."""
+    """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs; the last one fills up to a multiple of
+    four."""
     k = len(gains)
     filled = np.minimum(np.arange(-(-k // 4) * 4), k - 1)
     altitude, fastest_m_s = np.empty((k, guide.shape[1])), np.empty(k)

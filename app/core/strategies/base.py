@@ -96,9 +96,9 @@ class Strategy:
     line: str
     options: tuple[Option, ...]
     propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
-    foresee: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
+    predict_errors: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
     experiments: tuple[str, ...] = ()
-    learns: bool = True
+    corrects_model: bool = True
     needs_model: bool = True
 
     def works_with(self, experiment: Experiment) -> bool:

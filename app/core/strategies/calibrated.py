@@ -187,6 +187,6 @@ CALIBRATED: Final = Strategy(
     line="Fits the model to all flights and flies its optimum, hedged over what is left open: about two flights.",
     options=(),
     propose=propose,
-    foresee=foresee,
+    predict_errors=foresee,
     experiments=("takeoff",),
 )

@@ -205,5 +205,5 @@ GRADIENT: Final = Strategy(
         ),
     ),
     propose=propose,
-    foresee=foresee,
+    predict_errors=foresee,
 )

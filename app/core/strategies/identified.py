@@ -30,7 +30,7 @@ _SETTLED: Final = 1e-4
 _MODELS: Final = 48
 _MIN_IMPROVEMENT: Final = 0.002
 """Share of the best error that the model must promise to gain."""
-_UNMODELLED: Final = 0.005
+_MODEL_ERROR_SD: Final = 0.005
 """Standard deviation of what no linear model knows, as a share of the predicted error."""
 _TAIL: Final = 0.05
 _TAIL_SD: Final = 1.6449
@@ -133,11 +133,11 @@ def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> tu
         covariance=tuple(tuple(row) for row in found.covariance.tolist()),
         origin="the flights",
     )
-    outputs = aircraft.outputs(np.tile(gains, (_MODELS, 1)), spread.samples(aircraft, _MODELS))
+    outputs = aircraft.outputs(np.tile(gains, (_MODELS, 1)), spread.sample(aircraft, _MODELS))
     errors = aircraft.errors(_folded(outputs, found.pitch_noise_rad))
     error = float(errors[0])
     noise = found.pitch_noise_rad * np.sqrt(STEP_S * aircraft.grid_s[-1] * (1.0 - 2.0 / np.pi))
-    reach = _TAIL_SD * float(np.hypot(noise, _UNMODELLED * error))
+    reach = _TAIL_SD * float(np.hypot(noise, _MODEL_ERROR_SD * error))
     lowest, highest = np.quantile(errors, (_TAIL, 1.0 - _TAIL))
     interval = Interval(lower=max(0.0, min(error, float(lowest)) - reach), upper=max(error, float(highest)) + reach)
     return _trajectory(aircraft, outputs, _TAIL_SD * found.pitch_noise_rad), error, interval
@@ -217,6 +217,6 @@ IDENTIFIED: Final = Strategy(
         ),
     ),
     propose=propose,
-    foresee=foresee,
+    predict_errors=foresee,
     experiments=("pitch-tracking",),
 )

@@ -43,6 +43,6 @@ MANUAL: Final = Strategy(
     line="You choose every gain set; bounds and step limits are checked as for any other.",
     options=(),
     propose=propose,
-    foresee=foresee,
+    predict_errors=foresee,
     needs_model=False,
 )

@@ -120,6 +120,6 @@ SIMPLEX: Final = Strategy(
     line="Nelder–Mead on the nominal model alone, then that one set is flown.",
     options=(),
     propose=propose,
-    foresee=foresee,
-    learns=False,
+    predict_errors=foresee,
+    corrects_model=False,
 )

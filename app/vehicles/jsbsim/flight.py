@@ -14,7 +14,7 @@ from app.core.control.vertical_loop import RATE_HZ, STEP_S
 from app.vehicles.disturbances import gusts, streams
 from app.vehicles.errors import VehicleError
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, Integers, Rows, control
-from app.vehicles.simulated import MOST_STEPS
+from app.vehicles.simulated import MAX_STEPS
 
 if TYPE_CHECKING:
     import jsbsim
@@ -64,17 +64,17 @@ def new_aircraft() -> "jsbsim.FGFDMExec":
 class JsbsimFlight:
     """A simulation by the protocol of `app.vehicles.simulated`.
 
-    `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone; after `MOST_STEPS` they
+    `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone; after `MAX_STEPS` they
     come again. `autopilot` is the loop's memory, the state of app.core.control.vertical_loop first.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:
         noise, *directions = streams(seed, 4)
-        self._noise_m = noise.normal(0.0, options["altitude_noise_m"], MOST_STEPS)
+        self._noise_m = noise.normal(0.0, options["altitude_noise_m"], MAX_STEPS)
         self._gusts_ft_s = (
             [
                 gusts(
-                    direction, MOST_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=_GUST_CORRELATION_S
+                    direction, MAX_STEPS, sd=options["gust_m_s"] / _FOOT_M, correlation_s=_GUST_CORRELATION_S
                 ).tolist()
                 for direction in directions
             ]
@@ -160,5 +160,5 @@ class JsbsimFlight:
         """What only some flights have: gusts in, battery voltage out."""
         if self._gusts_ft_s:
             for axis, series in zip(("north", "east", "down"), self._gusts_ft_s, strict=True):
-                self._fdm[f"atmosphere/gust-{axis}-fps"] = series[step % MOST_STEPS]
+                self._fdm[f"atmosphere/gust-{axis}-fps"] = series[step % MAX_STEPS]
         row[BATTERY] = _FULL_BATTERY_V * self._fdm["battery/voltage-norm"]

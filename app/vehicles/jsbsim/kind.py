@@ -96,5 +96,5 @@ JSBSIM: Final = VehicleKind(
         ),
     ),
     open=_open,
-    conflicts=_cannot_lift,
+    find_conflicts=_cannot_lift,
 )

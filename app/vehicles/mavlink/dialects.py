@@ -86,7 +86,7 @@ class Dialect:
     module: str
     mavlink: int
     """1 or 2: the version sent. Both are understood."""
-    heeds_heartbeats: bool = True
+    uses_gcs_heartbeats: bool = True
     """Whether this autopilot wants to hear a ground station's heartbeat."""
     uncounted: tuple[str, ...] = ()
     """Beginnings of the names of messages whose sequence numbers are another counter's."""
@@ -177,7 +177,7 @@ PAPARAZZI: Final = Dialect(
     name="paparazzi",
     module="pymavlink.dialects.v10.paparazzi",
     mavlink=1,
-    heeds_heartbeats=False,
+    uses_gcs_heartbeats=False,
     uncounted=("SCRIPT_", "MISSION_", *_MOCAP_MESSAGES),
 )
 ARDUPILOTMEGA: Final = Dialect(

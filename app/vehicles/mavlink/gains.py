@@ -41,7 +41,7 @@ class GainStore:
         self.staged = None
         return dict(self._write(self.safe))
 
-    def give_back(self) -> str:
+    def restore_or_explain(self) -> str:
         """Restore the safe gains; why they cannot be verified, or nothing."""
         try:
             held = self.restore()

@@ -12,7 +12,7 @@ from app.vehicles.mavlink.radio import AutopilotLink
 RATE_OVER_S: Final = 2.0
 LOSS_OVER_S: Final = 10.0
 _EVERY_S: Final = 1.0
-_FRESH_S: Final = 2.0
+_MAX_AGE_S: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class StatusReader:
         radio, now_s = self._radio, self._radio.clock.now_s()
         health, heartbeat = radio.link.health, radio.seen.heartbeat
         recent = [(at_s, position) for at_s, position in radio.seen.positions if now_s - at_s <= RATE_OVER_S]
-        last = recent[-1][1] if recent and now_s - recent[-1][0] < _FRESH_S else None
+        last = recent[-1][1] if recent and now_s - recent[-1][0] < _MAX_AGE_S else None
         return Condition(
             step=step,
             packet_age_s=_age(now_s, health.last_packet_s),

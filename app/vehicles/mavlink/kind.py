@@ -168,8 +168,8 @@ MAVLINK: Final = VehicleKind(
     ),
     open=_open,
     connect=_connect,
-    conflicts=_conflicts,
-    simulates=is_simulated,
-    suits=_experiments,
+    find_conflicts=_conflicts,
+    is_simulation=is_simulated,
+    experiments_for=_experiments,
     check_gains=_check_gains,
 )

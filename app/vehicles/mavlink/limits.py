@@ -46,7 +46,7 @@ class Limits:
     landing_blocks: frozenset[str] = frozenset()
 
     @property
-    def witness_s(self) -> float:
+    def confirmation_s(self) -> float:
         """How far apart two heartbeats are that agree without another between them having said otherwise."""
         return MAX_WITNESS_GAP * self.heartbeat_s
 

@@ -180,7 +180,7 @@ class Link:
         with self._news:
             if now_s - self._rival_s < RIVAL_TIMEOUT_S:
                 return "Another vehicle with its system id speaks from another port."
-            return self._speakers.doubt(now_s)
+            return self._speakers.reason(now_s)
 
     @property
     def other_makes(self) -> frozenset[int]:
@@ -286,7 +286,7 @@ class Link:
 
     def _attend(self, timeout_s: float) -> None:
         """Send the heartbeat that is due, then hear what comes; `timeout_s` on the wall."""
-        self._beat()
+        self._send_heartbeat()
         for data, peer in self._transport.read(timeout_s):
             self._take_in(data, peer)
 
@@ -300,13 +300,13 @@ class Link:
         """How long to wait for news, s on the wall."""
         return self._clock.wall_s(max(self._next_heartbeat_s - self._clock.now_s(), 0.0))
 
-    def _beat(self) -> None:
+    def _send_heartbeat(self) -> None:
         now_s = self._clock.now_s()
         if now_s < self._next_heartbeat_s:
             return
         self._next_heartbeat_s = now_s + HEARTBEAT_EVERY_S
         is_attended = self._listeners > 0 or now_s - self._attended_s < UNATTENDED_AFTER_S
-        if self._dialect.heeds_heartbeats and is_attended:
+        if self._dialect.uses_gcs_heartbeats and is_attended:
             with self._sending:
                 self._write(self._heartbeat)
 
@@ -324,7 +324,7 @@ class Link:
         if remote == peer:
             self._hear(self._codec.parse(data))
         elif remote is None:
-            self._take_in_stranger(data, peer)
+            self._process_unknown_peer(data, peer)
         else:
             self._foreign += 1
             now_s = self._clock.now_s()
@@ -332,7 +332,7 @@ class Link:
                 self._looked_s = now_s
                 self._look_at_rival(data, peer, now_s)
 
-    def _take_in_stranger(self, data: bytes, peer: Peer) -> None:
+    def _process_unknown_peer(self, data: bytes, peer: Peer) -> None:
         """With a codec of its own: what a stranger sends must not stand in the way of the vehicle's first packet."""
         messages = self._new_codec().parse(data)
         if any(self._is_vehicle(message) for message in messages):
@@ -396,7 +396,7 @@ class Link:
         if self._vehicle_component in (None, source_component(message)):
             self._last_packet_s = now_s
             if not message.get_type().startswith(self._dialect.uncounted):
-                self._speakers.hear(frame, sequence(message), now_s, _boot_s(message))
+                self._speakers.add(frame, sequence(message), now_s, _boot_s(message))
         if is_autopilot:
             self._last_heartbeat_s = now_s
         return True

@@ -11,7 +11,7 @@ from app.vehicles.mavlink.failures import GAIN_FAILURES, RESPONSES, Failure, Fin
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.measurements import Parameter, Position
 from app.vehicles.mavlink.signals import Action, Command, Event, PacketReceived, PerformAction, SendGain, Setting
-from app.vehicles.mavlink.states import MOVES, OVER, State
+from app.vehicles.mavlink.states import OVER, TRANSITIONS, State
 from app.vehicles.mavlink.watch import TrialObservation
 
 GAIN_S: Final = 0.1
@@ -134,7 +134,7 @@ def note(trial: Trial, finding: Finding) -> Trial:
 
 
 def enter(trial: Trial, state: State, now_s: float) -> Trial:
-    if state not in MOVES[trial.state]:
+    if state not in TRANSITIONS[trial.state]:
         raise AssertionError(f"A trial cannot go from {trial.state} to {state}.")
     return replace(trial, state=state, since_s=now_s, resting_since_s=None)
 

@@ -12,7 +12,7 @@ from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Target
-from app.vehicles.mavlink.radio import PATIENCE_S, AutopilotLink
+from app.vehicles.mavlink.radio import REPLY_TIMEOUT_S, AutopilotLink
 from app.vehicles.mavlink.transports import Transport
 
 TAKEOFF_ALTITUDE_M: Final = 3.0
@@ -56,7 +56,7 @@ def open_radio(
         altitude_m=TAKEOFF_ALTITUDE_M,
     )
     return AutopilotLink(
-        link, profile, clock, aim, patience_s=PATIENCE_S * timeout_factor_of(options), overhear=overhear
+        link, profile, clock, aim, patience_s=REPLY_TIMEOUT_S * timeout_factor_of(options), overhear=overhear
     )
 
 

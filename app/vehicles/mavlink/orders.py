@@ -60,9 +60,9 @@ class RepeatedCommand:
             return False
         if not seen.heartbeat.armed and (self._answered or self._radio.is_disarmed):
             return True
-        return self._action is Action.LAND and self._lands(seen.heartbeat.mode)
+        return self._action is Action.LAND and self._is_landing(seen.heartbeat.mode)
 
-    def _lands(self, mode: str) -> bool:
+    def _is_landing(self, mode: str) -> bool:
         seen, profile = self._radio.seen, self._radio.profile
         if self._radio.block in profile.landing_blocks or mode in profile.landing_modes - profile.flying_modes:
             return True

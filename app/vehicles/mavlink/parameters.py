@@ -9,7 +9,7 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.measurements import Measurement, Parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing
-from app.vehicles.mavlink.radio import ATTEMPTS, PATIENCE_S, AutopilotLink
+from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 from app.vehicles.mavlink.signals import PacketReceived, Setting
 
 LIST_ATTEMPTS: Final = 3
@@ -83,7 +83,7 @@ def _list(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict
     """What comes by itself, until all has come or nothing more does."""
     heard: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
-    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.patience and not _is_complete(heard):
+    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.timeout_factor and not _is_complete(heard):
         if found := _listed(radio.listen(radio.patience_s)):
             heard |= found
             last_s = radio.clock.now_s()
@@ -97,7 +97,9 @@ def _listed(heard: list[PacketReceived]) -> dict[int, Parameter]:
 
 
 def _fetched(radio: AutopilotLink, place: int) -> dict[int, Parameter]:
-    answer = radio.ask(base.read_place(radio.aim, place), lambda it: isinstance(it, Parameter) and it.place == place)
+    answer = radio.request(
+        base.read_place(radio.aim, place), lambda it: isinstance(it, Parameter) and it.place == place
+    )
     return {place: answer} if isinstance(answer, Parameter) else {}
 
 
@@ -119,12 +121,13 @@ def _ask(radio: AutopilotLink, request: Outgoing, parameter: str, *, attempts: i
     def fits(heard: Measurement) -> bool:
         return isinstance(heard, Parameter) and heard.name == parameter
 
-    answer = radio.ask(request, fits, attempts=attempts)
+    answer = radio.request(request, fits, attempts=attempts)
     return answer.value if isinstance(answer, Parameter) else None
 
 
 def _unconfirmed(gain: GainParameter) -> VehicleError:
     return VehicleError(
-        f"{RESPONSES[Failure.PARAMETER].text} {gain.parameter} was asked {ATTEMPTS} times, every {PATIENCE_S:g} s.",
+        f"{RESPONSES[Failure.PARAMETER].text} {gain.parameter} was asked {ATTEMPTS} times, every "
+        f"{REPLY_TIMEOUT_S:g} s.",
         hint="See that the vehicle is still there and that its identity (system and aircraft number) is right.",
     )

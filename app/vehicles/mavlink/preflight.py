@@ -66,7 +66,7 @@ class GroundObservation:
 def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = None) -> None:
     """Wait for the heartbeat of an autopilot of the right make, sending nothing. Raises VehicleError when none comes
     within 5 s (longer where the vehicle's clock is fast), or another vehicle's than the `pinned` one's."""
-    within_s = HEARTBEAT_S * radio.patience
+    within_s = HEARTBEAT_S * radio.timeout_factor
     until_s = radio.clock.now_s() + within_s
     while radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
@@ -100,13 +100,13 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     """Read the flight plan and the firmware's version, changing nothing; what is wrong with the plan, or nothing."""
     problem = ""
     try:
-        radio.aim = replace(radio.aim, blocks=radio.profile.explore(radio.ask, radio.aim))
+        radio.aim = replace(radio.aim, blocks=radio.profile.explore(radio.request, radio.aim))
     except VehicleError as error:
         problem = str(error)
     radio.send(*radio.profile.conclude(radio.aim))
     asking = radio.profile.ask_version(radio.aim)
     if asking is not None:
-        radio.ask(asking, lambda _: bool(radio.seen.version), attempts=_VERSION_ATTEMPTS)
+        radio.request(asking, lambda _: bool(radio.seen.version), attempts=_VERSION_ATTEMPTS)
     has = tuple(name for name in radio.profile.stop_settings if _has(radio, name))
     radio.aim = replace(radio.aim, stop_settings=has)
     return problem
@@ -123,7 +123,7 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
         return
     stands = watched.disarmed and _moved_m(watched.positions) <= _STANDS_WITHIN_M and bool(watched.positions)
     if stands:
-        obeyed = radio.ask(base.disarm(radio.aim), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
+        obeyed = radio.request(base.disarm(radio.aim), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
         accepted = isinstance(obeyed, CommandReply) and obeyed.accepted
         radio.aim = replace(radio.aim, stops_by_command=accepted)
 
@@ -156,7 +156,7 @@ def make_armable(radio: AutopilotLink) -> None:
     refuses."""
     heartbeat = radio.seen.heartbeat
     steps = radio.profile.make_armable(radio.aim, heartbeat.mode) if heartbeat is not None else ()
-    until_s = radio.clock.now_s() + HEARTBEAT_S * radio.patience
+    until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
     while steps and not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
     if steps and radio.is_disarmed:
@@ -178,7 +178,7 @@ def observe(
     radio.listen(0.0)
     radio.seen.positions.clear()
     if lookout is not None:
-        lookout.forget()
+        lookout.discard_pending()
     begun_s = radio.clock.now_s()
     armed: list[bool] = []
     while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
@@ -186,7 +186,7 @@ def observe(
     ):
         heard = radio.listen(_LISTEN_S)
         armed += [each.measurement.armed for each in heard if isinstance(each.measurement, Heartbeat)]
-    seen_m = () if lookout is None else lookout.stand()
+    seen_m = () if lookout is None else lookout.ground_altitudes()
     positions = tuple(position for _, position in radio.seen.positions)
     return GroundObservation(positions, now_s - begun_s, seen_m, disarmed=bool(armed) and not any(armed))
 
@@ -240,7 +240,7 @@ def _heartbeat(radio: AutopilotLink) -> CheckItem:
     heartbeat = radio.seen.heartbeat
     make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
     version = f" {radio.seen.version}" if radio.seen.version else ""
-    oldest_s = _HEARTBEATS_MISSED * radio.profile.heartbeat_s * radio.patience
+    oldest_s = _HEARTBEATS_MISSED * radio.profile.heartbeat_s * radio.timeout_factor
     return CheckItem(
         name="heartbeat",
         title="Heartbeat",

@@ -23,7 +23,7 @@ from app.vehicles.mavlink.measurements import (
 from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Step, Target
 from app.vehicles.mavlink.signals import Action, ActionDone, ActionRefused, PacketReceived
 
-PATIENCE_S: Final = 0.5
+REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
 _POSITIONS: Final = 1000
 _SPOKEN: Final = 5
@@ -88,7 +88,7 @@ class AutopilotLink:
         clock: Clock,
         aim: Target,
         *,
-        patience_s: float = PATIENCE_S,
+        patience_s: float = REPLY_TIMEOUT_S,
         overhear: Callable[[Received], None] | None = None,
     ) -> None:
         self.link: Final = link
@@ -100,14 +100,14 @@ class AutopilotLink:
         self._overhear = overhear
 
     @property
-    def patience(self) -> float:
+    def timeout_factor(self) -> float:
         """How many times longer than a real vehicle this one is waited for."""
-        return self.patience_s / PATIENCE_S
+        return self.patience_s / REPLY_TIMEOUT_S
 
     @property
     def is_disarmed(self) -> bool:
         """By two heartbeats at least, and none between them that says otherwise."""
-        seen, apart_s = self.seen, MAX_WITNESS_GAP * self.profile.heartbeat_s * self.patience
+        seen, apart_s = self.seen, MAX_WITNESS_GAP * self.profile.heartbeat_s * self.timeout_factor
         return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= apart_s
 
     @property
@@ -140,7 +140,7 @@ class AutopilotLink:
         """Not of another component on board; of any while the autopilot's is not known."""
         return self.aim.component in (0, source_component(message))
 
-    def ask(
+    def request(
         self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
     ) -> Measurement | None:
         """The answer to a request that is repeated every 0.5 s; None when there is none. Raises LinkError."""
@@ -156,7 +156,7 @@ class AutopilotLink:
 
     def set_up(self, steps: tuple[Step, ...]) -> str:
         """Carry out steps on the ground, waiting for them; why they were refused, or nothing. Raises LinkError."""
-        conversation = CommandSequence(Action.ARM, steps, self, told="be set up")
+        conversation = CommandSequence(Action.ARM, steps, self, description="be set up")
         while True:
             ended = conversation.proceed(self.listen(self.patience_s / 10.0))
             if ended is not None:
@@ -164,11 +164,11 @@ class AutopilotLink:
 
 
 class CommandSequence:
-    """Steps under way: each begins when the one before it was answered; nothing here waits. `told` says what the
+    """Steps under way: each begins when the one before it was answered; nothing here waits. `description` says what the
     vehicle was told, where that is not the action."""
 
-    def __init__(self, action: Action, steps: tuple[Step, ...], radio: AutopilotLink, *, told: str = "") -> None:
-        self._action, self._radio, self._told = action, radio, told or action
+    def __init__(self, action: Action, steps: tuple[Step, ...], radio: AutopilotLink, *, description: str = "") -> None:
+        self._action, self._radio, self._told = action, radio, description or action
         self._steps = list(steps)
         self._sent_s = 0.0
         self._attempts = 0

@@ -42,7 +42,7 @@ class AltitudeSource(Protocol):
         """Why nothing comes, where the source knows; empty otherwise."""
         ...
 
-    def hear(self, received: Received) -> None:
+    def on_message(self, received: Received) -> None:
         """Take in a message of the vehicle's own link; a source with a link of its own passes it over."""
         ...
 
@@ -64,21 +64,21 @@ class AlignedAltitudeSource:
         self.seen: list[tuple[float, float]] = []
         self._rise_m = 0.0
 
-    def forget(self) -> None:
+    def discard_pending(self) -> None:
         """Pass over what came while nobody needed it."""
         self.source.take()
 
-    def stand(self) -> tuple[float, ...]:
+    def ground_altitudes(self) -> tuple[float, ...]:
         """The altitudes at which it saw the vehicle since the last call."""
         return tuple(sample.altitude_m for sample in self.source.take() if sample.tracking_valid and sample.advances)
 
-    def begin(self, stood_m: Sequence[float], ground_m: float) -> None:
+    def align(self, stood_m: Sequence[float], ground_m: float) -> None:
         """A flight begins: `stood_m` is where it saw the vehicle stand, which is at `ground_m` on its own datum."""
         self._rise_m = ground_m - statistics.median(stood_m)
         self.seen.clear()
-        self.forget()
+        self.discard_pending()
 
-    def look(self) -> list[SecondaryAltitudeReceived]:
+    def take_samples(self) -> list[SecondaryAltitudeReceived]:
         """What it saw since the last call."""
         samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.source.take()]
         self.seen += [(sample.seen_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]

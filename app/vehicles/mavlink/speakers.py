@@ -48,12 +48,12 @@ class DuplicateDetector:
         self._certain_s: float | None = None
         self._why = ""
 
-    def hear(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
+    def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
         """A message by its whole frame and sequence number; `boot_s`: the time that it tells, where it tells one."""
         if self._hear_number(frame, number, now_s) and boot_s is not None:
             self._hear_clock(boot_s - now_s, now_s)
 
-    def doubt(self, now_s: float) -> str:
+    def reason(self, now_s: float) -> str:
         """Why two are believed to speak; empty while one does."""
         if self._is_certain(self._doubled_numbers, now_s):
             self._certain_s, self._why = now_s, "Its sequence numbers come twice, with other contents."

@@ -34,7 +34,7 @@ class State(StrEnum):
     OBSERVE = "observing"
 
 
-MOVES: Final[Mapping[State, frozenset[State]]] = {
+TRANSITIONS: Final[Mapping[State, frozenset[State]]] = {
     State.IDLE: frozenset({State.CONNECT, State.SET_GAINS, State.OBSERVE}),
     State.CONNECT: frozenset({State.PREFLIGHT, State.IDLE, State.OBSERVE}),
     State.PREFLIGHT: frozenset({State.SET_GAINS, State.IDLE, State.QUARANTINE, State.OBSERVE}),

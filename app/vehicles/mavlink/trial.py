@@ -133,7 +133,7 @@ class TrialRunner:
         self._advance(Tick(self._radio.clock.now_s()))
 
     def _wanted(self) -> StopRequest | None:
-        return self._should_stop() if self._error is None else StopRequest(_spoken(self._error))
+        return self._should_stop() if self._error is None else StopRequest(_describe_error(self._error))
 
     def _advance(self, event: Event) -> None:
         before = self._trial.state
@@ -184,7 +184,7 @@ class TrialRunner:
             self._error = error
 
 
-def _spoken(error: BaseException) -> str:
+def _describe_error(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted from the keyboard"
     return f"the program failed ({type(error).__name__}: {error})"

@@ -40,7 +40,7 @@ class TrialParameters:
                 if not self._write(setting):
                     raise _unset(setting)
 
-    def put_back(self) -> str:
+    def restore(self) -> str:
         """Why they are not as they were, or nothing."""
         try:
             for name, changed in tuple(self._remembered().items()):

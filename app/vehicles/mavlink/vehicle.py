@@ -22,7 +22,7 @@ from app.vehicles.mavlink.orders import RepeatedCommand
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.signals import Action, PacketReceived, RecordSample
 from app.vehicles.mavlink.sources import AlignedAltitudeSource, AltitudeSource
-from app.vehicles.mavlink.states import MOVES, QUARANTINE_STATES, State
+from app.vehicles.mavlink.states import QUARANTINE_STATES, TRANSITIONS, State
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
 from app.vehicles.mavlink.trial_parameters import TrialParameters
@@ -81,7 +81,7 @@ class MavlinkVehicle:
         self._flight: TrialRunner | None = None
         self._order: RepeatedCommand | None = None
         self._lookout = None if source is None else AlignedAltitudeSource(source)
-        overhear = None if source is None else source.hear
+        overhear = None if source is None else source.on_message
         self._radio = open_radio(options, clock, overhear=overhear, transport=transport)
         self._gauges = StatusReader(self._radio)
         try:
@@ -104,9 +104,9 @@ class MavlinkVehicle:
     def stage(self, gains: Gains) -> dict[str, float]:
         """Write every gain and return what was read back. Raises GainsError for gains that may not be written (nothing
         is changed then), VehicleError when the vehicle does not confirm, SafeGainsError in quarantine."""
-        self._require_trust()
+        self._require_not_quarantined()
         self._listen(0.0)
-        self._require_trust()
+        self._require_not_quarantined()
         if self._state is State.IDLE:
             self._enter(State.SET_GAINS)
         try:
@@ -134,9 +134,9 @@ class MavlinkVehicle:
         the vehicle, and is raised again once it is down.
         """
         try:
-            self._require_trust()
+            self._require_not_quarantined()
             self._require_staged()
-            ground, stop = self._stand(STANDSTILL_S), should_stop()
+            ground, stop = self._observe_ground(STANDSTILL_S), should_stop()
             if stop is None:
                 self._parameters.set()
         except BaseException as error:
@@ -205,7 +205,7 @@ class MavlinkVehicle:
     def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
         """Every parameter; `on_progress` is told how many came, of how many. Raises VehicleError when they do not come,
         SafeGainsError while the vehicle is only observed."""
-        self._require_trust()
+        self._require_not_quarantined()
         return parameters.read_all(self._radio, on_progress)
 
     def restore(self) -> dict[str, float]:
@@ -219,7 +219,7 @@ class MavlinkVehicle:
 
     def _put_back(self) -> str:
         """The safe gains, and what a trial set beside them; what is wrong with them, or nothing."""
-        return self._gains.give_back() or self._parameters.put_back()
+        return self._gains.restore_or_explain() or self._parameters.restore()
 
     def land(self, reason: str) -> None:
         """Tell it to land, at once and whatever it says of itself. Raises VehicleError when it cannot be told."""
@@ -294,7 +294,7 @@ class MavlinkVehicle:
     def _await_heartbeat(self) -> None:
         asked_s = self._radio.clock.now_s()
         while self._radio.seen.heartbeat_s < asked_s:
-            if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * self._radio.patience:
+            if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * self._radio.timeout_factor:
                 raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
             self._listen(_LISTEN_S)
 
@@ -318,11 +318,11 @@ class MavlinkVehicle:
                 hint="Stage the gains, compare what is read back, then fly.",
             )
 
-    def _stand(self, watched_s: float) -> Ground:
+    def _observe_ground(self, watched_s: float) -> Ground:
         """Where it stands. Raises VehicleError when it is not ready to fly, SafeGainsError when it is armed."""
         watched, items = self._check(watched_s)
         preflight.require(items)
-        self._require_trust()
+        self._require_not_quarantined()
         return watched.ground
 
     def _check(self, watched_s: float) -> tuple[preflight.GroundObservation, tuple[CheckItem, ...]]:
@@ -349,7 +349,7 @@ class MavlinkVehicle:
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S
         )
         if self._lookout is not None:
-            self._lookout.begin(ground.seen_m, ground.altitude_m)
+            self._lookout.align(ground.seen_m, ground.altitude_m)
         self._flight = TrialRunner(
             self._radio,
             plan,
@@ -358,7 +358,7 @@ class MavlinkVehicle:
             on_sample=on_sample,
             should_stop=should_stop,
             channels=lambda kept, datum_m: records.channels_of(kept, datum_m, self._scored),
-            look=list if self._lookout is None else self._lookout.look,
+            look=list if self._lookout is None else self._lookout.take_samples,
         )
         try:
             flown = self._flight.fly()
@@ -366,10 +366,10 @@ class MavlinkVehicle:
             self._datum_m, self._flight = self._flight.datum_m, None
         self._state, self._why = flown.trial.state, flown.trial.why
         if self._state is State.QUARANTINE:
-            self._land_on()
+            self._keep_landing()
         return flown
 
-    def _land_on(self) -> None:
+    def _keep_landing(self) -> None:
         """A vehicle that could not be landed within its trial is told to land all the same, as long as it is armed and
         no person flies it."""
         heartbeat = self._radio.seen.heartbeat
@@ -440,7 +440,7 @@ class MavlinkVehicle:
 
     # ---- trust
 
-    def _require_trust(self) -> None:
+    def _require_not_quarantined(self) -> None:
         if self._state is State.QUARANTINE:
             raise SafeGainsError(
                 f"The vehicle is quarantined: {self._why}",
@@ -453,6 +453,6 @@ class MavlinkVehicle:
             )
 
     def _enter(self, state: State) -> None:
-        if state not in MOVES[self._state]:
+        if state not in TRANSITIONS[self._state]:
             raise AssertionError(f"A vehicle cannot go from {self._state} to {state}.")
         self._state = state

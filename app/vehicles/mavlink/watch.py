@@ -33,7 +33,7 @@ _ATTENDED_S: Final = 0.1
 _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
-_MOST_GLITCHES: Final = 3
+_MAX_GLITCHES: Final = 3
 _DOUBTED_LIMIT: Final = 10.0
 _RESTLESS_DRAINS_S: Final = 5.0
 """Doubted samples a second that are borne; ten more than that, and the position jumps to and fro."""
@@ -179,7 +179,7 @@ def _is_contradicted(watch: TrialObservation, now_s: float, ground_m: float) -> 
 
 
 def too_many_glitches(watch: TrialObservation) -> bool:
-    return watch.glitches > _MOST_GLITCHES
+    return watch.glitches > _MAX_GLITCHES
 
 
 def has_unreliable_position(watch: TrialObservation) -> bool:
@@ -209,12 +209,12 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
 
 def is_disarmed(watch: TrialObservation, limits: Limits) -> bool:
     """By two heartbeats at least, and none between them that says otherwise."""
-    return not watch.armed and watch.heartbeat_s - watch.armed_since_s >= limits.witness_s
+    return not watch.armed and watch.heartbeat_s - watch.armed_since_s >= limits.confirmation_s
 
 
 def mode_of(watch: TrialObservation, limits: Limits) -> str:
     """The mode that heartbeats agree upon; empty while they do not."""
-    return watch.mode if watch.heartbeat_s - watch.mode_since_s >= limits.witness_s else ""
+    return watch.mode if watch.heartbeat_s - watch.mode_since_s >= limits.confirmation_s else ""
 
 
 def may_stop_motors(watch: TrialObservation, now_s: float) -> bool:

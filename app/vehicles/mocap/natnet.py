@@ -88,7 +88,7 @@ class NatNetSource:
         newest = self._stream.newest
         return f"The cameras do not see {self.name}." if newest is not None and not newest.tracking_valid else ""
 
-    def hear(self, received: Received) -> None:
+    def on_message(self, received: Received) -> None:
         """The vehicle's own link is another."""
 
     def take(self) -> Sequence[SourceSample]:

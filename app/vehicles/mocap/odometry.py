@@ -73,7 +73,7 @@ class OdometrySource:
         newest = self._stream.newest
         return f"The {self.name} has failed." if newest is not None and not newest.tracking_valid else ""
 
-    def hear(self, received: Received) -> None:
+    def on_message(self, received: Received) -> None:
         message, arrived_s = received.message, received.received_s
         kind = message.get_type()
         if kind not in READERS or kind != (self._kind or kind):
@@ -128,7 +128,7 @@ class StreamSource:
     def trouble(self) -> str:
         return self._inner.trouble if self._thread.is_alive() else f"The {self.name} is not listened to any more."
 
-    def hear(self, received: Received) -> None:
+    def on_message(self, received: Received) -> None:
         """The vehicle's own link is another."""
 
     def take(self) -> Sequence[SourceSample]:
@@ -169,4 +169,4 @@ class StreamSource:
             self._transport.adopt(peer)
         now_s = self._clock.now_s()
         for message in messages:
-            self._inner.hear(Received(message, now_s))
+            self._inner.on_message(Received(message, now_s))

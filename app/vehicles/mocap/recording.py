@@ -15,7 +15,7 @@ from app.vehicles.base import OptionValue
 Scored = Literal["vehicle", "mocap"]
 """Whose altitude is scored."""
 
-APART_M: Final = 0.3
+MAX_DIFFERENCE_M: Final = 0.3
 """Further apart than this, the sources are said to disagree."""
 _STEPPED: Final = ("set_point_m",)
 """Channels that jump: between two samples the first holds."""
@@ -49,7 +49,7 @@ def add_secondary_altitude(
         trajectory.time_s + alignment.delay_s <= other_s[-1]
     )
     apart = compare(trajectory.time_s[covered], trajectory["altitude_m"][covered], second_m[covered])
-    if apart.largest_m > APART_M:
+    if apart.largest_m > MAX_DIFFERENCE_M:
         remarks.append(
             f"The vehicle and {name} disagree: up to {apart.largest_m:.2f} m, at {apart.at_s:.1f} s "
             f"({apart.rms_m:.2f} m root mean square)."

@@ -78,7 +78,7 @@ class MotionCapture:
 class MocapOutput(Protocol):
     """Says what the cameras saw."""
 
-    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         """Send it; what is to go over the drone's own link is returned."""
         ...
 
@@ -89,7 +89,7 @@ class VehicleLinkOutput:
     """VISION_POSITION_ESTIMATE among the drone's own messages, as every version of MAVLink carries it; it cannot say
     that the body is not tracked, so nothing is said then."""
 
-    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         return [
             OutgoingMessage("VISION_POSITION_ESTIMATE", _vision(each), "cameras") for each in glimpses if each.tracked
         ]
@@ -105,7 +105,7 @@ class OdometryOutput:
         self._transport: Transport = open_transport(address.link)
         self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
 
-    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         for glimpse in glimpses:
             self._transport.write(self._codec.pack(COMMON.message("ODOMETRY", _odometry(glimpse))))
         return []
@@ -134,7 +134,7 @@ class NatNetServer:
         group = (address.multicast, address.data_port)
         self._listeners: set[tuple[str, int]] = {group} if address.multicast else set()
 
-    def say(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         self._answer()
         for glimpse in glimpses:
             packet = frame_packet(glimpse, self._address.body, up=self._address.up)

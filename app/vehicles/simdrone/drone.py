@@ -40,7 +40,7 @@ class Drone:
         """Since it was switched on."""
         return self._ticks * TICK_S
 
-    def afflict(self, fault: str, duration_s: float = float("inf")) -> None:
+    def inject_fault(self, fault: str, duration_s: float = float("inf")) -> None:
         """Let a fault of `FAULTS` set in with the next tick."""
         self._faults.add(PlannedFault(fault, None, self.time_s + duration_s))
 
@@ -53,7 +53,7 @@ class Drone:
         """Let one tick pass; the packets that leave. Raises VehicleError when the simulation broke down."""
         self._faults.update(self.time_s, self._takeoff_s, self)
         self._ticks += 1
-        seen = self._outlet.say(self.cameras.look(self.time_s, self.body.altitude_m)) if self._outlet else []
+        seen = self._outlet.send(self.cameras.look(self.time_s, self.body.altitude_m)) if self._outlet else []
         if self.time_s < self._silent_until_s:
             self.body.advance(TICK_STEPS, MOTORS_OFF)
             return []
@@ -65,7 +65,7 @@ class Drone:
     def reboot(self) -> None:
         """Start the autopilot anew, in whatever state the body is; what is wrong with it stays wrong."""
         before, self.autopilot = self.autopilot, self._switch_on(self.body)
-        self.autopilot.survive(before)
+        self.autopilot.restore_persistent(before)
         self.autopilot.refuses_arming = before.refuses_arming
         self.autopilot.ignores_parameters = before.ignores_parameters
         self._codecs.clear()

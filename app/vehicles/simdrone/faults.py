@@ -45,11 +45,11 @@ class Fault:
     def end(self, drone: FaultTarget) -> None:
         """Called when it is over."""
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         """What becomes of the messages of one tick."""
         return list(letters)
 
-    def frames(self, frames: Sequence[bytes]) -> list[bytes]:
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
         """What becomes of the packets of one tick."""
         return list(frames)
 
@@ -64,7 +64,7 @@ class NoHeartbeat(Fault):
 
     name = "no-heartbeat"
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [letter for letter in letters if letter.kind != "HEARTBEAT"]
 
 
@@ -109,7 +109,7 @@ class LinkLost(Fault):
 
     name = "link-lost"
 
-    def frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002  none of them passes
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002  none of them passes
         return []
 
     @property
@@ -124,7 +124,7 @@ class FrozenPosition(Fault):
     name: ClassVar[str] = "frozen-position"
     _held: dict[str, OutgoingMessage] = field(default_factory=dict)
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [
             self._held.setdefault(letter.kind, letter) if letter.kind in _POSITIONS else letter for letter in letters
         ]
@@ -137,7 +137,7 @@ class JumpingPosition(Fault):
     name: ClassVar[str] = "jumping-position"
     _count: int = 0
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [self._jumped(letter) for letter in letters]
 
     def _jumped(self, letter: OutgoingMessage) -> OutgoingMessage:
@@ -154,7 +154,7 @@ class LowBattery(Fault):
 
     name = "low-battery"
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [replace(letter, fields=_drained(letter.fields)) for letter in letters]
 
 
@@ -175,7 +175,7 @@ class DuplicatedPackets(Fault):
     name: ClassVar[str] = "duplicated-packets"
     _count: int = 0
 
-    def frames(self, frames: Sequence[bytes]) -> list[bytes]:
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
         doubled: list[bytes] = []
         for frame in frames:
             self._count += 1
@@ -191,7 +191,7 @@ class ReorderedPackets(Fault):
     _count: int = 0
     _late: list[bytes] = field(default_factory=list)
 
-    def frames(self, frames: Sequence[bytes]) -> list[bytes]:
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
         passed: list[bytes] = []
         for frame in frames:
             self._count += 1
@@ -208,7 +208,7 @@ class WrongSystem(Fault):
 
     name = "wrong-system"
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [replace(letter, system=_WRONG_SYSTEM) for letter in letters]
 
 
@@ -328,12 +328,12 @@ class Faults:
 
     def letters(self, letters: list[OutgoingMessage]) -> list[OutgoingMessage]:
         for _, fault in self._working:
-            letters = fault.letters(letters)
+            letters = fault.transform_messages(letters)
         return letters
 
     def frames(self, frames: list[bytes]) -> list[bytes]:
         for _, fault in self._working:
-            frames = fault.frames(frames)
+            frames = fault.transform_frames(frames)
         return frames
 
 

@@ -251,7 +251,7 @@ def test_uncompiled_one_short_takeoff_is_judged() -> None:
         SAFE_COUNTS,
         False,
         TAKEOFF.model_parameters,
-        prior_distribution(TAKEOFF).samples(TAKEOFF, 2),
+        prior_distribution(TAKEOFF).sample(TAKEOFF, 2),
         1.0,
         TARGET,
         1600,

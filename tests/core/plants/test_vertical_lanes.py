@@ -24,7 +24,7 @@ def models(count: int) -> Matrix:
         covariance=tuple(tuple(row) for row in covariance.tolist()),
         origin="",
     )
-    return spread.draws(Takeoff(), count, seed=1)
+    return spread.draw_random(Takeoff(), count, seed=1)
 
 
 def gain_sets(count: int) -> Counts:

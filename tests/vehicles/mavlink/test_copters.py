@@ -90,7 +90,7 @@ class AltitudeAnew(Fault):
     def begin(self, drone: FaultTarget) -> None:
         self.drone = drone
 
-    def letters(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [self._raised(letter) for letter in letters]
 
     def _raised(self, letter: OutgoingMessage) -> OutgoingMessage:
@@ -217,7 +217,7 @@ def test_what_a_refused_run_had_set_is_put_back_too() -> None:
         with connected(rig) as vehicle:
             vehicle.stage(SAFE["px4"])
             rig.drone.autopilot.refuses_arming = True
-            rig.drone.autopilot.unreadiness = lambda: None  # type: ignore[attr-defined]  # it does not tell before
+            rig.drone.autopilot.prearm_failure = lambda: None  # type: ignore[attr-defined]  # it does not tell before
             with pytest.raises(VehicleError, match="would not arm") as refusal:
                 vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
             assert refusal.value.not_flown

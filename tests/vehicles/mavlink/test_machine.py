@@ -20,7 +20,7 @@ from app.vehicles.mavlink.signals import (
     SecondaryAltitudeReceived,
     SendGain,
 )
-from app.vehicles.mavlink.states import MOVES, State
+from app.vehicles.mavlink.states import TRANSITIONS, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 ABORT = "the operator pressed Abort"
@@ -333,7 +333,7 @@ def test_every_failure_in_every_state_leads_where_it_must(
 @pytest.mark.parametrize("state", STAGES)
 def test_the_walk_keeps_to_the_table_of_moves(state: State) -> None:
     states = STAGES[state]().states
-    assert all(later in MOVES[earlier] for earlier, later in pairwise(states))
+    assert all(later in TRANSITIONS[earlier] for earlier, later in pairwise(states))
 
 
 def test_a_flight_goes_through_its_states_and_ends_idle() -> None:

@@ -33,8 +33,8 @@ def heard(packets: Iterable[Packet]) -> tuple[str, float]:
     """What is believed first that is not nothing, and when; nothing, and the end."""
     speakers, at_s = DuplicateDetector(), 0.0
     for at_s, number, frame, boot_s in sorted(packets, key=lambda packet: packet[0]):
-        speakers.hear(frame, number, at_s, boot_s)
-        if doubt := speakers.doubt(at_s):
+        speakers.add(frame, number, at_s, boot_s)
+        if doubt := speakers.reason(at_s):
             return doubt, at_s
     return "", at_s
 
@@ -87,8 +87,8 @@ def test_the_doubt_is_over_once_one_of_them_is_silent() -> None:
     packets = sorted([*said("one", seconds=30.0), *said("other", number=40, boot_s=7.0, at_s=3.0, seconds=5.0)])
     doubts = []
     for at_s, number, frame, boot_s in packets:
-        speakers.hear(frame, number, at_s, boot_s)
-        doubts.append((at_s, bool(speakers.doubt(at_s))))
+        speakers.add(frame, number, at_s, boot_s)
+        doubts.append((at_s, bool(speakers.reason(at_s))))
     doubted = [at_s for at_s, doubt in doubts if doubt]
     assert 3.0 < doubted[0] < 5.0
     assert 12.0 < doubted[-1] < 17.0

@@ -39,7 +39,7 @@ def hear(source: OdometrySource, kind: str, fields: Mapping[str, FieldValue], di
     """Through the wire's bytes."""
     frame = dialect.codec(system=1, component=1).pack(dialect.message(kind, fields))
     (message,) = dialect.codec(system=2, component=2).parse(frame)
-    source.hear(Received(message, CLOCK.now_s()))
+    source.on_message(Received(message, CLOCK.now_s()))
 
 
 @pytest.fixture

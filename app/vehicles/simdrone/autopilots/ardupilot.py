@@ -113,7 +113,7 @@ _FIRMWARE: Final = FirmwareProfile(
 class ArduPilot(Copter):
     """Up to 4.6. Return-to-launch only lands here: the vehicle never leaves its place."""
 
-    manners: ClassVar[FirmwareProfile] = _FIRMWARE
+    firmware: ClassVar[FirmwareProfile] = _FIRMWARE
     names: ClassVar[Mapping[str, str]] = NAMES_4_6
     scale: ClassVar[float] = 1.0
 
@@ -130,7 +130,7 @@ class ArduPilot(Copter):
         cascade.acceleration_d = gains["acceleration_d"] / self.scale
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:  # noqa: ARG002  one number suffices
-        return next((mode for mode in self.manners.modes if mode.custom_mode == main), None)
+        return next((mode for mode in self.firmware.modes if mode.custom_mode == main), None)
 
     def take_off(self, param7: float) -> int:
         """Metres above the place of takeoff; from the ground, armed and in GUIDED only."""
@@ -158,7 +158,7 @@ class ArduPilot(Copter):
     def idle_limit_s(self) -> float:
         return self.parameters["DISARM_DELAY"]
 
-    def heeds(self, message: Message) -> bool:
+    def counts_heartbeat(self, message: Message) -> bool:
         """Only its own ground station's."""
         return message.get_srcSystem() == self.parameters["SYSID_MYGCS"]
 
@@ -166,7 +166,7 @@ class ArduPilot(Copter):
 class ArduPilot47(ArduPilot):
     """From 4.7 on: other names, and acceleration gains of a tenth."""
 
-    manners: ClassVar[FirmwareProfile] = replace(
+    firmware: ClassVar[FirmwareProfile] = replace(
         _FIRMWARE, version=0x040700FF, parameters=_COMMON + _gains(NAMES_4_7, SCALE_4_7)
     )
     names: ClassVar[Mapping[str, str]] = NAMES_4_7

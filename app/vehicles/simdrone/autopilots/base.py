@@ -55,7 +55,7 @@ class Autopilot(Protocol):
         """Take in what the radio received."""
         ...
 
-    def survive(self, before: Self) -> None:
+    def restore_persistent(self, before: Self) -> None:
         """Take over what outlives a reboot from itself as it was."""
         ...
 
@@ -71,7 +71,7 @@ class Timetable:
     ticks: dict[str, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, periods_s: Mapping[str, float]) -> "Timetable":
+    def from_periods(cls, periods_s: Mapping[str, float]) -> "Timetable":
         table = cls()
         for kind, period_s in periods_s.items():
             table.set(kind, period_s)

@@ -32,7 +32,7 @@ def custom_mode(main: int, sub: int = 0) -> int:
 class Px4(Copter):
     """Return-to-launch and termination only land here: the vehicle never leaves its place."""
 
-    manners: ClassVar[FirmwareProfile] = FirmwareProfile(
+    firmware: ClassVar[FirmwareProfile] = FirmwareProfile(
         dialect=COMMON,
         autopilot=12,
         version=0x011000FF,
@@ -101,12 +101,12 @@ class Px4(Copter):
         was_armed = self.armed
         letters = super().tick()
         if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
-            self.mode = self.find_mode(self.manners.hold)
+            self.mode = self.find_mode(self.firmware.hold)
         if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING:
-            self.mode = self.find_mode(self.manners.hold)
+            self.mode = self.find_mode(self.firmware.hold)
         return letters
 
-    def unreadiness(self) -> str | None:
+    def prearm_failure(self) -> str | None:
         """Its mode counts, too."""
         return self.arming_refusal()
 
@@ -119,7 +119,7 @@ class Px4(Copter):
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:
         wanted = custom_mode(max(main, 0), max(sub, 0))
-        return next((mode for mode in self.manners.modes if mode.custom_mode == wanted), None)
+        return next((mode for mode in self.firmware.modes if mode.custom_mode == wanted), None)
 
     def take_off(self, param7: float) -> int:
         """Metres above sea level; what is no number means MIS_TAKEOFF_ALT above the place of takeoff. A disarmed

@@ -44,18 +44,18 @@ REQUEST_CAPABILITIES: Final = 520
 class Copter(ABC):
     """One autopilot from switching on; see `Autopilot`."""
 
-    manners: ClassVar[FirmwareProfile]
+    firmware: ClassVar[FirmwareProfile]
 
     def __init__(self, body: Body, cascade: Cascade, *, system: int) -> None:
-        self.dialect = self.manners.dialect
+        self.dialect = self.firmware.dialect
         self.system, self.component = system, COMPONENT
         self.refuses_arming = False
         self.ignores_parameters = False
         self.took_off = False
         self.estimate_after_s = ESTIMATE_AFTER_S
         self.armed = False
-        self.mode = self.manners.modes[0]
-        self.parameters = Parameters(self.manners.parameters)
+        self.mode = self.firmware.modes[0]
+        self.parameters = Parameters(self.firmware.parameters)
         self.flyer = AltitudeGuidance(body, cascade)
         self._body = body
         self._codec = self.dialect.codec(system=system, component=COMPONENT)
@@ -66,7 +66,7 @@ class Copter(ABC):
         self._breaches = 0
         self._listing: int | None = None
         self._texts = 0
-        self._timetable = Timetable.of(self.manners.periods_s)
+        self._timetable = Timetable.from_periods(self.firmware.periods_s)
         self._out: list[OutgoingMessage] = []
         self.tune()
 
@@ -99,13 +99,13 @@ class Copter(ABC):
     def idle_limit_s(self) -> float:
         """How long it stays armed on the ground."""
 
-    def heeds(self, _message: Message) -> bool:
+    def counts_heartbeat(self, _message: Message) -> bool:
         """Whether this ground station's heartbeat counts."""
         return True
 
-    def unreadiness(self) -> str | None:
+    def prearm_failure(self) -> str | None:
         """Why its own checks before arming do not pass, as it tells all the time; None when they do."""
-        return self.manners.no_estimate if self.refuses_arming or not self._has_estimate else None
+        return self.firmware.no_estimate if self.refuses_arming or not self._has_estimate else None
 
     @property
     def _has_estimate(self) -> bool:
@@ -137,7 +137,7 @@ class Copter(ABC):
         out, self._out = self._out, []
         return out
 
-    def survive(self, before: Self) -> None:
+    def restore_persistent(self, before: Self) -> None:
         """A reboot: parameters are stored."""
         self.parameters = before.parameters
         self.tune()
@@ -164,13 +164,13 @@ class Copter(ABC):
         return self.parameters[parameter]
 
     def find_mode(self, name: str) -> FlightMode:
-        return next(mode for mode in self.manners.modes if mode.name == name)
+        return next(mode for mode in self.firmware.modes if mode.name == name)
 
     def _arm(self, *, force: bool) -> int:
         reason = None if force and not self.refuses_arming else self.arming_refusal()
         if reason is not None:
             self.say(reason)
-            return self.manners.refused
+            return self.firmware.refused
         if not self.armed:
             self.armed, self._armed_s = True, self.boot_s
             if self.mode.behaviour is Behaviour.TAKE_OFF:
@@ -178,9 +178,9 @@ class Copter(ABC):
         return ACCEPTED
 
     def arming_refusal(self) -> str | None:
-        if reason := Copter.unreadiness(self):
+        if reason := Copter.prearm_failure(self):
             return reason
-        return None if self.mode.may_arm else self.manners.not_armable
+        return None if self.mode.may_arm else self.firmware.not_armable
 
     def _disarm(self) -> None:
         self.armed = False
@@ -198,7 +198,7 @@ class Copter(ABC):
             return
         if self.boot_s - self._ground_heard_s > limit_s:
             self._ground_heard_s = None
-            self._react(reaction, self.manners.link_lost)
+            self._react(reaction, self.firmware.link_lost)
 
     def _watch_fence(self) -> None:
         limit_m, reaction = self.fence()
@@ -207,19 +207,19 @@ class Copter(ABC):
         if is_outside and not was_outside:
             self._breaches += 1
             self.send("FENCE_STATUS")
-            self._react(reaction, self.manners.fence_breached)
+            self._react(reaction, self.firmware.fence_breached)
 
     def _tell_readiness(self) -> None:
-        reason = None if self.armed or self._ticks % _TELL_TICKS else self.unreadiness()
+        reason = None if self.armed or self._ticks % _TELL_TICKS else self.prearm_failure()
         if reason is not None:
-            self.say(self.manners.unready + reason)
+            self.say(self.firmware.unready + reason)
 
     def _react(self, reaction: Reaction, reason: str) -> None:
         self.say(reason)
         if reaction is Reaction.LAND:
-            self.enter(self.find_mode(self.manners.land))
+            self.enter(self.find_mode(self.firmware.land))
         elif reaction is Reaction.HOLD:
-            self.enter(self.find_mode(self.manners.hold))
+            self.enter(self.find_mode(self.firmware.hold))
 
     # ------------------------------------------------------------ sending
 
@@ -247,7 +247,7 @@ class Copter(ABC):
             self._out += [OutgoingMessage(kind, telemetry.REPORTS[kind].fields(now)) for kind in due]
 
     def _snapshot(self) -> telemetry.Snapshot:
-        body, manners = self._body, self.manners
+        body, manners = self._body, self.firmware
         return telemetry.Snapshot(
             boot_s=self.boot_s,
             local_m=body.altitude_m + manners.ground_m,
@@ -264,14 +264,14 @@ class Copter(ABC):
             version=manners.version,
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
-            ready=self.unreadiness() is None,
+            ready=self.prearm_failure() is None,
         )
 
     def _send_parameter(self, place: int) -> None:
         parameter, value = self.parameters.at(place)
         fields: dict[str, FieldValue] = {
             "param_id": parameter.name,
-            "param_value": self.manners.coding.encode(value, parameter.kind),
+            "param_value": self.firmware.coding.encode(value, parameter.kind),
             "param_type": int(parameter.kind),
             "param_count": len(self.parameters),
             "param_index": place,
@@ -286,7 +286,7 @@ class Copter(ABC):
     # ------------------------------------------------------------ hearing
 
     def _hear_heartbeat(self, message: Message) -> None:
-        if number(message, "type") == _GROUND_STATION and self.heeds(message):
+        if number(message, "type") == _GROUND_STATION and self.counts_heartbeat(message):
             self._ground_heard_s = self.boot_s
 
     def _hear_param_list(self, _message: Message) -> None:
@@ -305,7 +305,7 @@ class Copter(ABC):
         if place is None or self.ignores_parameters:
             return
         parameter, _ = self.parameters.at(place)
-        coding = self.manners.coding
+        coding = self.firmware.coding
         fits = not coding.is_strict or number(message, "param_type") == parameter.kind
         value = coding.decode(number(message, "param_value"), parameter.kind)
         if fits and value is not None:
@@ -316,14 +316,14 @@ class Copter(ABC):
     def _hear_set_mode(self, message: Message) -> None:
         """The older way, without an answer."""
         custom = int(number(message, "custom_mode"))
-        mode = next((mode for mode in self.manners.modes if mode.custom_mode == custom), None)
+        mode = next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
             self.enter(mode)
 
     def _hear_data_stream(self, message: Message) -> None:
         """The older way to ask for telemetry, all of it at one rate."""
         rate_hz = number(message, "req_message_rate") if number(message, "start_stop") else 0.0
-        for kind in self.manners.streams:
+        for kind in self.firmware.streams:
             self._timetable.set(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
 
     def _hear_command(self, message: Message) -> None:
@@ -332,13 +332,13 @@ class Copter(ABC):
         result = UNSUPPORTED if obey is None else obey(self, message)
         self._acknowledge(message, command, result)
 
-    def _obey_arm(self, message: Message) -> int:
+    def _handle_arm(self, message: Message) -> int:
         force = number(message, "param2") == FORCE
         if number(message, "param1") > 0.5:
             return self._arm(force=force)
         if not (self.flyer.is_landed or force):
-            self.say(self.manners.not_landed)
-            return self.manners.refused
+            self.say(self.firmware.not_landed)
+            return self.firmware.refused
         self._disarm()
         return ACCEPTED
 
@@ -354,7 +354,7 @@ class Copter(ABC):
         return self.take_off(number(message, "param7"))
 
     def _obey_land(self, _message: Message) -> int:
-        self.enter(self.find_mode(self.manners.land))
+        self.enter(self.find_mode(self.firmware.land))
         return ACCEPTED
 
     def _obey_interval(self, message: Message) -> int:
@@ -363,7 +363,7 @@ class Copter(ABC):
         if kind is None:
             return FAILED
         interval_us = number(message, "param2")
-        default_s = self.manners.periods_s.get(kind, 0.0)
+        default_s = self.firmware.periods_s.get(kind, 0.0)
         self._timetable.set(kind, default_s if interval_us == 0.0 else interval_us / 1e6)
         return ACCEPTED
 
@@ -409,7 +409,7 @@ _COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
     LAND: Copter._obey_land,
     TAKE_OFF: Copter._obey_take_off,
     SET_MODE: Copter._obey_mode,
-    ARM_DISARM: Copter._obey_arm,
+    ARM_DISARM: Copter._handle_arm,
     GET_HOME: Copter._obey_home,
     SET_INTERVAL: Copter._obey_interval,
     REQUEST_MESSAGE: Copter._obey_request,

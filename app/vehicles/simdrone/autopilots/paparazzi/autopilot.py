@@ -103,7 +103,7 @@ class Paparazzi:
         self._flies = False
         self._touched_s: float | None = None
         self._touched_m = 0.0
-        self._timetable = Timetable.of(telemetry.PERIODS_S)
+        self._timetable = Timetable.from_periods(telemetry.PERIODS_S)
         if not tuned_telemetry:
             self._timetable.set("LOCAL_POSITION_NED", telemetry.BARE_POSITION_PERIOD_S)
         self._out: list[OutgoingMessage] = []
@@ -114,7 +114,7 @@ class Paparazzi:
     def receive(self, data: bytes) -> None:
         self._radio.put(data)
 
-    def survive(self, before: Self) -> None:
+    def restore_persistent(self, before: Self) -> None:
         """Its settings are those that were compiled in."""
 
     def tick(self) -> list[OutgoingMessage]:
