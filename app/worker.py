@@ -79,10 +79,10 @@ def run_worker(settings: Settings) -> None:
     Raises AlreadyRunningError when another worker has this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
-    airspace, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, airspace=airspace)
+    abort_registry, ending = AbortRegistry(), ShutdownRequest()
+    _install_signal_handlers(signal.SIGINT, signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     try:
-        _run(settings, ending, airspace, keep_waiting=lambda: False)
+        _run(settings, ending, abort_registry, keep_waiting=lambda: False)
     except LockedError as error:
         raise AlreadyRunningError(
             f"Another Gainline worker ({error.holder or 'its process is unknown'}) already works for "
@@ -95,15 +95,15 @@ def run_worker(settings: Settings) -> None:
 def run_supervised_worker(settings: Settings) -> None:
     """The worker beside a web process: it stands by while an older worker ends, and does not outlive its parent by
     more than the flights under way."""
-    airspace, ending = AbortRegistry(), ShutdownRequest()
-    _install_signal_handlers(signal.SIGTERM, ending=ending, airspace=airspace)
+    abort_registry, ending = AbortRegistry(), ShutdownRequest()
+    _install_signal_handlers(signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     threading.Thread(target=_shut_down_with_parent, args=(ending,), daemon=True).start()
     with suppress(LockedError):  # asked to end while it stood by
-        _run(settings, ending, airspace, keep_waiting=lambda: not ending.event.is_set())
+        _run(settings, ending, abort_registry, keep_waiting=lambda: not ending.event.is_set())
 
 
 def _run(
-    settings: Settings, ending: ShutdownRequest, airspace: AbortRegistry, *, keep_waiting: Callable[[], bool]
+    settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, *, keep_waiting: Callable[[], bool]
 ) -> None:
     prepare_data_dir(settings.data_dir)
     narrowed = make_private(settings.data_dir)
@@ -113,10 +113,10 @@ def _run(
     sys.setswitchinterval(SWITCH_EVERY_S)
     with exclusive(settings.data_dir / "worker.lock", keep_waiting=keep_waiting):
         require_current(settings.database_file)
-        Worker(settings, ending, airspace).work()
+        Worker(settings, ending, abort_registry).work()
 
 
-def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, airspace: AbortRegistry) -> None:
+def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, abort_registry: AbortRegistry) -> None:
     """The handler takes no lock: the thread that it interrupts may hold any. Whoever does is a thread of its own."""
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()
 
@@ -127,7 +127,7 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
         while True:
             reason = asked.get()
             ending.set(reason)
-            airspace.abort_all(reason)
+            abort_registry.abort_all(reason)
 
     threading.Thread(target=heed, name="signals", daemon=True).start()
     for number in signals:
@@ -144,12 +144,12 @@ class Worker:
     """Everything that runs while the worker holds its lock."""
 
     def __init__(
-        self, settings: Settings, ending: ShutdownRequest, airspace: AbortRegistry, clock: Clock = REAL_TIME
+        self, settings: Settings, ending: ShutdownRequest, abort_registry: AbortRegistry, clock: Clock = REAL_TIME
     ) -> None:
         self._settings = settings
         self._clock = clock
         self._ending = ending
-        self._airspace = airspace
+        self._abort_registry = abort_registry
         self._name = f"{platform.node()}:{os.getpid()}"
 
     def work(self) -> None:
@@ -157,9 +157,9 @@ class Worker:
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
-            sessions, deck, live = self._build_runners(database)
-            stack.callback(deck.close)
-            self._until_stored(deck.recover)
+            sessions, flight_runner, live = self._build_runners(database)
+            stack.callback(flight_runner.close)
+            self._until_stored(flight_runner.recover)
             self._until_stored(sessions.recover)
             stack.enter_context(live)  # from here on flights can be asked for, which recovery would withdraw
             acting = stack.enter_context(ThreadPoolExecutor(ACTS_AT_ONCE, thread_name_prefix="act"))
@@ -167,17 +167,17 @@ class Worker:
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE
             computing = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="job"))
             pool = stack.enter_context(ComputePool(SPARE_PROCESSORS, prepare=warm_up))
-            surveying = stack.enter_context(
+            landscape_pool = stack.enter_context(
                 ComputePool(LANDSCAPES_AT_ONCE, prepare=warm_up, niceness=LANDSCAPE_NICENESS)
             )
-            desks = self._build_job_runners(database, pool, surveying)
+            job_runners = self._build_job_runners(database, pool, landscape_pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self._ending.set, "the worker failed; its log says why")
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid)
             _log.info("worker ready", worker=self._name)
-            self._loop(database, lambda: self._claim(deck, flying, sessions, acting, desks, computing))
-            _log.info("worker ends", why=self._ending.reason, flying=self._airspace.trial_ids())
+            self._loop(database, lambda: self._claim(flight_runner, flying, sessions, acting, job_runners, computing))
+            _log.info("worker ends", why=self._ending.reason, flying=self._abort_registry.trial_ids())
 
     def _build_runners(self, database: Database) -> tuple[VehicleConnectionManager, FlightRunner, LiveServer]:
         def publish(message: PublishedMessage) -> None:
@@ -187,28 +187,30 @@ class Worker:
         sessions = VehicleConnectionManager(
             database,
             data_dir,
-            self._airspace,
+            self._abort_registry,
             publish,
             worker=self._name,
             closing=closing,
             links=is_loopback(self._settings.host),
             clock=self._clock,
         )
-        live = LiveServer(live_address(data_dir), abort=self._airspace.abort, order=sessions.order, hello=self._hello)
-        deck = FlightRunner(
+        live = LiveServer(
+            live_address(data_dir), abort=self._abort_registry.abort, order=sessions.order, hello=self._hello
+        )
+        flight_runner = FlightRunner(
             database,
             data_dir,
-            self._airspace,
+            self._abort_registry,
             publish,
             worker=self._name,
             closing=closing,
             session=sessions.session,
             clock=self._clock,
         )
-        return sessions, deck, live
+        return sessions, flight_runner, live
 
     def _build_job_runners(
-        self, database: Database, pool: ComputePool, surveying: ComputePool
+        self, database: Database, pool: ComputePool, landscape_pool: ComputePool
     ) -> tuple[JobRunner, ...]:
         proposer = ProposalJob(database, pool, worker=self._name)
         reproducer = ReproductionJob(
@@ -217,7 +219,7 @@ class Worker:
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
-            (LANDSCAPE_JOB, LandscapeJob(database, surveying, worker=self._name), LANDSCAPES_AT_ONCE),
+            (LANDSCAPE_JOB, LandscapeJob(database, landscape_pool, worker=self._name), LANDSCAPES_AT_ONCE),
         )
         return tuple(
             JobRunner(
@@ -244,22 +246,22 @@ class Worker:
 
     def _claim(
         self,
-        deck: FlightRunner,
+        flight_runner: FlightRunner,
         flying: Executor,
         sessions: VehicleConnectionManager,
         acting: Executor,
-        desks: Sequence[JobRunner],
+        job_runners: Sequence[JobRunner],
         computing: Executor,
     ) -> None:
-        while len(self._airspace.trial_ids()) < FLIGHTS_AT_ONCE and (task := deck.claim()) is not None:
-            flying.submit(deck.carry_out, task)
+        while len(self._abort_registry.trial_ids()) < FLIGHTS_AT_ONCE and (task := flight_runner.claim()) is not None:
+            flying.submit(flight_runner.carry_out, task)
         while (act := sessions.claim()) is not None:
             acting.submit(sessions.carry_out, act)
         sessions.maintain()
-        for desk in desks:
-            while (job := desk.claim()) is not None:
-                computing.submit(desk.carry_out, job)
-            desk.heartbeat()
+        for runner in job_runners:
+            while (job := runner.claim()) is not None:
+                computing.submit(runner.carry_out, job)
+            runner.heartbeat()
 
     def _until_stored(self, work: Callable[[], None]) -> None:
         while not self._ending.event.is_set():
@@ -272,4 +274,4 @@ class Worker:
                 return
 
     def _hello(self) -> WorkerHello:
-        return WorkerHello(pid=os.getpid(), version=__version__, flying=self._airspace.trial_ids())
+        return WorkerHello(pid=os.getpid(), version=__version__, flying=self._abort_registry.trial_ids())

@@ -2,10 +2,11 @@
 
     ./dev exec python -m bench.proposal
 
-A real database, simulated flights stored as a worker stores them, and the job carried out by the worker's own desk: the
-history is read and unpacked, sent to a process of the pool, the proposal computed there, judged and stored. Times every
-proposal of a campaign of seven flights, for each start and option, the pool warm as it is in a running worker, and once
-from a cold start of everything. Prints the best of three rounds of each and exits 1 when one is above a second.
+A real database, simulated flights stored as a worker stores them, and the job carried out by the worker's own job
+runner: the history is read and unpacked, sent to a process of the pool, the proposal computed there, judged and
+stored. Times every proposal of a campaign of seven flights, for each start and option, the pool warm as it is in a
+running worker, and once from a cold start of everything. Prints the best of three rounds of each and exits 1 when one
+is above a second.
 """
 
 import sys
@@ -43,12 +44,12 @@ CASES: Final[dict[str, dict[str, object]]] = {
 }
 
 
-def propose(desk: JobRunner) -> float:
+def propose(runner: JobRunner) -> float:
     """Carry out the waiting job; from its claim to the stored row, s."""
     start = time.perf_counter()
-    job = desk.claim()
+    job = runner.claim()
     assert job is not None
-    desk.carry_out(job)
+    runner.carry_out(job)
     return time.perf_counter() - start
 
 
@@ -71,16 +72,16 @@ def fly(database: Database, campaign_id: int) -> bool:
     return True
 
 
-def one_campaign(database: Database, desk: JobRunner, fields: dict[str, object]) -> list[float]:
+def one_campaign(database: Database, runner: JobRunner, fields: dict[str, object]) -> list[float]:
     """The time of each proposal of a campaign, s."""
     definition = Definition.model_validate({"stop": StopRule(kind="budget", max_flights=FLIGHTS), **fields})
     with database.write() as session:
         created = campaigns.create_campaign(
             session, NewCampaign(name="bench", vehicle=VehicleChoice(kind="jsbsim"), definition=definition)
         )
-    times = [propose(desk)]
+    times = [propose(runner)]
     while fly(database, created.id):
-        times.append(propose(desk))
+        times.append(propose(runner))
     return times
 
 
@@ -91,16 +92,16 @@ def main() -> int:
         database = Database(file)
         cold = time.perf_counter()
         with ComputePool(1, prepare=warm_up) as pool:
-            desk = JobRunner(
+            runner = JobRunner(
                 database, PROPOSAL_JOB, ProposalJob(database, pool, worker=WORKER), room=1, worker=WORKER, lease_s=30.0
             )
-            first = one_campaign(database, desk, {"stop": StopRule(kind="budget", max_flights=1)})
+            first = one_campaign(database, runner, {"stop": StopRule(kind="budget", max_flights=1)})
             print(
                 f"cold, the start of the process included: {time.perf_counter() - cold:.2f} s ({first[0]:.2f} s first)"
             )
             slowest = 0.0
             for name, fields in CASES.items():
-                rounds = [one_campaign(database, desk, fields) for _ in range(ROUNDS)]
+                rounds = [one_campaign(database, runner, fields) for _ in range(ROUNDS)]
                 times = [min(each) for each in zip(*rounds, strict=True)]
                 slowest = max(slowest, *times)
                 print(f"{name:32}", " ".join(f"{each * 1e3:4.0f}" for each in times), "ms")

@@ -18,7 +18,7 @@ from app.fleet.service import get_vehicle
 from app.trials import history
 
 
-def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: RequestContext) -> Vehicle:
+def promote_best(session: Session, campaign_id: int, asked: Promotion, context: RequestContext) -> Vehicle:
     """The vehicle with its new safe gains; the act that records it names the flights.
 
     Raises ConflictError while the best gains are not shown to be better than the first ones, and when the vehicle is
@@ -34,7 +34,7 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, asker: Re
             row, f"whether {format_gains(now.winner.gains)} is better than its first gains is {said.verdict}"
         )
     gains = dict(now.winner.gains)
-    promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), asker=asker)
+    promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), context=context)
     safe_gains_changed(session, row.vehicle_id)
     session.flush()
     return get_vehicle(session, row.vehicle_id)

@@ -21,7 +21,7 @@ _log = structlog.get_logger(__name__)
 
 
 class ProposalJob:
-    """What a desk for proposal jobs performs."""
+    """What the runner of proposal jobs carries out."""
 
     def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
         self._database = database
@@ -44,7 +44,7 @@ class ProposalJob:
 
 
 class LandscapeJob:
-    """What a desk for landscape jobs performs."""
+    """What the runner of landscape jobs carries out."""
 
     def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
         self._database = database

@@ -72,7 +72,7 @@ class ActTask:
     vehicle: LinkedVehicle
 
 
-def request_act(session: Session, vehicle_id: int, kind: ActKind, asker: RequestContext) -> VehicleAct:
+def request_act(session: Session, vehicle_id: int, kind: ActKind, context: RequestContext) -> VehicleAct:
     """What a person asks. Raises ConflictError in states in which it is not possible or while somebody else is in
     control, BusyError while something else is under way, NotAllowedError for who may not command it."""
     row = repository.get_one(session, vehicle_id)
@@ -80,23 +80,23 @@ def request_act(session: Session, vehicle_id: int, kind: ActKind, asker: Request
         raise ConflictError(
             f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, in one go."
         )
-    return act_view(_requested(session, row, kind, asker))
+    return act_view(_requested(session, row, kind, context))
 
 
-def require_may_stop_motors(session: Session, vehicle_id: int, asker: RequestContext) -> None:
+def require_may_stop_motors(session: Session, vehicle_id: int, context: RequestContext) -> None:
     """Raises NotAllowedError for who may not command a real vehicle, NotFoundError."""
-    require_may(Permission.STOP, repository.get_one(session, vehicle_id), asker)
+    require_may(Permission.STOP, repository.get_one(session, vehicle_id), context)
 
 
-def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: RequestContext) -> Vehicle:
+def release_vehicle(session: Session, vehicle_id: int, statement: str, context: RequestContext) -> Vehicle:
     """Out of quarantine, on a person's word; a registered vehicle once the worker has seen it disarmed and holding its
     safe gains. Raises as `request_act` does."""
     row = repository.get_one(session, vehicle_id)
     if row.registered:
-        _requested(session, row, ActKind.RELEASE, asker, reason=statement)
+        _requested(session, row, ActKind.RELEASE, context, reason=statement)
         return vehicle_view(row)
     check_action(ACTIONS, "release", row.state, row.name)
-    by = require_not_controlled_by_other(row, asker)
+    by = require_not_controlled_by_other(row, context)
     record_act(session, row, ActKind.RELEASE, by=by, reason=statement)
     record_released(session, row.id)
     session.flush()
@@ -104,16 +104,16 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, asker: Re
 
 
 def _requested(
-    session: Session, row: VehicleRow, kind: ActKind, asker: RequestContext, *, reason: str = ""
+    session: Session, row: VehicleRow, kind: ActKind, context: RequestContext, *, reason: str = ""
 ) -> VehicleActRow:
     check_action(ACTIONS, kind, row.state, row.name)
     if kind == ActKind.DISCONNECT:
-        require_may(Permission.STOP, row, asker)
+        require_may(Permission.STOP, row, context)
         if not is_linked_or_wanted(row):
             raise ConflictError(f"{row.name} is neither connected nor looked for.", hint="Connect it, if it is wanted.")
     else:
-        require_may_command(row, asker)
-    by = "" if kind in _READ_ONLY_ACTS else require_not_controlled_by_other(row, asker)
+        require_may_command(row, context)
+    by = "" if kind in _READ_ONLY_ACTS else require_not_controlled_by_other(row, context)
     require_idle(session, row)
     if kind in {ActKind.CONNECT, ActKind.DISCONNECT}:
         row.wanted_connected = kind == ActKind.CONNECT

@@ -47,14 +47,14 @@ def control_of(row: VehicleRow) -> Control | None:
     return Control(operator=row.operator, until=row.operator_until)
 
 
-def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, asker: RequestContext) -> Lease:
+def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, context: RequestContext) -> Lease:
     """A new lease, or the same one renewed by its token; with `take_over` also somebody else's, which an act records.
 
     Raises ConflictError naming who is in control, or saying that the token's lease is no longer there; NotAllowedError
     for who may not command the vehicle.
     """
     row = repository.get_one(session, vehicle_id)
-    require_may_command(row, asker)
+    require_may_command(row, context)
     if asked.token is not None and holds(row, asked.token):
         return _granted(session, row, asked.operator, asked.token)
     held = control_of(row)
@@ -87,11 +87,11 @@ def holds(row: VehicleRow, token: str) -> bool:
     return row.operator_token_hash is not None and hmac.compare_digest(row.operator_token_hash, _digest(token))
 
 
-def require_not_controlled_by_other(row: VehicleRow, asker: RequestContext) -> str:
+def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) -> str:
     """The operator who asks, empty when nobody is in control. Raises ConflictError when somebody else is."""
     if (held := control_of(row)) is None:
         return ""
-    if asker.token is None or not holds(row, asker.token):
+    if context.token is None or not holds(row, context.token):
         raise ConflictError(
             f"{held.operator} is in control of {row.name}.",
             hint="Ask them to do it or to hand over control; abort, land and motors off are open to everybody.",
@@ -99,31 +99,31 @@ def require_not_controlled_by_other(row: VehicleRow, asker: RequestContext) -> s
     return held.operator
 
 
-def require_control(row: VehicleRow, asker: RequestContext) -> str:
+def require_control(row: VehicleRow, context: RequestContext) -> str:
     """The operator in control, who asks from a page of ours in an unlocked browser on this computer: the only one who
     may have a real vehicle take off. Raises NotAllowedError or ConflictError otherwise."""
-    require(Permission.TAKE_OFF, asker.caller, row.name)
-    if not asker.from_our_page:
+    require(Permission.TAKE_OFF, context.caller, row.name)
+    if not context.from_our_page:
         raise NotAllowedError(
             f"{row.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
             hint="A script can propose gains and stage the flight; the operator then holds the button on the fly page.",
         )
-    operator = require_not_controlled_by_other(row, asker)
+    operator = require_not_controlled_by_other(row, context)
     if not operator:
         raise ConflictError(f"Nobody is in control of {row.name}.", hint="Take control on the fly page first.")
     return operator
 
 
-def require_may_command(row: VehicleRow, asker: RequestContext) -> None:
+def require_may_command(row: VehicleRow, context: RequestContext) -> None:
     """Raises NotAllowedError for who may not command a vehicle that has a link; simulations without one are for all."""
     if row.registered:
-        require(Permission.REAL if row.is_real else Permission.LINK, asker.caller, row.name)
+        require(Permission.REAL if row.is_real else Permission.LINK, context.caller, row.name)
 
 
-def require_may(act: Permission, row: VehicleRow, asker: RequestContext) -> None:
+def require_may(act: Permission, row: VehicleRow, context: RequestContext) -> None:
     """Raises NotAllowedError for who may not do this with a real vehicle that has a link; any other is for all."""
     if row.registered and row.is_real:
-        require(act, asker.caller, row.name)
+        require(act, context.caller, row.name)
 
 
 def record_act(

@@ -22,7 +22,7 @@ from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 
-def register_vehicle(session: Session, new: NewVehicle, asker: RequestContext) -> Vehicle:
+def register_vehicle(session: Session, new: NewVehicle, context: RequestContext) -> Vehicle:
     """A vehicle of its own, not connected yet.
 
     Raises InputError naming what cannot be used, ConflictError when the name is taken, UnconfirmedError when nobody has
@@ -35,14 +35,14 @@ def register_vehicle(session: Session, new: NewVehicle, asker: RequestContext) -
             hint=f"Create a campaign with the vehicle {kind.name}.",
             problems=(Problem("kind", "has no vehicles of its own"),),
         )
-    require(Permission.LINK, asker.caller, new.name)
-    options = kind.check(new.options, field="options", simulation_hosts=asker.simulation_hosts)
-    is_real = kind.is_real_with(options, asker.simulation_hosts)
+    require(Permission.LINK, context.caller, new.name)
+    options = kind.check(new.options, field="options", simulation_hosts=context.simulation_hosts)
+    is_real = kind.is_real_with(options, context.simulation_hosts)
     space = _space(kind, options, new.safe_gains)
     gains = space.check(new.safe_gains, field="safe_gains") if new.safe_gains else space.mapping(space.default)
     _require_free(session, new.name)
     if is_real:
-        require(Permission.REAL, asker.caller, new.name)
+        require(Permission.REAL, context.caller, new.name)
         _require_confirmed(new, gains)
     row = VehicleRow(
         kind=kind.name,
@@ -60,18 +60,18 @@ def register_vehicle(session: Session, new: NewVehicle, asker: RequestContext) -
     return vehicle_view(row)
 
 
-def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: RequestContext) -> Vehicle:
+def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: RequestContext) -> Vehicle:
     """Raises ConflictError when somebody else was faster or is in control, or the vehicle is not at rest; InputError
     naming what cannot be used, NotAllowedError for who may not command the vehicle."""
     row = repository.get_one(session, vehicle_id)
     check_version(edit.version, row.version, row.name, _differences(row, edit))
     _require_own(row)
-    require_may_command(row, asker)
+    require_may_command(row, context)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
-    by = require_not_controlled_by_other(row, asker)
+    by = require_not_controlled_by_other(row, context)
     if edit.options is not None:
-        _set_options(row, edit.options, asker)
+        _set_options(row, edit.options, context)
     if edit.safe_gains is not None:
         _set_safe_gains(session, row, edit.safe_gains, statement=edit.statement, by=by)
     if edit.name is not None and edit.name != row.name:
@@ -86,15 +86,15 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, asker: Re
 
 
 def promote_gains(
-    session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, asker: RequestContext
+    session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, context: RequestContext
 ) -> None:
     """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
     check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
     _require_own(row)
-    require_may_command(row, asker)
+    require_may_command(row, context)
     check_action(ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
-    _set_safe_gains(session, row, gains, statement=reason, by=require_not_controlled_by_other(row, asker))
+    _set_safe_gains(session, row, gains, statement=reason, by=require_not_controlled_by_other(row, context))
     row.version += 1
 
 
@@ -110,9 +110,9 @@ def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, 
     return {field: (getattr(row, field), value) for field, value in sent.items()}
 
 
-def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: RequestContext) -> None:
+def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: RequestContext) -> None:
     kind = VEHICLE_KINDS[row.kind]
-    options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=asker.simulation_hosts)
+    options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=context.simulation_hosts)
     if options == settings_of(row):
         return
     if row.state != VehicleState.DISCONNECTED:
@@ -120,7 +120,7 @@ def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], asker: Reque
             f"{row.name} is connected; its link's settings cannot change under it.",
             hint="Disconnect it, change them, and connect it again.",
         )
-    if kind.is_real_with(options, asker.simulation_hosts) != row.is_real:
+    if kind.is_real_with(options, context.simulation_hosts) != row.is_real:
         raise InputError(
             f"{row.name} is {'REAL' if row.is_real else 'simulated'} and stays so: that tells its flights apart.",
             hint="Register the other one as a vehicle of its own.",

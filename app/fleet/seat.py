@@ -98,11 +98,11 @@ def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
     line = WorkerPipe(pipe)
     try:
         with hold_vehicle_lock(call.lock, within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock):
-            seat = VehicleProcess(line, call)
+            process = VehicleProcess(line, call)
             try:
-                seat.run()
+                process.run()
             finally:
-                seat.close()
+                process.close()
     except PipeClosedError:
         pass
     except GainlineError as error:

@@ -111,14 +111,14 @@ MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 
 
 class VehicleConnection:
-    """The worker's handle of such a process: a Crew for flights, and a link to the vehicle in between.
+    """The worker's handle of such a process: a FlightBackend for flights, and a link to the vehicle in between.
 
     `hear` is told, on a thread of the session's own, how the vehicle is and what became of orders. One conversation at
     a time: a flight or an act; orders may come at any moment, from any thread.
     """
 
     def __init__(
-        self, call: ConnectionRequest, seat: Callable[[Connection, ConnectionRequest], None], *, hear: MessageHandler
+        self, call: ConnectionRequest, run: Callable[[Connection, ConnectionRequest], None], *, hear: MessageHandler
     ) -> None:
         self.call: Final = call
         self._hear_of = hear
@@ -126,7 +126,7 @@ class VehicleConnection:
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
         self._said: queue.SimpleQueue[FromVehicleProcess | None] = queue.SimpleQueue()
-        self._process = context.Process(target=seat, args=(theirs, call), name=f"session {call.name}", daemon=True)
+        self._process = context.Process(target=run, args=(theirs, call), name=f"session {call.name}", daemon=True)
         self._process.start()
         theirs.close()
         self._ended = threading.Event()
@@ -163,7 +163,7 @@ class VehicleConnection:
         return said
 
     def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        """As `Crew.fly` says."""
+        """As `FlightBackend.fly` says."""
         self.trial_id = orders.trial_id
         try:
             self._post(orders)

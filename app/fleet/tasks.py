@@ -65,7 +65,7 @@ class VehicleConnectionManager:
         self,
         database: Database,
         data_dir: Path,
-        airspace: AbortRegistry,
+        abort_registry: AbortRegistry,
         publish: Publish,
         *,
         worker: str,
@@ -75,13 +75,13 @@ class VehicleConnectionManager:
     ) -> None:
         self._database = database
         self._data_dir = data_dir
-        self._airspace = airspace
+        self._abort_registry = abort_registry
         self._publish = publish
         self._worker = worker
         self._closing = closing
         self._links = links
         self._clock = clock
-        self._berths: dict[int, VehicleSlot] = {}
+        self._slots: dict[int, VehicleSlot] = {}
         self._look_due_s = 0.0
         self._reconnect_executor = ThreadPoolExecutor(MAX_CONCURRENT, thread_name_prefix="link")
         self._record_executor = ThreadPoolExecutor(1, thread_name_prefix="books")
@@ -96,11 +96,11 @@ class VehicleConnectionManager:
 
     def close(self) -> None:
         """When nothing is carried out any more: every vehicle is let go, with its safe gains."""
-        berths = tuple(self._berths.values())
-        for session in [each for berth in berths for each in (berth.session, berth.reconnecting) if each is not None]:
+        slots = tuple(self._slots.values())
+        for session in [each for slot in slots for each in (slot.session, slot.reconnecting) if each is not None]:
             session.request_close()
         self._reconnect_executor.shutdown()
-        for session in [berth.session for berth in berths if berth.session is not None]:
+        for session in [slot.session for slot in slots if slot.session is not None]:
             session.close()
         self._record_executor.shutdown()
 
@@ -108,18 +108,18 @@ class VehicleConnectionManager:
 
     def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
         """Whether the vehicle's session was told. A flight that waits for its take-off stands down by it too."""
-        berth = self._berths.get(vehicle_id)
-        if berth is None or (session := berth.live) is None:
+        slot = self._slots.get(vehicle_id)
+        if slot is None or (session := slot.live) is None:
             return False
         told = session.send_command(order, reason, by_s)
         if (trial_id := session.trial_id) is not None:
-            self._airspace.abort(trial_id, reason)
+            self._abort_registry.abort(trial_id, reason)
         return told
 
     def session(self, vehicle_id: int) -> VehicleConnection:
         """For a flight. Raises VehicleError when there is no link."""
-        berth = self._berths.get(vehicle_id)
-        if berth is None or (session := berth.live) is None:
+        slot = self._slots.get(vehicle_id)
+        if slot is None or (session := slot.live) is None:
             raise _no_link_error()
         return session
 
@@ -140,13 +140,13 @@ class VehicleConnectionManager:
                 self._fail(task, f"The program made a mistake ({type(error).__name__}); see the worker's log.")
 
     def _connect(self, task: ActTask) -> None:
-        berth = self._berth(task.vehicle.vehicle_id)
+        slot = self._slot(task.vehicle.vehicle_id)
         try:
-            self._acquire_slot(berth)
+            self._acquire_slot(slot)
             try:
-                said = self._open_connection(berth, task.vehicle)
+                said = self._open_connection(slot, task.vehicle)
             finally:
-                berth.busy.release()
+                slot.busy.release()
         except GainlineError as error:
             concern = str(error) if isinstance(error, SafeGainsError) else ""
             self._fail(
@@ -161,22 +161,22 @@ class VehicleConnectionManager:
 
     def _close(self, vehicle_id: int, *, only: VehicleConnection | None = None) -> None:
         """The vehicle's session, whichever it is or `only` that one."""
-        berth = self._berth(vehicle_id)
-        self._acquire_slot(berth)
+        slot = self._slot(vehicle_id)
+        self._acquire_slot(slot)
         try:
-            if only is not None and berth.session is not only:
+            if only is not None and slot.session is not only:
                 return
-            session, berth.session = berth.session, None
+            session, slot.session = slot.session, None
             if session is not None:
                 session.close()
         finally:
-            berth.busy.release()
+            slot.busy.release()
         self._publish_state(vehicle_id, "gone")
 
-    def _acquire_slot(self, berth: VehicleSlot) -> None:
-        """The berth for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
-        while not berth.busy.acquire(timeout=self._clock.wall_s(YIELD_POLL_S)):
-            if (seeking := berth.reconnecting) is not None:
+    def _acquire_slot(self, slot: VehicleSlot) -> None:
+        """The slot for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
+        while not slot.busy.acquire(timeout=self._clock.wall_s(YIELD_POLL_S)):
+            if (seeking := slot.reconnecting) is not None:
                 seeking.request_close()
 
     def _ask(self, task: ActTask) -> None:
@@ -185,7 +185,7 @@ class VehicleConnectionManager:
         except VehicleError as error:
             self._fail(task, str(error))
             return
-        self._berth(task.vehicle.vehicle_id).concern = answered.concern
+        self._slot(task.vehicle.vehicle_id).concern = answered.concern
         self._store_with_retry(partial(_answered, task=task, answered=answered))
 
     def _fail(self, task: ActTask, problem: str, *, also: Callable[[Transaction], None] = lambda _: None) -> None:
@@ -202,9 +202,9 @@ class VehicleConnectionManager:
     def maintain(self) -> None:
         """To be called every second or so: sessions that ended by themselves are taken out of the books, and vehicles
         that are wanted connected are looked for. Raises StorageError."""
-        for vehicle_id, berth in tuple(self._berths.items()):
-            if (session := berth.session) is not None and not session.alive:
-                self._release_ended(vehicle_id, berth, session)
+        for vehicle_id, slot in tuple(self._slots.items()):
+            if (session := slot.session) is not None and not session.alive:
+                self._release_ended(vehicle_id, slot, session)
         if not self._links or self._clock.now_s() < self._look_due_s:
             return
         self._look_due_s = self._clock.now_s() + RECONNECT_INTERVAL_S
@@ -213,35 +213,35 @@ class VehicleConnectionManager:
         for vehicle in wanted:
             self._schedule_reconnect(vehicle)
 
-    def _release_ended(self, vehicle_id: int, berth: VehicleSlot, gone: VehicleConnection) -> None:
+    def _release_ended(self, vehicle_id: int, slot: VehicleSlot, gone: VehicleConnection) -> None:
         try:
             with self._database.write() as transaction:
                 acts.record_disconnected(transaction, vehicle_id)
         except ConflictError:
             return  # its flight is still in the books; later
         _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
-        if berth.session is gone:  # and not one that was opened meanwhile
-            berth.session = None
+        if slot.session is gone:  # and not one that was opened meanwhile
+            slot.session = None
         self._publish_state(vehicle_id, "gone")
 
     def _schedule_reconnect(self, vehicle: LinkedVehicle) -> None:
-        berth = self._berth(vehicle.vehicle_id)
-        seeking = berth.reconnecting
+        slot = self._slot(vehicle.vehicle_id)
+        seeking = slot.reconnecting
         if seeking is not None and seeking.call.options != vehicle.options:
             seeking.request_close()
-        if berth.session is None and seeking is None and berth.busy.acquire(blocking=False):
-            self._reconnect_executor.submit(self._reconnect, berth, vehicle)
+        if slot.session is None and seeking is None and slot.busy.acquire(blocking=False):
+            self._reconnect_executor.submit(self._reconnect, slot, vehicle)
 
-    def _reconnect(self, berth: VehicleSlot, vehicle: LinkedVehicle) -> None:
+    def _reconnect(self, slot: VehicleSlot, vehicle: LinkedVehicle) -> None:
         """With `busy` held. Raises nothing that matters: who is wanted is looked for again."""
         try:
-            said = self._open_connection(berth, vehicle, patient=True)
-            found = berth.session
+            said = self._open_connection(slot, vehicle, patient=True)
+            found = slot.session
         except GainlineError as error:
             _log.info("not connected", vehicle_id=vehicle.vehicle_id, why=str(error))
             return
         finally:
-            berth.busy.release()
+            slot.busy.release()
         kept = self._store_with_retry(
             lambda t: acts.record_reconnected(
                 t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held
@@ -250,13 +250,11 @@ class VehicleConnectionManager:
         if kept is False:
             self._close(vehicle.vehicle_id, only=found)
 
-    def _open_connection(
-        self, berth: VehicleSlot, vehicle: LinkedVehicle, *, patient: bool = False
-    ) -> ConnectionOpened:
+    def _open_connection(self, slot: VehicleSlot, vehicle: LinkedVehicle, *, patient: bool = False) -> ConnectionOpened:
         """With `busy` held. Raises VehicleError when there is no link in the end."""
         vehicle_id = vehicle.vehicle_id
-        if berth.session is not None:
-            berth.session.close()
+        if slot.session is not None:
+            slot.session.close()
         self._publish_state(vehicle_id, "connecting")
         call = ConnectionRequest(
             vehicle_id=vehicle_id,
@@ -270,8 +268,8 @@ class VehicleConnectionManager:
             keep_retrying=patient,
             clock=self._clock,
         )
-        session = berth.reconnecting = VehicleConnection(
-            call, run_vehicle_process, hear=partial(self._on_message, berth, vehicle_id)
+        session = slot.reconnecting = VehicleConnection(
+            call, run_vehicle_process, hear=partial(self._on_message, slot, vehicle_id)
         )
         try:
             if self._closing.is_set():
@@ -282,24 +280,24 @@ class VehicleConnectionManager:
             self._publish_state(vehicle_id, "gone")
             raise
         finally:
-            berth.reconnecting = None
-        berth.concern, berth.session = said.concern, session
+            slot.reconnecting = None
+        slot.concern, slot.session = said.concern, session
         _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(said.identity), concern=said.concern)
         return said
 
-    def _berth(self, vehicle_id: int) -> VehicleSlot:
-        return self._berths.setdefault(vehicle_id, VehicleSlot())
+    def _slot(self, vehicle_id: int) -> VehicleSlot:
+        return self._slots.setdefault(vehicle_id, VehicleSlot())
 
     # ---- what sessions say by themselves
 
-    def _on_message(self, berth: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
+    def _on_message(self, slot: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
         """On the session's own thread."""
         match news:
             case VehicleStatus(concern=concern):
                 self._publish(news)
-                if concern and not berth.concern:
+                if concern and not slot.concern:
                     self._record_in_background(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
-                berth.concern = concern
+                slot.concern = concern
             case CommandForwarded(order, reason, problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
                 self._record_in_background(lambda t: acts.record_command(t, vehicle_id, kind, reason, problem=problem))

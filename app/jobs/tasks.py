@@ -1,4 +1,4 @@
-"""A worker's desk: it claims jobs of its kind and carries them out, whatever they are."""
+"""The runner of jobs: it claims those of its kind and carries them out, whatever they are."""
 
 from collections.abc import Callable
 from concurrent.futures import CancelledError
@@ -69,7 +69,7 @@ class JobRunner:
         return len(self._at_work)
 
     def claim(self) -> ClaimedJob | None:
-        """The job that has waited longest, now this worker's; None when none waits or the desk is full. Raises
+        """The job that has waited longest, now this worker's; None when none waits or the runner is full. Raises
         StorageError."""
         if self.running_count >= self._room:
             return None

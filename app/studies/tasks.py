@@ -22,7 +22,8 @@ _log = structlog.get_logger(__name__)
 
 
 class ReproductionJob:
-    """What a desk for reproductions performs. `closing` ends what is under way; it runs again with the next worker."""
+    """What the runner of reproductions carries out. `closing` ends what is under way; it runs again with the next
+    worker."""
 
     def __init__(self, database: Database, *, worker: str, lease_s: float, closing: threading.Event) -> None:
         self._database = database

@@ -48,7 +48,7 @@ class FlightProcess:
         context = process_context()
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
-        self._process = context.Process(target=_work, args=(theirs,), name="cockpit", daemon=True)
+        self._process = context.Process(target=_work, args=(theirs,), name="flight", daemon=True)
         self._process.start()
         theirs.close()
 
@@ -96,7 +96,7 @@ class FlightProcess:
 
 
 class FlightProcessPool:
-    """Cockpits in waiting, so that a flight finds one with everything loaded. Thread-safe."""
+    """Idle flight processes, so that a flight finds one with everything loaded. Thread-safe."""
 
     def __init__(self, *, spare: int = 1) -> None:
         self._spare = spare
@@ -107,19 +107,19 @@ class FlightProcessPool:
         with self._lock:
             return self._waiting.pop() if self._waiting else FlightProcess()
 
-    def release(self, cockpit: FlightProcess) -> None:
+    def release(self, process: FlightProcess) -> None:
         """One that is free again; of too many, one is closed."""
         with self._lock:
             if len(self._waiting) < self._spare:
-                self._waiting.append(cockpit)
+                self._waiting.append(process)
                 return
-        cockpit.close()
+        process.close()
 
     def close(self) -> None:
         with self._lock:
             waiting, self._waiting = self._waiting, []
-        for cockpit in waiting:
-            cockpit.close()
+        for process in waiting:
+            process.close()
 
 
 def _work(pipe: Connection) -> None:

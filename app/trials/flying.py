@@ -43,7 +43,7 @@ class AbortRegistry:
         self._closed: str | None = None
 
     def register(self, trial_id: int) -> AbortFlag:
-        """The trial's flag; it is up already in a closed airspace."""
+        """The trial's flag; it is set already in a closed registry."""
         flag = self._flags.setdefault(trial_id, AbortFlag())
         if self._closed is not None:
             flag.set(self._closed)

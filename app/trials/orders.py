@@ -32,25 +32,25 @@ def warm_gate_cache(session: Session, trial_id: int) -> None:
         check_own_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
 
 
-def fly_trial(session: Session, trial_id: int, order: FlightOrder, asker: RequestContext) -> Trial:
+def fly_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext) -> Trial:
     """Ask for the flight of a planned trial in one go; the worker carries it out.
 
     Raises ConflictError for an unclassed flight, a spent budget, a campaign that is over or not ready, a vehicle that
     is not ready or in somebody else's control; GainsError naming what the gate refuses, unless that was overruled;
     BusyError when the vehicle has a flight already; NotAllowedError for a real vehicle.
     """
-    return _request_trial_flight(session, trial_id, "fly", order.speed, asker)
+    return _request_trial_flight(session, trial_id, "fly", order.speed, context)
 
 
-def stage_trial(session: Session, trial_id: int, asker: RequestContext) -> Trial:
+def stage_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
     """Have a registered vehicle take the gains of a planned trial, and wait with them for its operator's word.
 
     Raises as `fly_trial` does; NotAllowedError for who may not command the vehicle."""
-    return _request_trial_flight(session, trial_id, "stage", None, asker)
+    return _request_trial_flight(session, trial_id, "stage", None, context)
 
 
 def _request_trial_flight(
-    session: Session, trial_id: int, mode: FlightMode, speed: float | None, asker: RequestContext
+    session: Session, trial_id: int, mode: FlightMode, speed: float | None, context: RequestContext
 ) -> Trial:
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, mode, row.state, f"Trial {row.number}")
@@ -58,7 +58,7 @@ def _request_trial_flight(
     require_open(session, campaign, HISTORY)
     judged = check_own_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
-    request_flight(session, campaign, row, asker, mode=mode, speed=speed)
+    request_flight(session, campaign, row, context, mode=mode, speed=speed)
     return trial_view(session, campaign, row)
 
 
@@ -66,7 +66,7 @@ def request_flight(
     session: Session,
     campaign: CampaignRow,
     row: TrialRow,
-    asker: RequestContext,
+    context: RequestContext,
     *,
     mode: FlightMode = "fly",
     speed: float | None = None,
@@ -75,7 +75,7 @@ def request_flight(
     vehicle = campaign.vehicle
     if mode == "stage" and not vehicle.registered:
         raise ConflictError(f"{vehicle.name} is flown in one go.", hint="Fly it; only registered vehicles are staged.")
-    require_may_command(vehicle, asker)
+    require_may_command(vehicle, context)
     if mode == "fly" and fleet.needs_staging(vehicle):
         raise NotAllowedError(
             f"{vehicle.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
@@ -83,7 +83,7 @@ def request_flight(
         )
     rehearsals.require_rehearsed(session, campaign)
     fleet.require_ready(session, vehicle, mode)
-    require_not_controlled_by_other(vehicle, asker)
+    require_not_controlled_by_other(vehicle, context)
     now = utc_now()
     session.add(
         FlightRow(
@@ -102,7 +102,7 @@ def request_flight(
     session.flush()
 
 
-def take_off_trial(session: Session, trial_id: int, asker: RequestContext) -> Trial:
+def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
     """The operator's own act, after which a staged vehicle takes off. For a real one it has to come from a page of
     ours in an unlocked browser on this computer, with the token of who is in control.
 
@@ -116,11 +116,11 @@ def take_off_trial(session: Session, trial_id: int, asker: RequestContext) -> Tr
         raise ConflictError(f"The take-off of trial {row.number} was asked for already.", hint="Watch the flight.")
     vehicle = campaign.vehicle
     if fleet.needs_staging(vehicle):
-        require_control(vehicle, asker)
+        require_control(vehicle, context)
         rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may have been found bad while staged
     else:
-        require_may_command(vehicle, asker)
-        require_not_controlled_by_other(vehicle, asker)
+        require_may_command(vehicle, context)
+        require_not_controlled_by_other(vehicle, context)
     flight.take_off_at = utc_now()
     return trial_view(session, campaign, row)
 

@@ -56,7 +56,7 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return _seen(session, repository.get_one(session, trial_id))
 
 
-def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: RequestContext = LOCAL_CLI) -> Trial:
+def create_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
     """Plan a trial and, with `fly`, ask for its flight.
 
     Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
@@ -64,7 +64,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Reque
     real vehicle; and what `fly_trial` raises.
     """
     campaign = campaigns.get_row(session, campaign_id)
-    require_may(Permission.REVIEW, campaign.vehicle, asker)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
     require_open(session, campaign, BUDGETED_STATES)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
@@ -86,7 +86,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, asker: Reque
     session.add(row)
     session.flush()
     if new.fly is not None:
-        request_flight(session, campaign, row, asker, speed=new.fly.speed)
+        request_flight(session, campaign, row, context, speed=new.fly.speed)
     return trial_view(session, campaign, row)
 
 
@@ -106,14 +106,14 @@ def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     return _seen(session, row)
 
 
-def classify_trial(session: Session, trial_id: int, said: Classification, asker: RequestContext = LOCAL_CLI) -> Trial:
+def classify_trial(session: Session, trial_id: int, said: Classification, context: RequestContext = LOCAL_CLI) -> Trial:
     """A person's word on a flight; the next gains are computed again from what counts now.
 
     Raises ConflictError when the states' table does not lead there or somebody else was faster, InputError when a
     flight without a usable record is to count, NotAllowedError for who may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
-    require_may(Permission.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, asker)
+    require_may(Permission.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, context)
     outcome = TrialState(said.outcome)
     check_version(
         said.version,

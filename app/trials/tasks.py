@@ -63,14 +63,14 @@ class FlightRunner:
     """Claims flights and carries them out. `closing` ends the waiting for a database that takes nothing.
 
     `session(vehicle_id)` gives whoever has the link to a vehicle that keeps one between flights; others are opened for
-    each flight in a process of the hangar's.
+    each flight in a process of the pool.
     """
 
     def __init__(
         self,
         database: Database,
         data_dir: Path,
-        airspace: AbortRegistry,
+        abort_registry: AbortRegistry,
         publish: Publish,
         *,
         worker: str,
@@ -82,7 +82,7 @@ class FlightRunner:
         self._data_dir = data_dir
         self._session = session
         self._spool = Spool(data_dir / "spool")
-        self._airspace = airspace
+        self._abort_registry = abort_registry
         self._publish = publish
         self._worker = worker
         self._closing = closing
@@ -110,8 +110,8 @@ class FlightRunner:
         with ExitStack() as undo:
             with self._database.write() as session:
                 if (task := flights.claim_flight(session, self._worker)) is not None:
-                    self._airspace.register(task.trial_id)  # before anybody can see that it runs, and abort it
-                    undo.callback(self._airspace.unregister, task.trial_id)
+                    self._abort_registry.register(task.trial_id)  # before anybody can see that it runs, and abort it
+                    undo.callback(self._abort_registry.unregister, task.trial_id)
             undo.pop_all()
         return task
 
@@ -121,11 +121,11 @@ class FlightRunner:
             campaign_id=task.campaign_id, trial_id=task.trial_id, flight_id=task.flight_id
         ):
             try:
-                self._store_outcome(task, self._fly(task, self._airspace.register(task.trial_id)))
+                self._store_outcome(task, self._fly(task, self._abort_registry.register(task.trial_id)))
             except Exception:  # noqa: BLE001 - the edge of the thread
                 _log.exception("the end of a flight cannot be stored; the trial is lost at the next start")
             finally:
-                self._airspace.unregister(task.trial_id)
+                self._abort_registry.unregister(task.trial_id)
 
     def _fly(self, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
         if flag.reason is not None:
@@ -133,11 +133,11 @@ class FlightRunner:
         try:
             self._spool.reserve(task.flight_id)
             telemetry_log(self._data_dir, task.flight_id).parent.mkdir(exist_ok=True)
-            crew = self._acquire_backend(task)
+            backend = self._acquire_backend(task)
         except (GainlineError, OSError) as error:
             return FlightOutcome(problem=f"It was not begun: {error}")
         try:
-            return self._fly_on_backend(crew, task, flag)
+            return self._fly_on_backend(backend, task, flag)
         finally:
             flag.add_listener(lambda _reason: None)
 
@@ -147,18 +147,18 @@ class FlightRunner:
             return self._session(task.vehicle_id)
         return self._process_pool.acquire()
 
-    def _fly_on_backend(self, crew: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
+    def _fly_on_backend(self, backend: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
         """The part that the vehicle takes part in; whatever happens, its process is let go, and there is an end."""
         ended = FlightOutcome()
         try:
             self._phase(task, "staging")
-            flag.add_listener(lambda reason: crew.cancel_flight(task.trial_id, reason))
-            for said in crew.fly(self._request(task)):
+            flag.add_listener(lambda reason: backend.cancel_flight(task.trial_id, reason))
+            for said in backend.fly(self._request(task)):
                 match said:
                     case Telemetry() | FlightPhase():
                         self._publish(said)
                     case GainsStaged(read_back):
-                        ended = self._staged(task, flag, crew, read_back)
+                        ended = self._staged(task, flag, backend, read_back)
                     case FlightLanded(record):
                         ended = FlightOutcome(record=record, lifted_off=True)
                     case SafeGainsRestored(held):
@@ -171,14 +171,14 @@ class FlightRunner:
                             lifted_off=ended.lifted_off and not not_flown,
                         )
         except Exception as error:  # noqa: BLE001 - a mistake of the program must not leave the trial without an end
-            crew.close()
+            backend.close()
             return replace(ended, problem=_describe_error(error), unheard=True)
-        if isinstance(crew, FlightProcess):
-            self._process_pool.release(crew)
+        if isinstance(backend, FlightProcess):
+            self._process_pool.release(backend)
         return ended
 
     def _staged(
-        self, task: FlightTask, flag: AbortFlag, crew: FlightBackend, read_back: dict[str, float]
+        self, task: FlightTask, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
     ) -> FlightOutcome:
         """Take off if the vehicle holds what it was given and the database has taken note; else stand down."""
         ended = FlightOutcome(lifted_off=True)
@@ -186,19 +186,19 @@ class FlightRunner:
             self._store(lambda session: flights.record_staged(session, task.flight_id, read_back))
             if (problem := describe_mismatch(task.gains, read_back)) is not None:
                 ended = FlightOutcome(problem=problem)
-            elif (withdrawn := self._await_takeoff_clearance(task, flag, crew)) is not None:
+            elif (withdrawn := self._await_takeoff_clearance(task, flag, backend)) is not None:
                 ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
                 self._store(lambda session: flights.record_lift_off(session, task.flight_id))
         except GainlineError as error:
             ended = FlightOutcome(problem=f"It was not flown, because that could not be recorded: {error}")
         if ended.lifted_off:
-            crew.take_off()
+            backend.take_off()
         else:
-            crew.cancel_take_off()
+            backend.cancel_take_off()
         return ended
 
-    def _await_takeoff_clearance(self, task: FlightTask, flag: AbortFlag, crew: FlightBackend) -> str | None:
+    def _await_takeoff_clearance(self, task: FlightTask, flag: AbortFlag, backend: FlightBackend) -> str | None:
         """None when the vehicle may take off, at once or at its operator's word; else why it is not to."""
         if task.mode == "fly":
             return flag.reason
@@ -207,7 +207,7 @@ class FlightRunner:
         while self._clock.now_s() < until_s:
             if flag.reason is not None:
                 return flag.reason
-            if not crew.alive:
+            if not backend.alive:
                 return "the process that has the vehicle ended"
             try:
                 with self._database.read() as session:

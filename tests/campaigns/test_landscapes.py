@@ -114,11 +114,11 @@ def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_
     card_of(client, campaign_id)
     classify(client, campaign_id, "invalid")
     with ComputePool(1, prepare=int) as pool:
-        desk = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER),
+        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER),
                     room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
-        claimed = desk.claim()
+        claimed = runner.claim()
         assert claimed is not None
-        desk.carry_out(claimed)
+        runner.carry_out(claimed)
     (withdrawn,) = landscape_jobs(client)
     assert withdrawn["state"] == "cancelled"
     assert "flights have changed" in withdrawn["problem"]["title"]

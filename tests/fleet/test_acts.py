@@ -332,13 +332,13 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
     monkeypatch.setattr("app.fleet.tasks.VehicleConnection", Found)
     with database.write() as session:
         acts.record_disconnected(session, vehicle["id"])
-    deck = VehicleConnectionManager(
+    manager = VehicleConnectionManager(
         database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
     )
-    deck.maintain()
-    deck._reconnect_executor.shutdown()
+    manager.maintain()
+    manager._reconnect_executor.shutdown()
     assert events == ["found", "closed"]
-    assert not deck.order(vehicle["id"], "land", "a person asks", by_s=0.0)
+    assert not manager.order(vehicle["id"], "land", "a person asks", by_s=0.0)
     assert seen(client, vehicle)["state"] == "disconnected"
 
 
@@ -399,7 +399,7 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
 ) -> None:
     vehicles = [create_connected(client, database, name, real=name == "Real") for name in ("Simulated", "Real")]
     before = [newest(client, vehicle)["id"] for vehicle in vehicles]
-    deck = VehicleConnectionManager(
+    manager = VehicleConnectionManager(
         database,
         settings.data_dir,
         AbortRegistry(),
@@ -408,9 +408,9 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
         closing=threading.Event(),
         links=links,
     )
-    deck.recover()
-    deck.maintain()
-    deck.close()
+    manager.recover()
+    manager.maintain()
+    manager.close()
     after = [newest(client, vehicle)["id"] for vehicle in vehicles]
     assert [now != known for now, known in zip(after, before, strict=True)] == [links, links]
 

@@ -94,7 +94,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
     rig: LockstepRig, tmp_path: Path, takes_its_safe_gains: bool
 ) -> None:
     line = RecordingPipe()
-    seat = started(rig, line, tmp_path)
+    process = started(rig, line, tmp_path)
 
     def refuse() -> None:
         rig.drone.autopilot.refuses_arming = True
@@ -102,7 +102,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
 
     line.on_staged = refuse
     line.workers_end.send(TakeOffCommand())
-    seat._fly(orders(rig, tmp_path))
+    process._fly(orders(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert "would not arm" in trouble.what
     assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
@@ -114,12 +114,12 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
 
 def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: LockstepRig, tmp_path: Path) -> None:
     line = RecordingPipe()
-    seat = started(rig, line, tmp_path)
-    assert line.said == [ConnectionOpened(identity=seat._vehicle.identity, concern="", held=dict(SAFE))]
-    answered = seat._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=TUNED))
+    process = started(rig, line, tmp_path)
+    assert line.said == [ConnectionOpened(identity=process._vehicle.identity, concern="", held=dict(SAFE))]
+    answered = process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=TUNED))
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
-    seat._vehicle._observe("Somebody else armed it.")  # type: ignore[attr-defined]
-    answered = seat._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE))
+    process._vehicle._observe("Somebody else armed it.")  # type: ignore[attr-defined]
+    answered = process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE))
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(SAFE))
 
 
@@ -127,10 +127,10 @@ def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_sa
     rig: LockstepRig, tmp_path: Path
 ) -> None:
     """Its owner's gains, met for the first time, and a slip of the hand in the safe gains named for it."""
-    seat = started(rig, RecordingPipe(), tmp_path, safe_gains=TUNED)
-    assert "nothing was written" in seat._vehicle.concern
+    process = started(rig, RecordingPipe(), tmp_path, safe_gains=TUNED)
+    assert "nothing was written" in process._vehicle.concern
     other = {**TUNED, "kp": TUNED["kp"] + 1}
-    answered = seat._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=other))
+    answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=other))
     assert "nothing was written" in answered.concern
-    answered = seat._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=SAFE))
+    answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=SAFE))
     assert (answered.concern, answered.held) == ("", dict(SAFE))

@@ -58,13 +58,13 @@ def test_a_worker_killed_in_mid_flight_leaves_a_lost_trial_and_a_free_vehicle(se
     campaign_id = serving.campaign()
     first = serving.worker_pid()
     trial_id = in_the_air(serving, campaign_id, speed=1.0)
-    crew = children(first)
+    pids = children(first)
     os.kill(first, signal.SIGKILL)
     lost = serving.trial(trial_id, "lost")
     assert lost["reason"] == "the worker ended while it flew"
     assert lost["flight"]["state"] == "lost"
     assert serving.worker_pid() != first
-    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in crew))
+    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in pids))
     again = serving.trial(serving.fly(campaign_id), "valid")
     assert again["number"] == lost["number"] + 1
     vehicle = serving.get(f"/campaigns/{campaign_id}")["vehicle"]
@@ -92,10 +92,10 @@ def test_a_killed_fork_server_costs_no_flight_and_there_is_another_for_the_next(
     campaign_id = serving.campaign()
     worker = serving.worker_pid()
     trial_id = in_the_air(serving, campaign_id, speed=20.0)
-    killed, crew = fork_server(worker), children(worker)
+    killed, pids = fork_server(worker), children(worker)
     os.kill(killed, signal.SIGKILL)
     serving.trial(trial_id, "valid")
-    for pid in crew:
+    for pid in pids:
         os.kill(pid, signal.SIGKILL)
     in_vain = serving.fly(campaign_id)
     wait_for("the flight's failure", lambda: serving.get(f"/trials/{in_vain}")["flight"]["state"] == "failed")
@@ -111,15 +111,15 @@ def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> Non
     campaign_id = first.campaign()
     worker = first.worker_pid()
     trial_id = in_the_air(first, campaign_id, speed=3.0)
-    crew = children(worker)
-    for pid in crew:
+    pids = children(worker)
+    for pid in pids:
         os.kill(pid, signal.SIGSTOP)  # the flight now takes as long as a server takes to start
     os.kill(first.process.pid, signal.SIGKILL)
     assert first.stop() == -signal.SIGKILL
     with Serving(tmp_path / "data") as second:
         assert is_alive(worker), "it finishes its flight"
         assert second.worker_pid() == worker, "and is heard by the new web process meanwhile"
-        for pid in crew:
+        for pid in pids:
             os.kill(pid, signal.SIGCONT)
         flown = second.trial(trial_id, "valid")
         assert flown["record"]["duration_s"] > 32.6
@@ -145,8 +145,8 @@ def test_a_flight_that_outlived_its_web_process_can_still_be_aborted(tmp_path: P
 def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(serving: Serving) -> None:
     undisturbed = serving.proposal(serving.campaign())
     worker = serving.worker_pid()
-    crew = children(worker)
-    for pid in crew:
+    pids = children(worker)
+    for pid in pids:
         os.kill(pid, signal.SIGSTOP)  # the computation now takes as long as the test wants
     created = serving.post(
         "/campaigns",
@@ -160,14 +160,14 @@ def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(ser
         ),
     )
     os.kill(worker, signal.SIGKILL)
-    for pid in crew:
+    for pid in pids:
         os.kill(pid, signal.SIGCONT)
     proposal = serving.proposal(created["id"])
     for what in ("kind", "gains", "predicted_error", "explanation", "history_digest"):
         assert proposal[what] == undisturbed[what], what
     done = serving.get(f"/jobs/{job['id']}")
     assert (done["state"], done["attempts"]) == ("done", 2)
-    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in crew))
+    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in pids))
 
 
 @pytest.mark.complete

@@ -35,9 +35,9 @@ def test_a_reproduction_whose_worker_is_killed_runs_again_and_can_be_cancelled(s
     worker = serving.worker_pid()
     job_id = serving.post(f"/reproductions/{LONG}/run")["id"]
     assert running(serving, job_id)["attempts"] == 1
-    crew = children(worker)
+    pids = children(worker)
     os.kill(worker, signal.SIGKILL)
-    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in crew))
+    wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in pids))
     wait_for("another worker", lambda: serving.worker_pid() != worker)
     wait_for("the second attempt", lambda: serving.get(f"/jobs/{job_id}")["attempts"] == 2)
     running(serving, job_id)

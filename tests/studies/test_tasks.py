@@ -25,14 +25,14 @@ LONG = "variability"
 
 
 class Working:
-    """One desk with one job, carried out by a thread."""
+    """One runner with one job, carried out by a thread."""
 
     def __init__(self, database: Database) -> None:
         self.database = database
         self.closing = threading.Event()
         self.raised: list[BaseException] = []
         self._reproducer = ReproductionJob(database, worker=WORKER, lease_s=30.0, closing=self.closing)
-        self.desk = JobRunner(database, REPRODUCTION_JOB, self._perform, room=1, worker=WORKER, lease_s=30.0)
+        self.runner = JobRunner(database, REPRODUCTION_JOB, self._perform, room=1, worker=WORKER, lease_s=30.0)
 
     def _perform(self, job: ClaimedJob) -> None:
         try:
@@ -52,10 +52,10 @@ class Working:
     @contextmanager
     def under_way(self, job_id: int) -> Iterator[None]:
         """The job in a thread; it has ended when the block has."""
-        claimed = self.desk.claim()
+        claimed = self.runner.claim()
         assert claimed is not None
         assert claimed.id == job_id
-        thread = threading.Thread(target=self.desk.carry_out, args=(claimed,))
+        thread = threading.Thread(target=self.runner.carry_out, args=(claimed,))
         thread.start()
         try:
             yield
@@ -148,8 +148,8 @@ def test_an_order_that_cannot_be_read_fails_with_its_reason(working: Working) ->
 def test_a_desk_takes_no_more_than_it_has_room_for(working: Working) -> None:
     job_id, other = working.ask("controller"), working.ask("table1")
     with working.under_way(job_id):
-        assert working.desk.claim() is None
+        assert working.runner.claim() is None
     assert working.job(other).state == JobState.QUEUED
-    again = working.desk.claim()
+    again = working.runner.claim()
     assert again is not None
     assert again.id == other

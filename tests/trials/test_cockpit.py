@@ -36,20 +36,20 @@ def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, tria
 
 
 @pytest.fixture(scope="module")
-def cockpit() -> Iterator[FlightProcess]:
+def flight_process() -> Iterator[FlightProcess]:
     one = FlightProcess()
     yield one
     one.close()
 
 
 def fly(
-    cockpit: FlightProcess, asked: FlightRequest, on_said: Callable[[FlightMessage], None] = lambda _said: None
+    flight_process: FlightProcess, asked: FlightRequest, on_said: Callable[[FlightMessage], None] = lambda _said: None
 ) -> list[FlightMessage]:
     heard = []
-    for said in cockpit.fly(asked):
+    for said in flight_process.fly(asked):
         heard.append(said)
         if isinstance(said, GainsStaged):
-            cockpit.take_off()
+            flight_process.take_off()
         on_said(said)
     return heard
 
@@ -58,8 +58,8 @@ def only(heard: list[FlightMessage], kind: type[FlightMessage]) -> list[FlightMe
     return [said for said in heard if isinstance(said, kind)]
 
 
-def test_a_flight_in_the_process_is_the_flight_in_this_one(cockpit: FlightProcess, tmp_path: Path) -> None:
-    heard = fly(cockpit, orders(tmp_path))
+def test_a_flight_in_the_process_is_the_flight_in_this_one(flight_process: FlightProcess, tmp_path: Path) -> None:
+    heard = fly(flight_process, orders(tmp_path))
     with open_vehicle("twin", {}, safe_gains=GAINS) as vehicle:
         vehicle.stage(GAINS)
         here = vehicle.fly(FlightOptions(seed=3), on_sample=lambda _: None, should_stop=lambda: None)
@@ -72,9 +72,9 @@ def test_a_flight_in_the_process_is_the_flight_in_this_one(cockpit: FlightProces
 
 
 def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(
-    cockpit: FlightProcess, tmp_path: Path
+    flight_process: FlightProcess, tmp_path: Path
 ) -> None:
-    heard = fly(cockpit, orders(tmp_path))
+    heard = fly(flight_process, orders(tmp_path))
     rows = [row for said in heard if isinstance(said, Telemetry) for row in said.samples]
     assert [round(row[0] * 50) for row in rows] == list(range(len(rows)))
     assert rows[-1][0] == pytest.approx(33.0, abs=0.03)
@@ -86,47 +86,47 @@ def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(
 
 
 def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
-    cockpit: FlightProcess, tmp_path: Path
+    flight_process: FlightProcess, tmp_path: Path
 ) -> None:
     def abort(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            cockpit.cancel_flight(1, "too high")
+            flight_process.cancel_flight(1, "too high")
 
-    (landed,) = only(fly(cockpit, orders(tmp_path, speed=1.0), abort), FlightLanded)
+    (landed,) = only(fly(flight_process, orders(tmp_path, speed=1.0), abort), FlightLanded)
     assert isinstance(landed, FlightLanded)
     assert (landed.record.ending, landed.record.reason) == ("aborted", "too high")
     assert landed.record.trajectory["altitude_m"][-1] < 0.1
-    (landed,) = only(fly(cockpit, orders(tmp_path, trial_id=2)), FlightLanded)
+    (landed,) = only(fly(flight_process, orders(tmp_path, trial_id=2)), FlightLanded)
     assert isinstance(landed, FlightLanded)
     assert landed.record.ending == "completed"
 
 
 def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(
-    cockpit: FlightProcess, tmp_path: Path
+    flight_process: FlightProcess, tmp_path: Path
 ) -> None:
-    (trouble,) = fly(cockpit, orders(tmp_path, kind="import"))
+    (trouble,) = fly(flight_process, orders(tmp_path, kind="import"))
     assert isinstance(trouble, FlightFailure)
     assert not trouble.unsafe
-    assert len(only(fly(cockpit, orders(tmp_path)), FlightLanded)) == 1
+    assert len(only(fly(flight_process, orders(tmp_path)), FlightLanded)) == 1
 
 
-def test_a_declined_flight_leaves_no_record(cockpit: FlightProcess, tmp_path: Path) -> None:
+def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess, tmp_path: Path) -> None:
     heard = []
-    for said in cockpit.fly(orders(tmp_path)):
+    for said in flight_process.fly(orders(tmp_path)):
         heard.append(said)
-        cockpit.cancel_take_off()
+        flight_process.cancel_take_off()
     assert heard == [GainsStaged(GAINS)]
 
 
 def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
-    cockpit: FlightProcess, tmp_path: Path
+    flight_process: FlightProcess, tmp_path: Path
 ) -> None:
     heard = []
-    for said in cockpit.fly(orders(tmp_path, speed=1.0)):
+    for said in flight_process.fly(orders(tmp_path, speed=1.0)):
         heard.append(said)
         if isinstance(said, GainsStaged):
-            cockpit.cancel_flight(1, "not today")
-            cockpit.take_off()
+            flight_process.cancel_flight(1, "not today")
+            flight_process.take_off()
     (landed,) = only(heard, FlightLanded)
     assert isinstance(landed, FlightLanded)
     assert (landed.record.ending, landed.record.reason) == ("aborted", "not today")
@@ -158,25 +158,25 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
 
 
 def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) -> None:
-    cockpit = FlightProcess()
+    flight_process = FlightProcess()
 
     def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            os.kill(cockpit._process.pid or 0, signal.SIGKILL)
+            os.kill(flight_process._process.pid or 0, signal.SIGKILL)
 
     with pytest.raises(VehicleError, match=r"exit code -9"):
-        fly(cockpit, orders(tmp_path, speed=1.0), kill)
-    cockpit.close()
+        fly(flight_process, orders(tmp_path, speed=1.0), kill)
+    flight_process.close()
 
 
 def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_path: Path) -> None:
-    cockpit = FlightProcess()
+    flight_process = FlightProcess()
     heard: list[FlightMessage] = []
     with exclusive(tmp_path / "vehicle.lock"):
-        thread = threading.Thread(target=lambda: heard.extend(fly(cockpit, orders(tmp_path))))
+        thread = threading.Thread(target=lambda: heard.extend(fly(flight_process, orders(tmp_path))))
         thread.start()
         thread.join(1.0)
         assert heard == []
     thread.join(LOCK_TIMEOUT_S)
     assert len(only(heard, FlightLanded)) == 1
-    cockpit.close()
+    flight_process.close()

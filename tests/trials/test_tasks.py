@@ -1,4 +1,4 @@
-"""Carrying out flights: a real deck on a real database, with real vehicles in processes of their own."""
+"""Carrying out flights: a real flight runner on a real database, with real vehicles in processes of their own."""
 
 import os
 import signal
@@ -29,16 +29,16 @@ Watch = Callable[[PublishedMessage], None]
 
 
 class RunnerFixture:
-    """A deck with its airspace; `watch` hears what the flights say."""
+    """A flight runner with its abort registry; `watch` hears what the flights say."""
 
     def __init__(self, database: Database, settings: Settings) -> None:
-        self.airspace = AbortRegistry()
+        self.abort_registry = AbortRegistry()
         self.heard: list[PublishedMessage] = []
         self.watch: Watch = lambda _said: None
-        self.deck = FlightRunner(
+        self.runner = FlightRunner(
             database,
             settings.data_dir,
-            self.airspace,
+            self.abort_registry,
             self._hear,
             worker="tests",
             closing=threading.Event(),
@@ -46,13 +46,13 @@ class RunnerFixture:
         )
 
     def fly_next(self) -> None:
-        task = self.deck.claim()
+        task = self.runner.claim()
         assert task is not None
-        self.deck.carry_out(task)
+        self.runner.carry_out(task)
 
     def kill_processes(self) -> None:
-        for cockpit in self.deck._process_pool._waiting:
-            os.kill(cockpit._process.pid or 0, signal.SIGKILL)
+        for process in self.runner._process_pool._waiting:
+            os.kill(process._process.pid or 0, signal.SIGKILL)
 
     def _hear(self, said: PublishedMessage) -> None:
         self.heard.append(said)
@@ -63,7 +63,7 @@ class RunnerFixture:
 def field(client: TestClient, database: Database, settings: Settings) -> Iterator[RunnerFixture]:
     one = RunnerFixture(database, settings)
     yield one
-    one.deck.close()
+    one.runner.close()
 
 
 @pytest.fixture
@@ -125,14 +125,14 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
     assert (flown["state"], flown["flight"]["state"]) == ("valid", "landed")
     assert [said.phase for said in field.heard if isinstance(said, FlightPhase)] == [
         "staging", "flying", "landed", "ended"]  # fmt: skip
-    assert field.airspace.trial_ids() == []
+    assert field.abort_registry.trial_ids() == []
     assert vehicle_state(client) == "ready"
 
 
 def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_ground(
     client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
 ) -> None:
-    when_changed_to(TrialState.FLYING, lambda: field.airspace.abort(trial_id, "somebody walked in"))
+    when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, "somebody walked in"))
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
     assert (ended["state"], ended["reason"]) == ("aborted", "somebody walked in")
@@ -146,7 +146,7 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
 ) -> None:
     seen: list[bool] = []
 
-    when_changed_to(FlightState.RUNNING, lambda: seen.append(field.airspace.abort(trial_id, "changed my mind")))
+    when_changed_to(FlightState.RUNNING, lambda: seen.append(field.abort_registry.abort(trial_id, "changed my mind")))
     field.fly_next()
     assert seen == [True]
     ended = get(client, f"/api/trials/{trial_id}")
@@ -163,15 +163,15 @@ def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
 
     when_changed_to(FlightState.RUNNING, fail, stored=False)
     with pytest.raises(RuntimeError, match="the power went"):
-        field.deck.claim()
-    assert field.airspace.trial_ids() == []
+        field.runner.claim()
+    assert field.abort_registry.trial_ids() == []
 
 
 def test_a_flight_that_was_asked_for_while_the_worker_was_away_does_not_take_off(
     client: TestClient, field: RunnerFixture, trial_id: int
 ) -> None:
-    field.deck.recover()
-    assert field.deck.claim() is None
+    field.runner.recover()
+    assert field.runner.claim() is None
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
     assert "the worker was away when it was asked for" in after["flight"]["problem"]
@@ -184,7 +184,7 @@ def test_a_flight_that_waited_too_long_is_withdrawn_and_one_of_now_is_flown(
     with database.write() as session:
         for row in session.query(FlightRow):
             row.requested_at -= REQUEST_TIMEOUT + timedelta(seconds=1)
-    assert field.deck.claim() is None
+    assert field.runner.claim() is None
     flight = get(client, f"/api/trials/{trial_id}")["flight"]
     assert flight["state"] == "cancelled"
     assert "could not be begun within 10 s" in flight["problem"]
@@ -201,7 +201,7 @@ def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothin
     assert f"kept as {kept}" in lost["reason"]
     assert kept.suffix == ".unusable"
     assert vehicle_state(client) == "ready"
-    assert field.airspace.trial_ids() == []
+    assert field.abort_registry.trial_ids() == []
 
 
 def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
@@ -247,7 +247,7 @@ def test_a_worker_that_died_with_gains_staged_leaves_a_real_vehicle_in_quarantin
     if real:
         make_vehicle_real(database)
     stage(database)
-    field.deck.recover()
+    field.runner.recover()
     assert get(client, f"/api/trials/{trial_id}")["state"] == "planned"
     assert vehicle_state(client) == then
 
@@ -284,7 +284,7 @@ def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
     client: TestClient, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(field.deck._process_pool, "acquire", Refusing)
+        patched.setattr(field.runner._process_pool, "acquire", Refusing)
         field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
@@ -302,18 +302,18 @@ class RefusingAll(Refusing):
     takes_its_safe_gains = False
 
 
-@pytest.mark.parametrize(("crew", "then"), [(Refusing, "ready"), (RefusingAll, "quarantined")])
+@pytest.mark.parametrize(("backend", "then"), [(Refusing, "ready"), (RefusingAll, "quarantined")])
 def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gains(
     client: TestClient,
     database: Database,
     field: RunnerFixture,
     trial_id: int,
     monkeypatch: pytest.MonkeyPatch,
-    crew: type[Refusing],
+    backend: type[Refusing],
     then: str,
 ) -> None:
     make_vehicle_real(database)
-    monkeypatch.setattr(field.deck._process_pool, "acquire", crew)
+    monkeypatch.setattr(field.runner._process_pool, "acquire", backend)
     field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
@@ -323,15 +323,15 @@ def test_a_real_vehicle_that_never_left_the_ground_is_in_doubt_only_for_its_gain
 def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
     client: TestClient, database: Database, field: RunnerFixture, trial_id: int
 ) -> None:
-    task = field.deck.claim()
+    task = field.runner.claim()
     assert task is not None
     with database.write() as session:
         session.query(FlightRow).one().trial.state = TrialState.FLYING
-    field.deck._spool.reserve(task.flight_id)
-    field.deck._spool.write(task.flight_id, create_record(1.0))
-    field.deck.recover()
+    field.runner._spool.reserve(task.flight_id)
+    field.runner._spool.write(task.flight_id, create_record(1.0))
+    field.runner.recover()
     assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
-    assert field.deck._spool.flight_ids() == []
+    assert field.runner._spool.flight_ids() == []
 
 
 def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_gains_back(
