@@ -1,6 +1,5 @@
 """Motion capture as MAVLink carries it: ODOMETRY and VISION_POSITION_ESTIMATE, on the vehicle's link or another."""
 
-import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -85,7 +84,7 @@ class OdometrySource:
             pose.values,
             time_s=pose.time_s,
             arrived_s=arrived_s,
-            tracking_valid=pose.tracking_valid and math.isfinite(pose.altitude_m),
+            tracking_valid=pose.tracking_valid,
         )
 
     @property

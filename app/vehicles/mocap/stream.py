@@ -1,5 +1,6 @@
 """What a stream of poses says, as samples of altitude: put on our clock, and whether each says anything new."""
 
+import math
 from collections import deque
 from typing import Final
 
@@ -54,14 +55,14 @@ class PoseStream:
     def put(
         self, altitude_m: float, pose: tuple[float, ...], *, time_s: float, arrived_s: float, tracking_valid: bool
     ) -> None:
-        """`time_s` by the source's clock, `arrived_s` by ours."""
-        later = time_s > self._time_s or time_s < self._time_s - _RESTART_S
+        """`time_s` by the source's clock, `arrived_s` by ours. An altitude that is not finite is none."""
+        later = math.isfinite(time_s) and (time_s > self._time_s or time_s < self._time_s - _RESTART_S)
         sample = SourceSample(
             received_s=arrived_s,
             seen_s=self._arrivals.seen_s(time_s, arrived_s) if later else arrived_s,
             altitude_m=altitude_m,
-            tracking_valid=tracking_valid,
-            advances=later and pose != self._pose,
+            tracking_valid=tracking_valid and math.isfinite(altitude_m),
+            advances=later and not _is_same(pose, self._pose),
         )
         if later:
             self._time_s, self._pose = time_s, pose
@@ -71,3 +72,10 @@ class PoseStream:
     def take(self) -> list[SourceSample]:
         """What came since the last call, oldest first."""
         return [self._samples.popleft() for _ in range(len(self._samples))]
+
+
+def _is_same(pose: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """To the last bit, where a number that is missing (NaN) is as missing as another."""
+    return len(pose) == len(other) and all(
+        a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(pose, other, strict=True)
+    )

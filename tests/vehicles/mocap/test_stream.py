@@ -57,3 +57,30 @@ def test_a_source_that_was_switched_off_and_on_advances_again() -> None:
     put(stream, 900.0, 0.1, arrived_s=5.0)
     put(stream, 0.01, 0.2, arrived_s=25.0)
     assert [(sample.seen_s, sample.advances) for sample in stream.take()] == [(5.0, True), (25.0, True)]
+
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize("altitude_m", [NAN, INF, -INF])
+def test_an_altitude_that_is_no_number_is_a_body_that_is_not_seen(altitude_m: float) -> None:
+    stream = PoseStream()
+    put(stream, 1.00, 0.10)
+    put(stream, 1.01, altitude_m)
+    assert [sample.tracking_valid for sample in stream.take()] == [True, False]
+
+
+def test_a_frozen_pose_is_stale_though_some_of_its_numbers_are_missing() -> None:
+    stream = PoseStream()
+    for time_s in (1.00, 1.01, 1.02):
+        stream.put(0.1, (0.1, float("nan")), time_s=time_s, arrived_s=time_s, tracking_valid=True)
+    assert [sample.advances for sample in stream.take()] == [True, False, False]
+
+
+@pytest.mark.parametrize("time_s", [NAN, INF])
+def test_a_time_that_is_no_number_says_nothing_new_and_spoils_nothing(time_s: float) -> None:
+    stream = PoseStream()
+    put(stream, 1.00, 0.10)
+    put(stream, time_s, 0.11, arrived_s=1.01)
+    put(stream, 1.02, 0.12)
+    assert [(sample.seen_s, sample.advances) for sample in stream.take()] == [(1.0, True), (1.01, False), (1.02, True)]
