@@ -128,10 +128,10 @@ def classify_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id,
 
 
 @router.post("/trials/{trial_id}/judge-abort")
-def judge_abort(act: IdempotentPost, trial_id: Id, body: AbortJudgement) -> Trial:
+def judge_abort(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: AbortJudgement) -> Trial:
     """Say why the operator broke a flight off. It counts against its gains only if the vehicle behaved badly; whatever
     was computed from it is computed again."""
-    return act(Trial, lambda session: service.judge_abort(session, trial_id, body))
+    return act(Trial, lambda session: service.judge_abort(session, trial_id, body, asking))
 
 
 @router.get("/trials/{trial_id}/trajectory")
@@ -213,6 +213,7 @@ records = APIRouter(prefix="/api", tags=["trials"])
 @records.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
 def upload_trajectory(
     record: Record,
+    asking: RequestContextDep,
     trial_id: Id,
     takeoff: Annotated[int | None, Query(ge=1, le=10_000, description="which one of a log with several")] = None,
     confirm: Annotated[
@@ -226,7 +227,9 @@ def upload_trajectory(
     and optionally the other channels, at most 200 000 rows. It is scored and classed at once.
     """
     flown = service.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
-    return record.once(Trial, lambda session: service.import_record(session, trial_id, flown, confirmed=confirm))
+    return record.once(
+        Trial, lambda session: service.import_record(session, trial_id, flown, asking, confirmed=confirm)
+    )
 
 
 @records.post("/trials/{trial_id}/photos", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)

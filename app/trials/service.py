@@ -132,13 +132,14 @@ def classify_trial(session: Session, trial_id: int, said: Classification, contex
     return trial_view(session, campaign, row)
 
 
-def judge_abort(session: Session, trial_id: int, said: AbortJudgement) -> Trial:
+def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: RequestContext = LOCAL_CLI) -> Trial:
     """An operator's word on why they broke a flight off; the next gains are computed again from what counts now.
 
     Raises ConflictError unless the trial is aborted, and not for a limit that the program keeps, or when somebody else
-    was faster.
+    was faster, NotAllowedError for who may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
+    require_may(Permission.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, context)
     check_version(said.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", said.cause)})
     check_action(ACTIONS, "judge abort", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
@@ -171,15 +172,19 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
-def import_record(session: Session, trial_id: int, flown: Takeoff, *, confirmed: bool = False) -> Trial:
+def import_record(
+    session: Session, trial_id: int, flown: Takeoff, context: RequestContext = LOCAL_CLI, *, confirmed: bool = False
+) -> Trial:
     """The record of a flight made elsewhere, or the recovered one of a lost flight; scored and classed at once.
 
     Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
-    nobody has `confirmed` that, TrajectoryError when the record cannot be stored.
+    nobody has `confirmed` that, TrajectoryError when the record cannot be stored, NotAllowedError for who may not
+    command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, "upload", row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
+    check_action(ACTIONS, "upload", row.state, f"Trial {row.number}")
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         settle_gains(session, campaign, row, flown, confirmed=confirmed)

@@ -12,7 +12,7 @@ from app.db.session import Database
 from app.keyring import Keyring
 from app.main import create_app
 from app.settings import Settings
-from tests.builders import Json, create_campaign, create_ready_campaign, create_trial, get
+from tests.builders import Json, create_campaign, create_csv, create_ready_campaign, create_trial, get, upload
 from tests.builders import stage as stage_claimed
 from tests.fleet.vehicles import (
     OUR_PAGE,
@@ -143,6 +143,8 @@ def test_whoever_has_no_key_commands_no_real_vehicle_whatever_the_headers_say(
         ("POST", f"/api/campaigns/{planned['campaign_id']}/trials", {"gains": planned["gains"]}),
         ("POST", f"/api/trials/{planned['id']}/stage", {}),
         ("POST", f"/api/trials/{planned['id']}/fly", {}),
+        ("POST", f"/api/trials/{planned['id']}/classify", {"version": 1, "outcome": "valid", "reason": "mine"}),
+        ("POST", f"/api/trials/{planned['id']}/judge-abort", {"version": 1, "cause": "something else"}),
     ]
     page = {**OUR_PAGE, "Origin": "http://127.0.0.1:8000"}
     for method, path, body in asked:
@@ -151,6 +153,8 @@ def test_whoever_has_no_key_commands_no_real_vehicle_whatever_the_headers_say(
         refused = stranger.request(method, path, json=body, headers=page)
         assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed"), path
         assert "real vehicle" in refused.json()["detail"], path
+    refused = upload(stranger, planned["id"], create_csv())
+    assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
     assert get(client, f"/api/vehicles/{real['id']}")["control"] is None
 
 
