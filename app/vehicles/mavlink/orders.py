@@ -4,35 +4,55 @@ from typing import Final
 
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import confirms_motors_off
+from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
 from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.signals import Action, PacketReceived
 
 STOPPING_S: Final = 5.0
 """For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""
+SINKING_S: Final = 1.0
+"""A vehicle that has sunk for so long is landing; one gust is no landing."""
+LANDED_WITHIN_S: Final = 20.0
+"""Longer than a landing takes: whoever flies the vehicle after it was landing for so long is somebody else."""
 
 
 class RepeatedCommand:
-    """Once the vehicle has obeyed nothing more is sent: somebody else may fly it again."""
+    """Sent again until the vehicle has obeyed. Motors off is over once the motors stand, or after some seconds. Land is
+    over once the motors stand, a person flies the vehicle, or it has had the time to land; while it is landing, nothing
+    is sent."""
 
     def __init__(self, radio: AutopilotLink, action: Action) -> None:
         """Sends it. Raises VehicleError when it takes a block of a flight plan that is not known."""
         self._radio, self._action = radio, action
         self._asked_s = radio.clock.now_s()
         self._answered = False
+        self._by_hand_since_s: float | None = None
+        self._landing_since_s: float | None = None
         self._is_over = False
         self._send()
 
     def proceed(self, heard: list[PacketReceived]) -> None:
         """Take in what came, and send it again when it is due."""
-        if self._action is Action.KILL:
-            settings = self._radio.profile.stop_settings
-            self._answered = self._answered or any(confirms_motors_off(each.measurement, settings) for each in heard)
+        for each in heard:
+            self._note(each)
         now_s = self._radio.clock.now_s()
         is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
-        self._is_over = self._is_over or is_late or self._is_obeyed()
-        if not self._is_over and now_s - self._sent_s >= self._every_s(now_s):
+        self._is_over = self._is_over or is_late or self._has_stopped() or self._has_landed(now_s)
+        is_due = now_s - self._sent_s >= self._every_s(now_s)
+        if is_due and self._landing_since_s is None and not self._is_over:
             self._send()
+
+    def _note(self, heard: PacketReceived) -> None:
+        profile = self._radio.profile
+        if self._action is Action.KILL:
+            self._answered = self._answered or confirms_motors_off(heard.measurement, profile.stop_settings)
+        elif isinstance(heard.measurement, Heartbeat):
+            if heard.measurement.mode not in profile.manual_modes:
+                self._by_hand_since_s = None
+            elif self._by_hand_since_s is None:
+                self._by_hand_since_s = heard.now_s
+            elif heard.now_s - self._by_hand_since_s >= self._radio.witness_gap_s:
+                self._is_over = True
 
     def _every_s(self, now_s: float) -> float:
         if self._action is Action.LAND:
@@ -52,19 +72,34 @@ class RepeatedCommand:
         for step in steps:
             self._radio.send(*step.sends)
 
-    def _is_obeyed(self) -> bool:
-        """By what came since it was given: the motors stand, by two heartbeats or by one and an answer; or, where it
-        was to land, it does."""
+    def _has_stopped(self) -> bool:
+        """By what came since it was given: two heartbeats, or one and an answer."""
         seen = self._radio.seen
         if seen.heartbeat is None or seen.heartbeat_s <= self._asked_s:
             return False
-        if not seen.heartbeat.armed and (self._answered or self._radio.is_disarmed):
-            return True
-        return self._action is Action.LAND and self._is_landing(seen.heartbeat.mode)
+        return not seen.heartbeat.armed and (self._answered or self._radio.is_disarmed)
 
-    def _is_landing(self, mode: str) -> bool:
+    def _has_landed(self, now_s: float) -> bool:
+        if not self._is_landing(now_s):
+            self._landing_since_s = None
+        elif self._landing_since_s is None:
+            self._landing_since_s = now_s
+        return self._landing_since_s is not None and now_s - self._landing_since_s >= LANDED_WITHIN_S
+
+    def _is_landing(self, now_s: float) -> bool:
+        """By what came since it was given, of which the newest counts: a vehicle that flies again is told again."""
+        if self._action is Action.KILL:
+            return False
         seen, profile = self._radio.seen, self._radio.profile
-        if self._radio.block in profile.landing_blocks or mode in profile.landing_modes - profile.flying_modes:
+        if seen.block_s > self._asked_s and self._radio.block in profile.landing_blocks:
             return True
-        at_s, last = seen.positions[-1] if seen.positions else (float("-inf"), None)
-        return last is not None and at_s > self._asked_s and last.climb_rate_m_s < DESCENDING_M_S
+        says_so = profile.landing_modes - profile.flying_modes
+        if seen.heartbeat is not None and seen.heartbeat_s > self._asked_s and seen.heartbeat.mode in says_so:
+            return True
+        since_s = max(self._asked_s, now_s - SINKING_S)
+        recent = [position for at_s, position in seen.positions if at_s > since_s]
+        return (
+            now_s - self._asked_s >= SINKING_S
+            and len(recent) > 1
+            and all(position.climb_rate_m_s < DESCENDING_M_S for position in recent)
+        )

@@ -40,6 +40,7 @@ class VehicleMemory:
     """Since when every heartbeat has said so."""
     version: str = ""
     block: int | None = None
+    block_s: float = float("-inf")
     battery_v: float | None = None
     may_arm: bool | None = None
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
@@ -56,7 +57,7 @@ class VehicleMemory:
             case Version(version=version):
                 self.version = version
             case BlockEntered(number=number):
-                self.block = number
+                self.block, self.block_s = number, now_s
             case Battery(voltage_v=volts, may_arm=may_arm):
                 self.battery_v = volts if volts is not None else self.battery_v
                 self.may_arm = may_arm
@@ -107,8 +108,13 @@ class AutopilotLink:
     @property
     def is_disarmed(self) -> bool:
         """By two heartbeats at least, and none between them that says otherwise."""
-        seen, apart_s = self.seen, MAX_WITNESS_GAP * self.profile.heartbeat_s * self.timeout_factor
-        return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= apart_s
+        seen = self.seen
+        return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= self.witness_gap_s
+
+    @property
+    def witness_gap_s(self) -> float:
+        """How far two heartbeats must be apart to be two witnesses."""
+        return MAX_WITNESS_GAP * self.profile.heartbeat_s * self.timeout_factor
 
     @property
     def block(self) -> str:

@@ -1,0 +1,119 @@
+"""Land and motors off outside of a trial: for how long they are sent, by what the vehicle says of itself."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+import pytest
+
+from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.measurements import BlockEntered, Heartbeat, Measurement, Position
+from app.vehicles.mavlink.orders import RepeatedCommand
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.profiles.base import Target
+from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.signals import Action, PacketReceived
+from tests.clocks import SimulatedClock
+
+GUIDED, STABILIZE, LAND = "4", "0", "9"
+HEARTBEAT = Heartbeat(autopilot=3, armed=True, mode=GUIDED, system=1, component=1)
+LANDED_BLOCK = 14
+
+
+class Sent(list[str]):
+    """In place of a link: the kinds of message that went out."""
+
+    def send(self, kind: str, **_fields: object) -> None:
+        self.append(kind)
+
+
+class Ordered:
+    """A vehicle in the air at whose own link a person has ordered something; each `second` it says this."""
+
+    def __init__(self, action: Action = Action.LAND, autopilot: str = "ardupilot") -> None:
+        self.clock, self.sent = SimulatedClock(), Sent()
+        blocks = {"land here": 13, "land": LANDED_BLOCK, "Takeoff": 4}
+        self.radio = AutopilotLink(
+            cast("Link", self.sent), PROFILES[autopilot], self.clock, Target(system=1, aircraft=1, blocks=blocks)
+        )
+        self.told(HEARTBEAT)
+        self.clock.wait_s(0.1)
+        self.order = RepeatedCommand(self.radio, action)
+        self.first = len(self.sent)
+
+    def told(self, *measurements: Measurement) -> list[PacketReceived]:
+        for measurement in measurements:
+            self.radio.seen.note(measurement, self.clock.now_s())
+        return [PacketReceived(measurement, self.clock.now_s()) for measurement in measurements]
+
+    def second(self, *said: Measurement, climb_rate_m_s: float = 0.0) -> int:
+        """How many orders go out in it: four looks, a position at each, and at the first what else it says."""
+        before = len(self.sent)
+        for look in range(4):
+            self.clock.wait_s(0.25)
+            place = Position(self.clock.now_s(), 2.0, climb_rate_m_s)
+            self.order.proceed(self.told(*(said if look == 0 else ()), place))
+        return (len(self.sent) - before) // self.first
+
+    def seconds(self, count: int, *said: Measurement, **moves: float) -> Sequence[int]:
+        return [self.second(*said, **moves) for _ in range(count)]
+
+
+def flying(**differently: Any) -> Heartbeat:
+    return replace(HEARTBEAT, **differently)
+
+
+def test_land_goes_on_after_a_moment_of_sinking_that_was_no_landing() -> None:
+    ordered = Ordered()
+    ordered.clock.wait_s(0.1)
+    ordered.order.proceed(ordered.told(HEARTBEAT, Position(0.2, 2.0, -0.5)))
+    assert sum(ordered.seconds(10, HEARTBEAT)) >= 9
+
+
+def test_land_is_not_sent_again_while_the_vehicle_sinks_and_again_once_it_does_not() -> None:
+    ordered = Ordered()
+    ordered.seconds(2, HEARTBEAT, climb_rate_m_s=-0.5)
+    assert ordered.seconds(5, HEARTBEAT, climb_rate_m_s=-0.5) == [0, 0, 0, 0, 0]
+    assert sum(ordered.seconds(5, HEARTBEAT)) >= 4
+
+
+def test_land_is_not_sent_again_while_the_mode_says_so_and_again_once_it_is_another() -> None:
+    ordered = Ordered()
+    ordered.second(flying(mode=LAND))
+    assert ordered.seconds(5, flying(mode=LAND)) == [0, 0, 0, 0, 0]
+    assert sum(ordered.seconds(5, HEARTBEAT)) >= 4
+
+
+def test_a_block_that_was_told_before_the_order_does_not_answer_it() -> None:
+    ordered = Ordered(autopilot="paparazzi")
+    ordered.radio.seen.block, ordered.radio.seen.block_s = LANDED_BLOCK, 0.0
+    assert sum(ordered.seconds(5, flying(mode="208"))) >= 4
+    ordered.told(BlockEntered(LANDED_BLOCK))
+    assert sum(ordered.seconds(15, flying(mode="208"))) == 0
+
+
+def test_a_person_who_takes_the_vehicle_over_is_not_disturbed_and_one_heartbeat_is_nobody() -> None:
+    ordered = Ordered()
+    assert sum(ordered.seconds(3, flying(mode=STABILIZE), HEARTBEAT)) >= 2
+    ordered.seconds(3, flying(mode=STABILIZE))
+    assert ordered.seconds(5, flying(mode=STABILIZE)) == [0, 0, 0, 0, 0]
+    assert ordered.seconds(5, HEARTBEAT) == [0, 0, 0, 0, 0]
+
+
+def test_a_vehicle_that_flies_again_long_after_it_was_landing_is_somebody_elses() -> None:
+    ordered = Ordered()
+    ordered.seconds(25, flying(mode=LAND))
+    assert ordered.seconds(5, HEARTBEAT, climb_rate_m_s=1.0) == [0, 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("action", [Action.LAND, Action.KILL])
+def test_nothing_is_sent_any_more_once_the_motors_stand(action: Action) -> None:
+    ordered = Ordered(action)
+    ordered.seconds(3, flying(armed=False))
+    assert ordered.seconds(3, flying(armed=False)) == [0, 0, 0]
+
+
+def test_motors_off_is_sent_for_five_seconds_whatever_flies() -> None:
+    ordered = Ordered(Action.KILL)
+    assert sum(ordered.seconds(5, HEARTBEAT, climb_rate_m_s=-2.0)) >= 4
+    assert ordered.seconds(5, HEARTBEAT, climb_rate_m_s=-2.0) == [0, 0, 0, 0, 0]
