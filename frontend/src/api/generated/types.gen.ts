@@ -4883,6 +4883,12 @@ export type JudgeAbortData = {
          * a text of the caller's own, new for each act: the same request sent again with it is harmless
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -4962,6 +4968,12 @@ export type UploadTrajectoryData = {
          * a text of the caller's own, new for each act: the same request sent again with it is harmless
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
