@@ -1,5 +1,6 @@
 """Land and motors off outside of a trial: repeated until the vehicle says that it has obeyed."""
 
+from itertools import takewhile
 from typing import Final
 
 from app.vehicles.errors import VehicleError
@@ -97,7 +98,7 @@ class RepeatedCommand:
         if seen.heartbeat is not None and seen.heartbeat_s > self._asked_s and seen.heartbeat.mode in says_so:
             return True
         since_s = max(self._asked_s, now_s - SINKING_S)
-        recent = [position for at_s, position in seen.positions if at_s > since_s]
+        recent = [each for _, each in takewhile(lambda heard: heard[0] > since_s, reversed(seen.positions))]
         return (
             now_s - self._asked_s >= SINKING_S
             and len(recent) > 1
