@@ -113,7 +113,8 @@ def classify_trial(session: Session, trial_id: int, said: Classification, contex
     flight without a usable record is to count, NotAllowedError for who may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
-    require_may(Permission.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, context)
+    campaign = campaigns.get_row(session, row.campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
     outcome = TrialState(said.outcome)
     check_version(
         said.version,
@@ -123,7 +124,6 @@ def classify_trial(session: Session, trial_id: int, said: Classification, contex
     )
     check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
     check_transition(TRANSITIONS, row.state, outcome, f"Trial {row.number}")
-    campaign = campaigns.get_row(session, row.campaign_id)
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     set_trial_state(row, outcome, reason=said.reason)
@@ -139,10 +139,10 @@ def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: 
     was faster, NotAllowedError for who may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
-    require_may(Permission.REVIEW, campaigns.get_row(session, row.campaign_id).vehicle, context)
+    campaign = campaigns.get_row(session, row.campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
     check_version(said.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", said.cause)})
     check_action(ACTIONS, "judge abort", row.state, f"Trial {row.number}")
-    campaign = campaigns.get_row(session, row.campaign_id)
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     if row.abort_cause == "limit":
         raise ConflictError(

@@ -10,7 +10,7 @@ from app.db.models import VehicleActRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
-from app.fleet.session import ConnectionOpened, ConnectionRequest, VehicleConnection
+from app.fleet.session import ConnectionOpened, VehicleConnection
 from app.fleet.states import ActKind, VehicleState
 from app.fleet.tasks import VehicleConnectionManager
 from app.main import create_app
@@ -313,8 +313,8 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
     events: list[str] = []
 
     class Found(VehicleConnection):
-        def __init__(self, call: ConnectionRequest, *_: object, **__: object) -> None:
-            self.call = call  # type: ignore[misc]
+        def __init__(self, *_: object, **__: object) -> None:
+            pass
 
         def wait_until_open(self) -> ConnectionOpened:
             ask(client, vehicle, "disconnect")
