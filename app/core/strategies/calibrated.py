@@ -61,26 +61,26 @@ def propose(
     fraction = min(trust_fraction(flights), definition.step_fraction)
     box = Box(*space.reachable(space.vector(base.gains), fraction))
     choice = _choose(definition, experiment, space, flights, calibration, base, models, box)
-    foretold = predict_flight(calibration, base, choice.gains)
+    prediction = predict_flight(calibration, base, choice.gains)
     clipped = _at_an_edge(space, box, choice.optimum)
     explanation = Explanation(
-        summary=_summary(experiment, base, choice, foretold, len(calibration.numbers)),
+        summary=_summary(experiment, base, choice, prediction, len(calibration.numbers)),
         base_flight=base.number,
         gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
         direction=_named(space, choice.gains - space.vector(base.gains)),
         clipped=clipped,
         notes=(*choice.notes, *_notes(fraction, clipped)),
-        lesson=_describe_lesson(calibration, foretold),
+        lesson=_describe_lesson(calibration, prediction),
         fitted=calibration.fitted,
         trust_fraction=fraction,
     )
     return Proposal(
         kind=choice.kind,
         gains=space.mapping(choice.gains),
-        predicted=foretold.trajectory,
-        predicted_error=foretold.error,
+        predicted=prediction.trajectory,
+        predicted_error=prediction.error,
         explanation=explanation,
-        interval=foretold.interval,
+        interval=prediction.interval,
         spread=calibration.spread(),
     )
 
@@ -144,19 +144,19 @@ def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
 
 
 def _summary(
-    experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, foretold: FlightPrediction, flights: int
+    experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, prediction: FlightPrediction, flights: int
 ) -> str:
     unit = experiment.error_unit
     told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
     best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
         return f"{told} finds nothing that is better than {best} by {percent(MIN_IMPROVEMENT, 1)} and may be flown."
-    low, high = foretold.interval.lower, foretold.interval.upper
+    low, high = prediction.interval.lower, prediction.interval.upper
     assert base.error is not None
-    share = 1.0 - foretold.error / base.error
+    share = 1.0 - prediction.error / base.error
     return (
         f"{told} promises {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than with {best}: "
-        f"{short(foretold.error)} {unit}, with {percent(foretold.interval.confidence)} confidence within "
+        f"{short(prediction.error)} {unit}, with {percent(prediction.interval.confidence)} confidence within "
         f"{short(low)} … {short(high)} {unit}."
     )
 
@@ -168,10 +168,10 @@ def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(filter(None, (kept, limits, trust)))
 
 
-def _describe_lesson(calibration: Calibration, foretold: FlightPrediction) -> str:
+def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> str:
     """The parameter that the foretold error hangs on most."""
-    values = foretold.models - foretold.models.mean(axis=0)
-    errors = foretold.errors - foretold.errors.mean()
+    values = prediction.models - prediction.models.mean(axis=0)
+    errors = prediction.errors - prediction.errors.mean()
     spread = np.linalg.norm(values, axis=0)
     shares = np.divide(np.abs(errors @ values), spread, out=np.zeros_like(spread), where=spread > 0.0)
     most = calibration.fitted[int(np.argmax(np.round(shares, 9)))]

@@ -172,13 +172,13 @@ def _set_up(radio: AutopilotLink, steps: tuple[Step, ...]) -> None:
 
 
 def observe(
-    radio: AutopilotLink, lookout: AlignedAltitudeSource | None, *, watched_s: float = WATCHED_S
+    radio: AutopilotLink, secondary: AlignedAltitudeSource | None, *, watched_s: float = WATCHED_S
 ) -> GroundObservation:
     """Listen for so long, and up to 10 s for the battery's voltage and a heartbeat that is late."""
     radio.listen(0.0)
     radio.seen.positions.clear()
-    if lookout is not None:
-        lookout.discard_pending()
+    if secondary is not None:
+        secondary.discard_pending()
     begun_s = radio.clock.now_s()
     armed: list[bool] = []
     while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
@@ -186,7 +186,7 @@ def observe(
     ):
         heard = radio.listen(_LISTEN_S)
         armed += [each.measurement.armed for each in heard if isinstance(each.measurement, Heartbeat)]
-    seen_m = () if lookout is None else lookout.ground_altitudes()
+    seen_m = () if secondary is None else secondary.ground_altitudes()
     positions = tuple(position for _, position in radio.seen.positions)
     return GroundObservation(positions, now_s - begun_s, seen_m, disarmed=bool(armed) and not any(armed))
 
@@ -211,13 +211,14 @@ def evaluate_items(
     return (*items, *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
 
 
-def evaluate_secondary(lookout: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
+def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
     rate_hz = len(watched.seen_m) / watched.seconds
     return CheckItem(
         name="second_source",
         title="Second source of altitude",
         passed=rate_hz >= SIGHTINGS_HZ,
-        found=lookout.source.trouble.removesuffix(".") or f"{rate_hz:.0f} sightings a second by {lookout.source.name}",
+        found=secondary.source.trouble.removesuffix(".")
+        or f"{rate_hz:.0f} sightings a second by {secondary.source.name}",
         needed=f"{SIGHTINGS_HZ:g} a second or more",
         hint="See that it tracks the vehicle and streams, or fly without it.",
     )
