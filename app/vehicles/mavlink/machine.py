@@ -294,12 +294,19 @@ def _disarming(trial: Trial, event: Event) -> Step:
         why = "It was found in the air while its motors were to be stopped."
         return abort(note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
-        return quarantine(trial, f"It has not said within {DISARMED_WITHIN_S:g} s that its motors stopped.", now_s)
+        return quarantine(trial, _why_not_stopped(trial, now_s), now_s)
     may_stop = trial.stopped or watching.may_stop_motors(trial.watch, now_s)
     if may_stop and now_s - trial.repeated_s >= REPEAT_S:
         action = Action.KILL if trial.stopped else Action.MOTORS_OFF
         return replace(trial, repeated_s=now_s), (PerformAction(action),)
     return trial, ()
+
+
+def _why_not_stopped(trial: Trial, now_s: float) -> str:
+    doubt = "" if trial.stopped else watching.find_doubt_of_ground(trial.watch, now_s)
+    if doubt:
+        return f"Its motors were not told to stop: {doubt}."
+    return f"It has not said within {DISARMED_WITHIN_S:g} s that its motors stopped."
 
 
 def _answered(trial: Trial, event: Event) -> Trial:

@@ -218,11 +218,23 @@ def mode_of(watch: TrialObservation, limits: Limits) -> str:
 
 
 def may_stop_motors(watch: TrialObservation, now_s: float) -> bool:
-    """Whether its motors may be stopped without a person's word: every witness has had it on the ground for a second,
-    and where it is has never leapt there."""
+    """Whether its motors may be stopped without a person's word."""
+    return not find_doubt_of_ground(watch, now_s)
+
+
+def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
+    """Why it may not be on the ground; empty once every witness has had it there for a second, and where it is has
+    never leapt."""
     since_s = watch.grounded_since_s
-    is_certain = not (watch.doubled or watch.leapt or watch.rebooted)
-    return is_certain and since_s is not None and now_s - since_s >= AGREED_S
+    if watch.doubled:
+        return "two vehicles may be speaking under its system id"
+    if watch.rebooted:
+        return "it rebooted during the flight"
+    if watch.leapt:
+        return "its altitude leapt during the flight"
+    if since_s is None or now_s - since_s < AGREED_S:
+        return f"not every witness has had it on the ground for {AGREED_S:g} s"
+    return ""
 
 
 # ---- positions and heartbeats

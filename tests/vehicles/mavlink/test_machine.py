@@ -591,6 +591,7 @@ def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+    assert walk.trial.why == f"{ABORT} Its motors were not told to stop: its altitude leapt during the flight."
 
 
 @pytest.mark.parametrize("says_so", [True, False])

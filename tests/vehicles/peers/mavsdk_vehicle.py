@@ -97,19 +97,23 @@ class MavsdkVehicle:
         self._mode = mode
 
     def _run(self) -> None:
-        count, next_s = 0, time.monotonic()
-        while not self._leaving.wait(max(next_s - time.monotonic(), 0.0)):
-            next_s += STEP_S
-            self._move()
+        """What a busy machine held up is flown at once and told once, for MAVSDK stamps what it sends. In the air it
+        cannot be disarmed."""
+        begun_s, steps = time.monotonic(), 0
+        while not self._leaving.wait(max(begun_s + steps * STEP_S - time.monotonic(), 0.0)):
+            due = 1 + int((time.monotonic() - begun_s) / STEP_S)
+            tell_battery = due // _BATTERY_EVERY > steps // _BATTERY_EVERY
+            for _ in range(steps, due):
+                self._move()
+            steps = due
+            self._actions.set_disarmable(self.stands, False)
             position = PositionNed(0.0, 0.0, -self.altitude_m)
             velocity = VelocityNed(0.0, 0.0, -self._climb_rate_m_s)
             self._telemetry.publish_position_velocity_ned(PositionVelocityNed(position, velocity))
-            if count % _BATTERY_EVERY == 0:
+            if tell_battery:
                 self._telemetry.publish_sys_status(Battery(_BATTERY_V, 90.0), True, True, True, True, True)
-            count += 1
 
     def _move(self) -> None:
-        """In the air it cannot be disarmed."""
         match self._mode:
             case FlightMode.TAKEOFF | FlightMode.HOLD:
                 missing_m = GROUND_M + self._held("MIS_TAKEOFF_ALT") - self.altitude_m
@@ -119,4 +123,3 @@ class MavsdkVehicle:
             case _:
                 self._climb_rate_m_s = 0.0
         self.altitude_m = max(self.altitude_m + self._climb_rate_m_s * STEP_S, GROUND_M)
-        self._actions.set_disarmable(self.stands, False)
