@@ -99,7 +99,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "two sources more than 0.3 m apart for 0.3 s", "land", "invalid", "Two sources of altitude disagree."
         ),
         Failure.LOST_POSITION: Response(
-            "none of its positions could be believed for 0.5 s, or more than 15 a second are doubted",
+            "none of its positions could be believed for 0.5 s, more than 15 a second are doubted, "
+            "or its altitude stays 0.5 m behind its climb rate as it takes off",
             "land",
             "invalid",
             "The vehicle's position was lost.",

@@ -5,7 +5,13 @@ from typing import Final
 from app.vehicles.mavlink import agreement
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.watch import TrialObservation, has_unreliable_position, is_disarmed, mode_of
+from app.vehicles.mavlink.watch import (
+    TrialObservation,
+    has_unreliable_position,
+    is_behind_climb_rate,
+    is_disarmed,
+    mode_of,
+)
 
 _HEARTBEATS_MISSED: Final = 3.5
 _OWN_CEILING_M: Final = 0.5
@@ -114,6 +120,14 @@ def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) ->
     elif has_unreliable_position(watch):
         why = "Its position jumps to and fro."
     return Finding(failure=Failure.LOST_POSITION, why=why) if why else None
+
+
+def find_altitude_behind(watch: TrialObservation) -> Finding | None:
+    """For a vehicle that was told to climb and is on the ground by its altitude."""
+    if not is_behind_climb_rate(watch):
+        return None
+    why = f"By its climb rate it rose by {watch.behind_m:.1f} m more than by its altitude."
+    return Finding(failure=Failure.LOST_POSITION, why=why)
 
 
 def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:

@@ -4,15 +4,16 @@ It knows no autopilot and no clock: events carry their time, commands are data t
 """
 
 import statistics
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final
 
 from app.vehicles.mavlink import agreement, findings
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure, Finding
 from app.vehicles.mavlink.limits import DESCENDING_M_S, GROUND_M, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
+from app.vehicles.mavlink.measurements import Heartbeat, Position, confirms_motors_off
 from app.vehicles.mavlink.moves import (
     Plan,
     Step,
@@ -58,6 +59,10 @@ DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
 _IN_PLACE_M: Final = 0.3
+_SHIFT_M: Final = 0.3
+"""By how much any altitude may shift on the ground as the motors start."""
+_CLIMBED_M: Final = 0.1
+"""A vehicle that has climbed less, by its climb rate, has not moved."""
 _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
 
@@ -108,7 +113,7 @@ def _react(trial: Trial, event: Event) -> Step:
     if isinstance(event, MotorsOffRequested):
         return stop_motors(trial, event.reason, event.now_s)
     if isinstance(event, AbortRequested) and trial.state in COMMANDED:
-        trial = _with_ground(trial) if trial.state is State.ARM else trial
+        trial = _with_ground(trial, event.now_s) if trial.state is State.ARM else trial
         return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
     return _HANDLERS[trial.state](trial, event)
 
@@ -120,34 +125,52 @@ def _arm(trial: Trial, event: Event) -> Step:
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if finding := findings.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
-        return fail(_with_ground(trial), finding, now_s)
+        return fail(_with_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    trial = _with_ground(replace(trial, watch=replace(trial.watch, block="")))
+    trial = _with_ground(replace(trial, watch=replace(trial.watch, block="", behind_m=0.0)), now_s)
+    if finding := _left_ground(trial):
+        return fail(trial, finding, now_s)
     trial = replace(trial, commanded_s=now_s, commanded_boot_s=last.time_boot_s)
     return enter(trial, State.TAKEOFF, now_s), (PerformAction(Action.TAKE_OFF),)
 
 
-def _with_ground(trial: Trial) -> Trial:
-    """Heights count from where it stands now, if its altitude began anew as it was armed: that leapt, on an autopilot
-    that counts from the ground, and stands still since, in the same place, and it does not say that it flies. Whatever
-    else its altitude did is no new ground: it may have left the old one."""
-    watch, stood = trial.watch, trial.ground_samples[len(trial.ground_samples) // 2 :]
-    if not (trial.plan.climbs_from_ground and watch.leapt and stood) or watch.doubted or watch.landed is False:
+def _with_ground(trial: Trial, now_s: float) -> Trial:
+    """Heights count from where it stands now, for its altitude shifts as its motors start, and begins anew on an
+    autopilot that counts from the ground. Where it may have moved, the ground stays where it was."""
+    watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
+    stood = samples[len(samples) // 2 :]
+    if not stood or watch.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
         return trial
     altitudes_m = [position.altitude_m for position in stood]
+    is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
     is_in_place = stood[-1].away_m(watch.origin or stood[-1]) <= _IN_PLACE_M
-    if max(altitudes_m) - min(altitudes_m) > GROUND_M or not is_in_place:
+    shift_m = statistics.median(altitudes_m) - plan.ground_m
+    may_shift = plan.climbs_from_ground or abs(shift_m) <= _SHIFT_M
+    if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
         return trial
-    ground_m = statistics.median(altitudes_m)
     return replace(
         trial,
-        plan=trial.plan.on_ground_at(ground_m),
+        plan=plan.on_ground_at(plan.ground_m + shift_m),
         watch=watching.reset_altitude(watch),
-        ground_shift_m=ground_m - trial.plan.ground_m,
+        ground_shift_m=shift_m,
         ground_samples=(),
     )
+
+
+def _climbed_m(samples: Sequence[Position]) -> float:
+    """By its climb rate alone."""
+    return sum(later.climb_rate_m_s * (later.time_boot_s - earlier.time_boot_s) for earlier, later in pairwise(samples))
+
+
+def _left_ground(trial: Trial) -> Finding | None:
+    """For a vehicle that has not been told to climb."""
+    last = trial.watch.last
+    if last is None or abs(away_m := last.altitude_m - trial.plan.ground_m) <= GROUND_M:
+        return None
+    why = f"Its altitude changed by {away_m:+.2f} m before the take-off command, and it may have moved."
+    return Finding(failure=Failure.LOST_POSITION, why=why)
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
@@ -168,6 +191,8 @@ def _take_off(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
         return enter(trial, State.RECORD, now_s), ()
+    if finding := findings.find_altitude_behind(trial.watch):
+        return fail(trial, finding, now_s)
     if isinstance(event, ActionRefused):
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
     if now_s - trial.since_s > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):

@@ -115,9 +115,8 @@ def _lose_link(trial: Trial, now_s: float) -> Step:
 
 
 def _give_up_take_off(trial: Trial, now_s: float) -> Step:
-    """Motors off where it is on the ground by height and speed. In the air its integrator is wound up."""
-    grounded = watching.is_grounded(trial.watch, now_s, trial.plan.ground_m)
-    return disarm(trial, now_s) if grounded else abort(trial, now_s)
+    """Motors off where every witness has it on the ground. In the air its integrator is wound up."""
+    return disarm(trial, now_s) if trial.watch.grounded_since_s is not None else abort(trial, now_s)
 
 
 def _abort_landing(trial: Trial, now_s: float) -> Step:
@@ -164,11 +163,11 @@ def disarm(trial: Trial, now_s: float) -> Step:
 
 
 def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
-    """At once, wherever the vehicle is; the trial is aborted, whatever came before. It is repeated from disarm."""
+    """At once, wherever the vehicle is; a trial that had not failed is aborted by it. It is repeated from disarm."""
     if trial.stopped:
         return trial, ()
-    why = joined(trial.why, f"{MOTORS_OFF_ASKED}{reason}.")
-    trial = replace(trial, failure=Failure.OPERATOR, why=why, stopped=True, answered=False, awaited=None, unsent=())
+    why, failure = joined(trial.why, f"{MOTORS_OFF_ASKED}{reason}."), trial.failure or Failure.OPERATOR
+    trial = replace(trial, failure=failure, why=why, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
     return replace(trial, repeated_s=now_s), (PerformAction(Action.KILL),)

@@ -43,6 +43,8 @@ _BACK_S: Final = 1.0
 """A clock that falls back by less is a packet that came late."""
 _SAME_CLOCK_S: Final = 0.5
 _REBOOTED_S: Final = 0.4
+BEHIND_M: Final = 0.5
+"""An altitude that has stayed so far behind the climb rate does not follow it."""
 _DRIFT_M: Final = 1.0
 """How far off an altitude may be that drifted while it flew."""
 
@@ -93,6 +95,8 @@ class TrialObservation:
     grounded_since_s: float | None = None
     lifted: bool = False
     """Whether it was ever above the ground."""
+    behind_m: float = 0.0
+    """How far its altitude stayed behind its climb rate, before it was first above the ground."""
     second: SecondaryAltitude | None = None
     rebooted: bool = False
     breached: str = ""
@@ -121,7 +125,7 @@ def begin(
 def reset_altitude(watch: TrialObservation) -> TrialObservation:
     """The memory of a vehicle on the ground whose altitude begins anew: what it was before says nothing any more."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
-    return replace(watch, leapt=False, lifted=False, side=-1, crossings=0, second=second)
+    return replace(watch, leapt=False, lifted=False, behind_m=0.0, side=-1, crossings=0, second=second)
 
 
 def update(
@@ -164,15 +168,8 @@ def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObser
         return watch
     watch = replace(watch, lifted=watch.lifted or is_airborne(watch, now_s, ground_m))
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
-    grounded = is_grounded(watch, now_s, ground_m) and not _is_contradicted(watch, now_s, ground_m)
+    grounded = is_grounded(watch, now_s, ground_m) and not is_said_to_fly(watch, now_s, ground_m)
     return replace(watch, grounded_since_s=since_s if grounded else None)
-
-
-def _is_contradicted(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
-    """What it says of itself counts once it has flown: one that was told to climb may believe that it does."""
-    says_flying = watch.lifted and watch.landed is False and now_s - watch.landed_s < AGREED_S
-    seen_m = agreement.current_altitude_m(watch.second, now_s)
-    return says_flying or (seen_m is not None and seen_m - ground_m > GROUND_M)
 
 
 # ---- what may be believed
@@ -207,6 +204,18 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     return watch.last is not None and is_fresh(watch, now_s) and watch.last.altitude_m - ground_m > GROUND_M
 
 
+def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
+    """By what it says of itself, or by where the second source sees it, whatever its altitude."""
+    says_so = watch.landed is False and now_s - watch.landed_s < AGREED_S
+    seen_m = agreement.current_altitude_m(watch.second, now_s)
+    return says_so or (seen_m is not None and seen_m - ground_m > GROUND_M)
+
+
+def is_behind_climb_rate(watch: TrialObservation) -> bool:
+    """Whether its altitude stands still while it rises, by its climb rate."""
+    return watch.behind_m > BEHIND_M
+
+
 def is_disarmed(watch: TrialObservation, limits: Limits) -> bool:
     """By two heartbeats at least, and none between them that says otherwise."""
     return not watch.armed and watch.heartbeat_s - watch.armed_since_s >= limits.confirmation_s
@@ -232,6 +241,8 @@ def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
         return "it rebooted during the flight"
     if watch.leapt:
         return "its altitude leapt during the flight"
+    if is_behind_climb_rate(watch):
+        return "its altitude did not follow its climb rate"
     if since_s is None or now_s - since_s < AGREED_S:
         return f"not every witness has had it on the ground for {AGREED_S:g} s"
     return ""
@@ -316,6 +327,7 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
     crossed = watch.crossings + (side != watch.side)
     return replace(
         watch,
+        behind_m=_behind_m(watch, position),
         accepted_s=now_s,
         last=position,
         origin=watch.origin or position,
@@ -323,3 +335,12 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
         crossings=crossed,
         other=None,
     )
+
+
+def _behind_m(watch: TrialObservation, position: Position) -> float:
+    last = watch.last
+    if last is None or watch.lifted or is_behind_climb_rate(watch):
+        return watch.behind_m
+    climb_rate_m_s = position.climb_rate_m_s if abs(position.climb_rate_m_s) > RESTING_M_S else 0.0
+    climbed_m = climb_rate_m_s * (position.time_boot_s - last.time_boot_s)
+    return watch.behind_m + climbed_m - (position.altitude_m - last.altitude_m)

@@ -123,6 +123,48 @@ def test_the_ground_is_where_a_vehicle_stands_whose_altitude_began_anew_as_it_wa
     assert walk.state is State.RECORD
 
 
+@pytest.mark.parametrize("plan", [COPTER, PLAN], ids=["copter", "paparazzi"])
+@pytest.mark.parametrize("by_m", [0.05, 0.2, -0.25])
+def test_the_ground_is_measured_again_before_the_command_for_starting_motors_shift_it(by_m: float, plan: Plan) -> None:
+    """Seen: one that stood 0.2 m higher by its own altitude was taken for one in the air that hovers."""
+    walk = begun_anew(by_m, plan=plan)
+    assert walk.trial.plan.ground_m == pytest.approx(GROUND_M + by_m)
+    datum_m = GROUND_M + by_m if plan.climbs_from_ground else 0.0
+    assert walk.trial.plan.datum_m == pytest.approx(datum_m)
+    walk.pass_s(plan.lift_off_s + 0.1)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
+
+
+def test_a_shift_that_its_own_speed_explains_is_no_new_ground() -> None:
+    walk = armed()
+    walk.climb_rate_m_s = 0.5
+    walk.pass_s(0.26)
+    walk.climb_rate_m_s = 0.0
+    commanded(walk)
+    assert walk.trial.plan == COPTER
+
+
+def test_a_shift_that_the_second_source_does_not_see_is_measured_and_one_that_it_sees_is_a_rise() -> None:
+    for seen_m, ground_m in ((0.0, GROUND_M + 0.25), (0.25, GROUND_M)):
+        walk = armed()
+        walk.altitude_m += 0.25
+        while walk.state is State.ARM:
+            walk.pass_s(STEP_S)
+            walk.give(SecondaryAltitudeReceived(GROUND_M + seen_m, is_new=True, now_s=walk.now_s))
+        assert walk.trial.plan.ground_m == pytest.approx(ground_m)
+
+
+def test_a_vehicle_whose_altitude_left_the_ground_before_the_command_is_not_told_to_climb() -> None:
+    walk = armed()
+    rise(walk)
+    commanded(walk)
+    assert walk.trial.failure is Failure.LOST_POSITION
+    assert walk.trial.why == "Its altitude changed by +0.40 m before the take-off command, and it may have moved."
+    walk.pass_s(0.5)
+    assert Action.TAKE_OFF not in walk.actions
+    assert walk.actions[-1] is Action.LAND, "it may be in the air"
+
+
 def test_a_vehicle_whose_altitude_began_anew_has_its_motors_stopped_where_it_stands() -> None:
     walk = begun_anew(plan=replace(COPTER, lift_off_s=0.5))
     walk.pass_s(0.6)
@@ -178,6 +220,7 @@ def test_what_else_its_altitude_does_before_the_command_is_no_new_ground(
 def test_a_paparazzis_altitude_does_not_begin_anew_for_it_can_be_dropped() -> None:
     walk = begun_anew(plan=PLAN)
     assert walk.trial.plan == PLAN
+    assert Action.TAKE_OFF not in walk.actions
     walk.pass_s(12.0)
     assert Action.MOTORS_OFF not in walk.actions
 
@@ -469,6 +512,34 @@ def test_a_vehicle_that_lifts_off_too_late_is_landed_on_its_safe_gains() -> None
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NO_LIFT_OFF)
     assert Action.MOTORS_OFF not in walk.actions
     assert walk.gains_sent == [SAFE_GAINS[0]]
+
+
+def test_a_vehicle_that_says_that_it_flies_is_landed_though_its_altitude_stays_on_the_ground() -> None:
+    """Its altitude may stand still while it climbs: then motors off would drop it."""
+    walk = taking_off()
+    walk.landed = False
+    walk.pass_s(1.5)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NO_LIFT_OFF)
+    walk.pass_s(35.0)
+    assert Action.MOTORS_OFF not in walk.actions
+    walk.landed = True
+    walk.pass_s(3.5)
+    assert walk.actions[-1] is Action.MOTORS_OFF
+
+
+def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motors() -> None:
+    walk = taking_off()
+    ground_m = walk.altitude_m
+    for _ in range(50):
+        walk.altitude_m, walk.climb_rate_m_s = ground_m - STEP_S, 1.0
+        walk.pass_s(STEP_S)
+    walk.altitude_m, walk.climb_rate_m_s = ground_m, 0.0
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
+    assert walk.trial.why == "By its climb rate it rose by 0.5 m more than by its altitude."
+    walk.pass_s(60.0)
+    assert walk.state is State.QUARANTINE
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+    assert "Its motors were not told to stop: its altitude did not follow its climb rate." in walk.trial.why
 
 
 def test_a_refused_take_off_disarms_on_the_ground() -> None:
