@@ -1,23 +1,25 @@
+import { useEffect } from "react";
 import { Route, Routes } from "react-router";
-import { AppFrame } from "./components/AppFrame";
-import { later } from "./components/later";
-import { CampaignPage } from "./pages/CampaignPage";
-import { CampaignsPage } from "./pages/CampaignsPage";
-import { NotFoundPage } from "./pages/NotFoundPage";
+import { CampaignPage } from "./features/campaign/CampaignPage";
+import { CampaignsPage } from "./features/campaigns/CampaignsPage";
+import { AppFrame } from "./frame/AppFrame";
+import { fetchEveryPage, lazyPage } from "./lazyPage";
+import { NotFoundPage } from "./ui/NotFoundPage";
 
-const ComparePage = later("ComparePage");
-const ControllerPage = later("ControllerPage");
-const FlightPage = later("FlightPage");
-const FlyPage = later("FlyPage");
-const JobsPage = later("JobsPage");
-const NewCampaignPage = later("NewCampaignPage");
-const NewVehiclePage = later("NewVehiclePage");
-const ReproductionsPage = later("ReproductionsPage");
-const SettingsPage = later("SettingsPage");
-const VehiclePage = later("VehiclePage");
-const VehiclesPage = later("VehiclesPage");
+const ComparePage = lazyPage("ComparePage");
+const ControllerPage = lazyPage("ControllerPage");
+const FlightPage = lazyPage("FlightPage");
+const FlyPage = lazyPage("FlyPage");
+const JobsPage = lazyPage("JobsPage");
+const NewCampaignPage = lazyPage("NewCampaignPage");
+const NewVehiclePage = lazyPage("NewVehiclePage");
+const ReproductionsPage = lazyPage("ReproductionsPage");
+const SettingsPage = lazyPage("SettingsPage");
+const VehiclePage = lazyPage("VehiclePage");
+const VehiclesPage = lazyPage("VehiclesPage");
 
 export function App() {
+  useEffect(fetchEveryPage, []);
   return (
     <Routes>
       <Route element={<AppFrame />}>

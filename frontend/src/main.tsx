@@ -5,8 +5,8 @@ import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { BrowserRouter } from "react-router";
+import { retries } from "./api/problems";
 import { App } from "./app";
-import { retries } from "./lib/problems";
 import { theme } from "./theme/theme";
 
 const root = document.getElementById("root");

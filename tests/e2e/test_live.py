@@ -110,7 +110,7 @@ def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboa
     dashboard, other = open_dashboard(own_server.url), open_dashboard(own_server.url)
     campaign_id = dashboard.create("twin", name="Before")
     dashboard.open_campaign(campaign_id)
-    with other.page.expect_response(re.compile(r"/assets/later-.*\.js")):
+    with other.page.expect_response(re.compile(r"/assets/pages-.*\.js")):
         other.open("/")
     other.until(lambda: bool(other.page.evaluate(CHARTS_FETCHED)))
     own_server.stop()
@@ -186,10 +186,10 @@ def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(
     open_dashboard: Opener, shared_server: Server
 ) -> None:
     dashboard = open_dashboard(shared_server.url, alone=True)
-    dashboard.page.route("**/assets/later-*.js", lambda route: route.abort())
+    dashboard.page.route("**/assets/pages-*.js", lambda route: route.abort())
     dashboard.open("/vehicles")
     expect(dashboard.page.get_by_role("alert")).to_contain_text("This page could not be fetched.")
     expect(dashboard.page.get_by_role("alert")).to_contain_text("Try again")
-    dashboard.page.unroute("**/assets/later-*.js")
+    dashboard.page.unroute("**/assets/pages-*.js")
     dashboard.button("Try again").click()
     expect(heading(dashboard, "Vehicles")).to_be_visible()

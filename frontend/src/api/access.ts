@@ -1,9 +1,9 @@
 /** What this browser may do here. */
 
 import { useQuery } from "@tanstack/react-query";
-import { type WatchedVehicle, watchOnly } from "../lib/access";
 import { answer } from "./client";
 import { getAccess } from "./generated";
+import { readOnlyReason, type WatchedVehicle } from "./readOnly";
 
 const LOOK_AGAIN_MS = 5000;
 
@@ -19,7 +19,7 @@ function useAccess() {
 }
 
 /** Why this browser may only watch the vehicle, or anything at all (null); null where it may act. */
-export function useWatchOnly(vehicle: WatchedVehicle | null): string | null {
+export function useReadOnlyReason(vehicle: WatchedVehicle | null): string | null {
   const access = useAccess();
-  return access === undefined ? null : watchOnly(access, vehicle);
+  return access === undefined ? null : readOnlyReason(access, vehicle);
 }

@@ -1,7 +1,6 @@
 /** Recorded controllers held against the replica. */
 
 import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import type { RecordFiles } from "../lib/records";
 import { answer } from "./client";
 import {
   type ControllerCheck,
@@ -14,6 +13,7 @@ import {
   listControllerChecks,
 } from "./generated";
 import type { Theme } from "./queries";
+import type { RecordFiles } from "./records";
 
 export type { CheckedSignal, ControllerCheck, ControllerCheckSummary } from "./generated";
 export type CheckFigureName = GetControllerCheckFigureData["path"]["name"];

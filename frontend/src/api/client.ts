@@ -1,9 +1,9 @@
 /** The generated client, set up once: same origin, a key for every POST, problem documents as errors. */
 
-import { randomKey } from "../lib/ids";
-import { ApiError, problemFrom } from "../lib/problems";
-import { controlHeader } from "../live/leases";
 import { client } from "./generated/client.gen";
+import { randomKey } from "./ids";
+import { controlHeader } from "./leases";
+import { ApiError, problemFrom } from "./problems";
 
 client.setConfig({ baseUrl: "" });
 

@@ -2,10 +2,10 @@
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { problemOf } from "../lib/problems";
-import { dropLease, holdLease, leasesNow, type OwnLease } from "../live/leases";
 import { answer } from "./client";
 import { giveUpControl, takeControl } from "./generated";
+import { dropLease, holdLease, leasesNow, type OwnLease } from "./leases";
+import { problemOf } from "./problems";
 import { useVehicleChanged } from "./vehicles";
 
 const RENEW_MS = 5000;
@@ -58,7 +58,7 @@ export function useTakeControl(vehicleId: number) {
   });
 }
 
-export function useHandOver(vehicleId: number) {
+export function useReleaseControl(vehicleId: number) {
   const changed = useVehicleChanged();
   return useMutation({
     mutationFn: () => answer(giveUpControl({ path: { vehicle_id: vehicleId } })),

@@ -2,9 +2,9 @@
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
-import { fileNameIn } from "../lib/files";
-import { randomKey } from "../lib/ids";
-import { ApiError, problemFrom } from "../lib/problems";
+import { fileNameIn } from "./fileName";
+import { randomKey } from "./ids";
+import { ApiError, problemFrom } from "./problems";
 import type { Campaign } from "./types";
 
 export function pathOf(campaignId: number, file: "report.html" | "report.pdf" | "bundle"): string {
@@ -35,7 +35,7 @@ export function useDownload(path: string) {
 
 /** The page of the campaign opens then. Here and not where it was asked for: an empty list is another page as soon as
  * the campaign is known, and would not hear of it. */
-export function useBringIn() {
+export function useImportBundle() {
   const queries = useQueryClient();
   const navigate = useNavigate();
   return useMutation({

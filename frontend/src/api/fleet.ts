@@ -1,7 +1,6 @@
 /** What people do with vehicles, and what vehicles were asked and given. */
 
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
-import { controlHeader } from "../live/leases";
 import { answer } from "./client";
 import {
   checkVehicle,
@@ -17,6 +16,7 @@ import {
   restoreSafeGains,
   type VehicleEdit,
 } from "./generated";
+import { controlHeader } from "./leases";
 import { useVehicleChanged } from "./vehicles";
 
 const SHOWN = 20;
@@ -68,13 +68,13 @@ const ACTS = {
   parameters: readParameters,
 } as const;
 
-export type Asked = keyof typeof ACTS;
+export type VehicleRequest = keyof typeof ACTS;
 
 /** Ask a vehicle for one of its acts; what comes of it is seen in the list of its acts. */
-export function useAskVehicle(vehicleId: number) {
+export function useVehicleRequest(vehicleId: number) {
   const changed = useVehicleChanged();
   return useMutation({
-    mutationFn: (act: Asked) =>
+    mutationFn: (act: VehicleRequest) =>
       answer(ACTS[act]({ path: { vehicle_id: vehicleId }, headers: controlHeader(vehicleId) })),
     onSettled: () => changed(vehicleId),
   });

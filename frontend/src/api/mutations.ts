@@ -2,8 +2,6 @@
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
-import type { RecordFiles } from "../lib/records";
-import { controlHeader } from "../live/leases";
 import { answer } from "./client";
 import {
   archiveCampaign,
@@ -25,6 +23,8 @@ import {
   type Trial,
   uploadTrajectory,
 } from "./generated";
+import { controlHeader } from "./leases";
+import type { RecordFiles } from "./records";
 
 function useSettled() {
   const queries = useQueryClient();
@@ -88,7 +88,7 @@ export function useCancelTrial() {
   });
 }
 
-export interface Classing {
+export interface ClassificationInput {
   trial: Trial;
   outcome: "valid" | "aborted" | "invalid";
   reason: string;
@@ -97,20 +97,20 @@ export interface Classing {
 export function useClassify() {
   const settled = useSettled();
   return useMutation({
-    mutationFn: ({ trial, outcome, reason }: Classing) =>
+    mutationFn: ({ trial, outcome, reason }: ClassificationInput) =>
       answer(classifyTrial({ path: { trial_id: trial.id }, body: { version: trial.version, outcome, reason } })),
     onSuccess: settled.trial,
     onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),
   });
 }
 
-export type AbortWord = "behaved badly" | "something else";
+export type AbortJudgementInput = "behaved badly" | "something else";
 
 /** Why the operator broke a flight off. */
 export function useJudgeAbort() {
   const settled = useSettled();
   return useMutation({
-    mutationFn: ({ trial, cause }: { trial: Trial; cause: AbortWord }) =>
+    mutationFn: ({ trial, cause }: { trial: Trial; cause: AbortJudgementInput }) =>
       answer(judgeAbort({ path: { trial_id: trial.id }, body: { version: trial.version, cause } })),
     onSuccess: settled.trial,
     onError: (_error, { trial }) => settled.ofCampaign(trial.campaign_id),

@@ -13,7 +13,7 @@ export function usePhotos(trialId: number) {
   });
 }
 
-export function usePhotoActs(trialId: number) {
+export function usePhotoActions(trialId: number) {
   const queries = useQueryClient();
   const onSettled = () => queries.invalidateQueries({ queryKey: ["trial", trialId, "photos"] });
   return {

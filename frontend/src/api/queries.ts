@@ -1,12 +1,9 @@
-/** Everything that pages read. Keys are what `lib/events.ts` makes doubtful. */
+/** Everything that pages read. Keys are what `live/staleQueries.ts` makes stale. */
 
 import { keepPreviousData, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
-import { useCallback, useState } from "react";
-import { hasLanded } from "../lib/nextStep";
-import type { Seconds } from "../lib/traces";
+import { useCallback } from "react";
 import { answer } from "./client";
 import {
-  type Campaign,
   type CampaignState,
   getCampaign,
   getCampaignFigure,
@@ -18,7 +15,6 @@ import {
   getTrial,
   listCampaigns,
   listTrials,
-  type NextFlight,
   type PageTrial,
   type Sort,
   type Trial,
@@ -26,6 +22,9 @@ import {
 
 export type Theme = "light" | "dark";
 export type FigureName = "takeoffs" | "errors" | "gains";
+
+/** From and to, in seconds of the flight. */
+export type TimeRange = readonly [number, number];
 
 export interface CampaignFilter {
   search: string;
@@ -95,42 +94,13 @@ export function useTrials(campaignId: number) {
   });
 }
 
-/** A campaign with its flights and its next one, as they belong together. */
-export interface Standing {
-  campaign: Campaign;
-  trials: readonly Trial[];
-  next: NextFlight;
-}
-
-/** Null until all of it is known. Each part is read by itself: what a change has made doubtful is not put beside what is
- * new already, so that nobody is asked for what was said a moment ago, or offered gains that are overtaken. */
-export function useStanding(campaignId: number): Standing | null {
-  const campaign = useCampaign(campaignId);
-  const trials = useTrials(campaignId);
-  const next = useProposal(campaignId);
-  const [held, setHeld] = useState<Standing | null>(null);
-  const parts = { campaign: campaign.data, trials: trials.data, next: next.data };
-  const areNew = [campaign, trials, next].every(({ isStale, error }) => !isStale || error !== null);
-  const areOther = parts.campaign !== held?.campaign || parts.trials !== held?.trials || parts.next !== held?.next;
-  if (areNew && areOther && isKnown(parts)) setHeld(parts);
-  // A landing is told at once: nothing is shown in the air that is known to be down.
-  if (held !== null && parts.trials !== undefined && hasLanded(held.campaign, parts.trials)) {
-    return { ...held, trials: parts.trials };
-  }
-  return held;
-}
-
-function isKnown(parts: { [Part in keyof Standing]: Standing[Part] | undefined }): parts is Standing {
-  return parts.campaign !== undefined && parts.trials !== undefined && parts.next !== undefined;
-}
-
 export function useTrial(trialId: number) {
   return useQuery({ queryKey: ["trial", trialId], queryFn: () => answer(getTrial({ path: { trial_id: trialId } })) });
 }
 
 /** What of a figure is looked at: these seconds, in more detail, and that flight's own curve among many. */
 export interface FigureView {
-  window: Seconds | null;
+  window: TimeRange | null;
   flight: number | null;
 }
 

@@ -1,4 +1,4 @@
-/** What pages read of vehicles. Keys are what `lib/events.ts` makes doubtful. */
+/** What pages read of vehicles. Keys are what `live/staleQueries.ts` makes stale. */
 
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";

@@ -1,18 +1,19 @@
 /** What the event stream says, kept outside of React: the connection, the flights under way, and how vehicles are. */
 
 import { useEffect, useMemo, useState, useSyncExternalStore } from "react";
-import { begun, extended, type LiveFlight, type Telemetry, underWay, withFlight } from "../lib/live";
-import type { News } from "../lib/speech";
+import { Store } from "../api/store";
+import type { News } from "./speech";
+import { begun, extended, type LiveFlight, type Telemetry, underWay, withFlight } from "./telemetry";
 import {
   type Aged,
   aged,
   before,
   CURRENT_S,
-  type Heard,
+  type LastHeard,
   type Moment,
   secondsBetween,
   type VehicleStatus,
-} from "../lib/vehicle";
+} from "./vehicleStatus";
 
 export interface Connection {
   state: "connecting" | "live" | "away";
@@ -21,32 +22,9 @@ export interface Connection {
   heardAt: string | null;
 }
 
-type Listener = () => void;
-
-export class Store<Value> {
-  private value: Value;
-  private readonly listeners = new Set<Listener>();
-
-  constructor(value: Value) {
-    this.value = value;
-  }
-
-  readonly get = (): Value => this.value;
-
-  readonly set = (value: Value): void => {
-    this.value = value;
-    for (const listener of this.listeners) listener();
-  };
-
-  readonly subscribe = (listener: Listener): (() => void) => {
-    this.listeners.add(listener);
-    return () => this.listeners.delete(listener);
-  };
-}
-
 const connection = new Store<Connection>({ state: "connecting", worker: true, heardAt: null });
 const flights = new Store<ReadonlyMap<number, LiveFlight>>(new Map());
-const vehicles = new Store<ReadonlyMap<number, Heard>>(new Map());
+const vehicles = new Store<ReadonlyMap<number, LastHeard>>(new Map());
 
 export function setConnection(change: Partial<Connection>): void {
   const next = { ...connection.get(), ...change };
@@ -58,17 +36,17 @@ export function setNotLive(state: "connecting" | "away", heardAt: string | null)
   if (connection.get().state !== state) connection.set({ ...connection.get(), state, heardAt });
 }
 
-export function takeTelemetry(news: Telemetry): void {
+export function applyTelemetry(news: Telemetry): void {
   const known = flights.get().get(news.trial_id) ?? begun(news.campaign_id, news.trial_id);
   flights.set(withFlight(flights.get(), { ...extended(known, news), heardAt: before(momentNow(), news.age_s) }));
 }
 
-export function takePhase(campaignId: number, trialId: number, phase: string): void {
+export function applyPhase(campaignId: number, trialId: number, phase: string): void {
   const known = flights.get().get(trialId) ?? begun(campaignId, trialId);
   flights.set(withFlight(flights.get(), { ...known, phase, heardAt: momentNow() }));
 }
 
-export function takeStatus(status: VehicleStatus): void {
+export function applyStatus(status: VehicleStatus): void {
   vehicles.set(new Map([...vehicles.get(), [status.vehicleId, { status, heardAt: before(momentNow(), status.ageS) }]]));
 }
 

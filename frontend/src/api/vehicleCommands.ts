@@ -1,0 +1,81 @@
+/** The acts of the fly screen: stage, take off, unstage; land and motors off, which wait for nothing. */
+
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useEffect, useRef, useState } from "react";
+import { answer } from "./client";
+import { landVehicle, stageTrial, stopMotors, type Trial, takeOffTrial, unstageTrial } from "./generated";
+import { controlHeader } from "./leases";
+import { problemOf } from "./problems";
+
+type Act = typeof stageTrial | typeof takeOffTrial | typeof unstageTrial;
+
+function useAct(act: Act, vehicleId: number) {
+  const queries = useQueryClient();
+  const settled = (trialId: number, campaignId: number) =>
+    Promise.all([
+      queries.invalidateQueries({ queryKey: ["trial", trialId] }),
+      queries.invalidateQueries({ queryKey: ["campaign", campaignId] }),
+      queries.invalidateQueries({ queryKey: ["vehicles"] }),
+      queries.invalidateQueries({ queryKey: ["flying"] }),
+    ]);
+  return useMutation({
+    mutationFn: ({ id }: Trial) => answer(act({ path: { trial_id: id }, headers: controlHeader(vehicleId) })),
+    onSuccess: (after) => queries.setQueryData(["trial", after.id], after),
+    onSettled: (_after, _error, { id, campaign_id }) => settled(id, campaign_id),
+  });
+}
+
+export function useFlyActions(vehicleId: number) {
+  return {
+    stage: useAct(stageTrial, vehicleId),
+    takeOff: useAct(takeOffTrial, vehicleId),
+    unstage: useAct(unstageTrial, vehicleId),
+  };
+}
+
+export type VehicleCommand = "land" | "motors off";
+
+export interface CommandAnswer {
+  order: VehicleCommand;
+  accepted: boolean;
+  sentence: string;
+}
+
+const SENDS = { land: landVehicle, "motors off": stopMotors } as const;
+const AGAIN_MS = 400;
+/** An order is not carried out long after it was given: whoever still wants it gives it again. */
+const GIVE_UP_MS = 5000;
+
+async function send(vehicleId: number, order: VehicleCommand): Promise<CommandAnswer> {
+  try {
+    const { accepted, sentence } = await answer(SENDS[order]({ path: { vehicle_id: vehicleId }, body: {} }));
+    return { order, accepted, sentence };
+  } catch (error) {
+    const problem = problemOf(error);
+    return {
+      order,
+      accepted: false,
+      sentence: problem === null ? "" : `${problem.title}: ${problem.detail} ${problem.hint}`,
+    };
+  }
+}
+
+/** Tells a vehicle to land or to stop its motors, again and again until the worker has taken it, for five seconds. */
+export function useVehicleCommands(vehicleId: number) {
+  const [said, setSaid] = useState<CommandAnswer | null>(null);
+  const again = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
+  useEffect(() => () => clearTimeout(again.current), []);
+
+  async function tell(order: VehicleCommand, untilMs: number): Promise<void> {
+    const answered = await send(vehicleId, order);
+    setSaid(answered);
+    if (answered.accepted || performance.now() >= untilMs) return;
+    again.current = setTimeout(() => void tell(order, untilMs), AGAIN_MS);
+  }
+
+  const press = (order: VehicleCommand): void => {
+    clearTimeout(again.current);
+    void tell(order, performance.now() + GIVE_UP_MS);
+  };
+  return { said, press };
+}

@@ -1,0 +1,109 @@
+import { ActionIcon } from "@mantine/core";
+import { IconChartLine, IconTable } from "@tabler/icons-react";
+import { type ReactNode, useMemo, useState } from "react";
+import type { TimeRange } from "../api/queries";
+import type { FigureCard } from "../api/types";
+import { DataTable } from "../ui/DataTable";
+import { ErrorNotice } from "../ui/ErrorNotice";
+import type { Topic } from "../ui/explanations";
+import { HelpTip } from "../ui/HelpTip";
+import { Panel } from "../ui/Panel";
+import classes from "../ui/Panel.module.css";
+import { Chart } from "./Chart";
+import type { Build, CurveOf } from "./plotly";
+import type { PlotlyFigure } from "./traces";
+
+interface Props {
+  title: string;
+  card: FigureCard | undefined;
+  error: unknown;
+  /** Whether it is being asked for already. */
+  wanted?: boolean;
+  height: number;
+  /** What the page adds to the figure as it came. */
+  dressed?: (figure: PlotlyFigure) => PlotlyFigure;
+  liveTrial?: number | null;
+  onChoose?: (trial: number) => void;
+  onWindow?: (window: TimeRange | null) => void;
+  curveOf?: CurveOf;
+  build?: Build;
+  tools?: ReactNode;
+  /** What a newcomer asks of it. */
+  topic?: Topic;
+  /** What there is to say of it in words. */
+  note?: string | undefined;
+  className?: string | undefined;
+}
+
+/** One figure with its table one tap away; says so when there is nothing to draw yet or drawing failed. */
+export function FigurePanel({
+  title,
+  card,
+  error,
+  wanted = true,
+  height,
+  dressed,
+  liveTrial,
+  onChoose,
+  onWindow,
+  curveOf,
+  build,
+  tools,
+  topic,
+  note,
+  className,
+}: Props) {
+  const [asTable, setAsTable] = useState(false);
+  const raw = card?.figure;
+  const figure = useMemo(() => {
+    if (!raw) return null;
+    const drawn = raw as unknown as PlotlyFigure;
+    return dressed === undefined ? drawn : dressed(drawn);
+  }, [raw, dressed]);
+  const Icon = asTable ? IconChartLine : IconTable;
+  const other = asTable ? `${title}: show the chart` : `${title}: show the numbers as a table`;
+  return (
+    <Panel
+      title={
+        <>
+          {title} {topic && <HelpTip topic={topic} />}
+        </>
+      }
+      className={className}
+      tools={
+        <>
+          {!asTable && tools}
+          {card?.table && (
+            <ActionIcon color="gray" aria-label={other} title={other} onClick={() => setAsTable(!asTable)}>
+              <Icon size={20} color="var(--dim)" />
+            </ActionIcon>
+          )}
+        </>
+      }
+    >
+      {card === undefined && error !== null && <ErrorNotice error={error} />}
+      {card !== undefined && card.state !== "ready" && (
+        <div className={classes["waiting"]} style={{ height }}>
+          {card.reason}
+        </div>
+      )}
+      {card === undefined && error === null && <div style={{ height }} aria-busy={wanted} />}
+      {figure !== null && asTable && card?.table && (
+        <DataTable table={card.table} label={`${title}, numbers`} height={height} />
+      )}
+      {figure !== null && !asTable && (
+        <Chart
+          figure={figure}
+          label={`${title}. ${card?.summary ?? ""}`}
+          height={height}
+          liveTrial={liveTrial ?? null}
+          onChoose={onChoose}
+          onWindow={onWindow}
+          curveOf={curveOf}
+          build={build}
+        />
+      )}
+      {note && <p className={classes["note"]}>{note}</p>}
+    </Panel>
+  );
+}

@@ -1,0 +1,165 @@
+/** The chart library, fetched when the first chart is drawn. */
+
+import type { Plotly } from "plotly.js-basic-dist-min";
+import type { TimeRange } from "../api/queries";
+import { onLive } from "../live/store";
+import type { LiveFlight } from "../live/telemetry";
+import { throttled } from "../ui/throttle";
+import { onPointed, pointAt } from "./pointing";
+import { flightAt, marksOver, roomFor, type Trace, traceWithRole, windowFrom } from "./traces";
+
+const BUILDS = {
+  /** Lines and marks: what nearly every chart is made of, and a fifth less to load than the build with all. */
+  lines: () => import("plotly.js-basic-dist-min"),
+  contours: () => import("plotly.js-cartesian-dist-min"),
+} as const;
+
+export type Build = keyof typeof BUILDS;
+
+const loading = new Map<Build, Promise<Plotly>>();
+
+export function loadPlotly(build: Build = "lines"): Promise<Plotly> {
+  const known = loading.get(build);
+  if (known !== undefined) return known;
+  const asked = BUILDS[build]().then(
+    (module) => module.default,
+    (error: unknown) => {
+      loading.delete(build);
+      throw error;
+    },
+  );
+  loading.set(build, asked);
+  return asked;
+}
+
+/** Nothing leaves this machine: Plotly's own upload and edit buttons stay out. */
+export const CONFIG = {
+  displayModeBar: window.matchMedia("(pointer: coarse)").matches ? false : "hover",
+  displaylogo: false,
+  showSendToCloud: false,
+  plotlyServerURL: "",
+  doubleClick: "reset",
+  showTips: false,
+  modeBarButtons: [["toImage", "resetScale2d"]],
+} as const;
+
+const SHORTEST_REDRAW_MS = 90;
+
+interface Point {
+  curveNumber: number;
+  x: unknown;
+}
+
+export interface PlotlyElement extends HTMLElement {
+  layout?: { yaxis?: { range?: [number, number] } };
+  on?(event: "plotly_click" | "plotly_hover", listener: (event: { points: Point[] }) => void): void;
+  on?(event: "plotly_unhover", listener: () => void): void;
+  on?(event: "plotly_relayout", listener: (event: Record<string, unknown>) => void): void;
+  removeAllListeners?(event: string): void;
+}
+
+/** Where a flight without a curve of its own finds one. */
+export type CurveOf = (flight: number) => Promise<{ x: number[]; y: number[] } | null>;
+
+export interface Listeners {
+  /** The seconds that a figure shows before anybody zooms. */
+  whole: TimeRange | null;
+  onChoose?: ((flight: number) => void) | undefined;
+  onWindow?: ((window: TimeRange | null) => void) | undefined;
+}
+
+const SETTLED_MS = 250;
+
+/** Tell which flight is pointed at and clicked, and, once a zoom has settled, which seconds are looked at. */
+export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, onChoose, onWindow }: Listeners): void {
+  for (const event of ["click", "hover", "unhover", "relayout"]) chart.removeAllListeners?.(`plotly_${event}`);
+  const flightOf = ([point]: Point[]) => (point ? flightAt(traces, point.curveNumber, point.x) : null);
+  chart.on?.("plotly_click", ({ points }) => {
+    const flight = flightOf(points);
+    if (flight !== null) onChoose?.(flight);
+  });
+  chart.on?.("plotly_hover", ({ points }) => chart.matches(":hover") && pointAt(flightOf(points)));
+  chart.on?.("plotly_unhover", () => chart.matches(":hover") && pointAt(null));
+  chart.onmouseleave = () => pointAt(null);
+  let settling: ReturnType<typeof setTimeout> | undefined;
+  chart.on?.("plotly_relayout", (event) => {
+    const seconds = whole && onWindow ? windowFrom(event, whole) : undefined;
+    if (seconds === undefined) return;
+    clearTimeout(settling);
+    settling = setTimeout(() => onWindow?.(seconds), SETTLED_MS);
+  });
+}
+
+const DWELL_MS = 150;
+
+/** Let a flight that is pointed at elsewhere stand out: its curve by style alone, its marks by their labels. */
+export function followPointing(
+  plotly: Plotly,
+  chart: PlotlyElement,
+  traces: readonly Trace[],
+  curveOf?: CurveOf,
+): () => void {
+  const spare = traceWithRole(traces, "pointed");
+  let dwelling: ReturnType<typeof setTimeout> | undefined;
+  let wanted: number | null = null;
+  let lent = false;
+
+  async function lend(flight: number | null): Promise<void> {
+    const curve = flight === null ? null : await curveOf?.(flight);
+    if (wanted !== flight || (!curve && !lent)) return;
+    lent = Boolean(curve);
+    chart.toggleAttribute("data-pointing", lent);
+    const change = { x: [curve?.x ?? []], y: [curve?.y ?? []], name: `Flight ${flight}` };
+    await plotly.update(chart, change, {}, [spare]);
+  }
+
+  const unfollow = onPointed((flight) => {
+    wanted = flight;
+    clearTimeout(dwelling);
+    for (const group of chart.querySelectorAll("[data-pointed]")) group.removeAttribute("data-pointed");
+    const group = flight === null ? null : chart.querySelector(`.scatterlayer .traceflight-${flight}`);
+    group?.setAttribute("data-pointed", "");
+    chart.toggleAttribute("data-pointing", group !== null);
+    if (spare >= 0 && (lent || (flight !== null && group === null))) {
+      dwelling = setTimeout(() => void lend(group === null ? flight : null), DWELL_MS);
+    }
+    if (!chart.matches(":hover")) label(flight === null ? [] : marksOver(traces, flight));
+  });
+
+  function label(marks: { curveNumber: number; pointNumber: number }[]): void {
+    if (spare >= 0) return;
+    if (marks.length === 0) {
+      plotly.Fx.unhover(chart);
+      return;
+    }
+    const subplots = marks.map(({ curveNumber }) => {
+      const { xaxis, yaxis } = traces[curveNumber] ?? {};
+      return `${xaxis ?? "x"}${yaxis ?? "y"}`;
+    });
+    plotly.Fx.hover(chart, marks, subplots);
+  }
+
+  return () => {
+    unfollow();
+    clearTimeout(dwelling);
+  };
+}
+
+/** Grow the chart's live trace as telemetry of a trial comes; returns the function that ends it. */
+export function drawLive(plotly: Plotly, chart: HTMLElement, trace: number, trialId: number): () => void {
+  let latest: LiveFlight | null = null;
+  const drawing = throttled(async () => {
+    if (latest === null || latest.timeS.length === 0) return;
+    const change = { x: [latest.timeS], y: [latest.measured], showlegend: true };
+    const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.measured);
+    await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, [trace]);
+  }, SHORTEST_REDRAW_MS);
+  const unfollow = onLive(trialId, (flight) => {
+    latest = flight;
+    drawing.ask();
+  });
+  return () => {
+    unfollow();
+    drawing.stop();
+  };
+}

@@ -1,0 +1,90 @@
+import { expect, test } from "vitest";
+import { begun } from "../live/telemetry";
+import {
+  flightAt,
+  marksOver,
+  narrowed,
+  roomFor,
+  type Trace,
+  traceWithRole,
+  windowFrom,
+  withChosen,
+  withLive,
+  withTimeRange,
+} from "./traces";
+
+const traces: Trace[] = [
+  { meta: { role: "set point" }, x: [0, 32], y: [3, 3] },
+  { meta: { role: "flight", trial: 1, standing: "earlier" }, line: { width: 1 }, x: [0, 1], y: [0, 2] },
+  { meta: { role: "flight", trial: 2, standing: "best" }, line: { width: 3 }, x: [0, 1], y: [0, 3] },
+  { meta: { role: "live" }, x: [], y: [], showlegend: false },
+];
+
+test("the live trace takes what has been measured, and only that trace", () => {
+  const flight = { ...begun(1, 5), timeS: [0.1, 0.2], measured: [0, 0.05] };
+  const drawn = withLive(traces, flight);
+  expect(drawn[3]).toMatchObject({ x: [0.1, 0.2], y: [0, 0.05], showlegend: true });
+  expect(drawn.slice(0, 3)).toEqual(traces.slice(0, 3));
+  expect(withLive(traces, null)).toEqual(traces);
+});
+
+test("a chosen flight stands out and the others step back", () => {
+  const drawn = withChosen(traces, 1);
+  expect(drawn[1]).toMatchObject({ line: { width: 3.5 } });
+  expect(drawn[2]?.opacity).toBeLessThan(0.5);
+  expect(drawn[0]?.opacity).toBeUndefined();
+});
+
+test("choosing a flight that is not drawn changes nothing", () => {
+  expect(withChosen(traces, 9)).toEqual(traces);
+  expect(withChosen(traces, null)).toEqual(traces);
+});
+
+test("a point of a flight's curve or a mark over its number names the flight, the set point nothing", () => {
+  const marks: Trace[] = [{ meta: { role: "measured" }, x: [1, 2, 4], y: [0.3, 0.2, 0.1] }];
+  expect(flightAt(traces, 2, 0.5)).toBe(2);
+  expect(flightAt(traces, 0, 0.5)).toBeNull();
+  expect(flightAt(traces, 99, 0.5)).toBeNull();
+  expect(flightAt(marks, 0, 4)).toBe(4);
+  expect(marksOver(marks, 4)).toEqual([{ curveNumber: 0, pointNumber: 2 }]);
+  expect(marksOver(marks, 3)).toEqual([]);
+  expect(traceWithRole(traces, "live")).toBe(3);
+});
+
+test("an axis grows with a live curve that leaves it, and only then", () => {
+  expect(roomFor([-0.2, 3.6], [0, 3.5])).toEqual([-0.2, 3.6]);
+  expect(roomFor([0, 3.6], [0, 5, 4])).toEqual([0, 5.5]);
+  expect(roomFor([0, 3.6], [])).toEqual([0, 3.6]);
+});
+
+test("a narrow screen gets a smaller legend of the same colours", () => {
+  const unseen = { name: "Likely, lower edge", showlegend: false };
+  const named = [{ name: "Predicted" }, { name: "To beat: 0.155" }, {}, unseen];
+  expect(narrowed({ legend: { font: { color: "red", size: 12 } }, xaxis: {} }, named, 328)).toEqual({
+    legend: { font: { color: "red", size: 11 }, entrywidth: 5.8 * 14, entrywidthmode: "pixels" },
+    xaxis: {},
+  });
+});
+
+test("names in a narrow screen's legend stand two to a row, or in full where that would cut them short", () => {
+  const margin = { l: 48, r: 14 };
+  const widthFor = (name: string) => narrowed({ margin }, [{ name }], 328)["legend"];
+  expect(widthFor("80 % of 9 flights")).toMatchObject({ entrywidth: (328 - 48 - 14) / 2 - 45 });
+  expect(widthFor("A · flight 2 of On twin")).toMatchObject({ entrywidth: 5.8 * 23 });
+});
+
+test("the time axis can be cut without losing the rest of the layout", () => {
+  const layout = { xaxis: { title: "Time", range: [0, 32.6] }, yaxis: { range: [0, 4] } };
+  expect(withTimeRange(layout, [0, 10])).toMatchObject({
+    xaxis: { title: "Time", range: [0, 10] },
+    yaxis: layout.yaxis,
+  });
+  expect(withTimeRange(layout, null)).toBe(layout);
+});
+
+test("a zoom says which seconds are looked at, and the way back that it is all of them", () => {
+  expect(windowFrom({ "xaxis.range[0]": 2, "xaxis.range[1]": 4 }, [0, 32])).toEqual([2, 4]);
+  expect(windowFrom({ "xaxis.range": [2, 4] }, [0, 32])).toEqual([2, 4]);
+  expect(windowFrom({ "xaxis.range[0]": 0, "xaxis.range[1]": 32 }, [0, 32])).toBeNull();
+  expect(windowFrom({ "yaxis.range[0]": 0 }, [0, 32])).toBeUndefined();
+});

@@ -1,0 +1,85 @@
+import { ActionIcon, Anchor, Button, TextInput } from "@mantine/core";
+import { IconPencil } from "@tabler/icons-react";
+import { useCallback, useState } from "react";
+import { Link } from "react-router";
+import { useRename } from "../../api/mutations";
+import { problemOf } from "../../api/problems";
+import { useCatalogue } from "../../api/queries";
+import type { Campaign } from "../../api/types";
+import { count } from "../../ui/format";
+import { StateBadge } from "../../ui/StateBadge";
+import { campaignStateLabel } from "../../ui/states";
+import classes from "./CampaignHeader.module.css";
+import { settingsOf } from "./definition";
+import { Exports } from "./Exports";
+
+/** Name, state, and the settings that proposals depend on. */
+export function CampaignHeader({ campaign }: { campaign: Campaign }) {
+  const [renaming, setRenaming] = useState(false);
+  const catalogue = useCatalogue().data;
+  return (
+    <header className={classes["header"]}>
+      <Anchor component={Link} to="/" className={classes["back"]}>
+        All campaigns
+      </Anchor>
+      {renaming ? (
+        <Rename campaign={campaign} onClose={() => setRenaming(false)} />
+      ) : (
+        <div className={classes["line"]}>
+          <h1 className={classes["name"]}>{campaign.name}</h1>
+          <ActionIcon color="gray" aria-label="Rename the campaign" title="Rename" onClick={() => setRenaming(true)}>
+            <IconPencil size={18} color="var(--dim)" />
+          </ActionIcon>
+        </div>
+      )}
+      <div className={classes["facts"]}>
+        <StateBadge words={campaignStateLabel(campaign.state, campaign.outcome, campaign.rehearsal.state)} />
+        <span>{count(campaign.trials.flown, "flight")}</span>
+        <details className={classes["settings"]}>
+          <summary>Settings</summary>
+          <dl>
+            {settingsOf(campaign, catalogue).map(([title, value]) => (
+              <div key={title}>
+                <dt>{title}</dt>
+                <dd>{value}</dd>
+              </div>
+            ))}
+          </dl>
+        </details>
+        <Exports campaign={campaign} />
+      </div>
+    </header>
+  );
+}
+
+function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void }) {
+  const [name, setName] = useState(campaign.name);
+  const rename = useRename(campaign);
+  const problem = problemOf(rename.error);
+  const focused = useCallback((input: HTMLInputElement | null) => input?.select(), []);
+  return (
+    <form
+      className={classes["rename"]}
+      onKeyDown={(event) => event.key === "Escape" && onClose()}
+      onSubmit={(event) => {
+        event.preventDefault();
+        rename.mutate(name, { onSuccess: onClose });
+      }}
+    >
+      <TextInput
+        aria-label="Name of the campaign"
+        value={name}
+        maxLength={120}
+        ref={focused}
+        error={problem && [problem.detail || problem.title, problem.hint].join(" ")}
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <Button type="submit" loading={rename.isPending} disabled={name.trim() === ""}>
+        Rename
+      </Button>
+      <Button variant="default" onClick={onClose}>
+        Cancel
+      </Button>
+    </form>
+  );
+}

@@ -1,0 +1,126 @@
+import { Skeleton, useComputedColorScheme } from "@mantine/core";
+import { memo, startTransition, useCallback, useEffect, useState } from "react";
+import { useParams } from "react-router";
+import { useReadOnlyReason } from "../../api/access";
+import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } from "../../api/queries";
+import type { Campaign, Trial } from "../../api/types";
+import { loadPlotly } from "../../charts/plotly";
+import { pointAt } from "../../charts/pointing";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { NotFound } from "../../ui/NotFound";
+import { NotFoundPage } from "../../ui/NotFoundPage";
+import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
+import { useTitle } from "../../ui/useTitle";
+import { useUnits } from "../../ui/useUnits";
+import { ByFlightPanels, CurvesPanel } from "./CampaignCharts";
+import { CampaignHeader } from "./CampaignHeader";
+import classes from "./CampaignPage.module.css";
+import { FlightsPanel } from "./FlightsPanel";
+import { LandscapePanel } from "./LandscapePanel";
+import { NextFlightCard } from "./NextFlightCard";
+import { StatisticsPanel } from "./StatisticsPanel";
+import { useCampaignStatus } from "./useCampaignStatus";
+import { VerdictPanel } from "./VerdictPanel";
+import { selectedTrial } from "./verdict";
+
+export function CampaignPage() {
+  const campaignId = Number(useParams()["campaignId"]);
+  return Number.isInteger(campaignId) ? <CampaignById key={campaignId} campaignId={campaignId} /> : <NotFoundPage />;
+}
+
+function CampaignById({ campaignId }: { campaignId: number }) {
+  const campaign = useCampaign(campaignId);
+  const trials = useTrials(campaignId);
+  useTitle(campaign.data?.name ?? "Campaign");
+  if (campaign.data) {
+    return <CampaignView campaign={campaign.data} trials={trials.data ?? null} trouble={trials.error} />;
+  }
+  if (campaign.error) return <NotFound error={campaign.error} />;
+  return <Coming campaignId={campaignId} />;
+}
+
+/** What the page will want is asked for at once, not only when there is a place for it. */
+function Coming({ campaignId }: { campaignId: number }) {
+  const theme = useComputedColorScheme("light");
+  useCatalogue();
+  useProposal(campaignId);
+  useCampaignFigure(campaignId, "takeoffs", theme);
+  useCampaignFigure(campaignId, "errors", theme);
+  useCampaignFigure(campaignId, "gains", theme);
+  useEffect(() => {
+    loadPlotly().catch(() => undefined); // the chart asks again, and says what is wrong
+  }, []);
+  return (
+    <div aria-busy="true" className={classes["columns"]}>
+      <Skeleton height={480} radius="md" />
+      <Skeleton height={480} radius="md" />
+    </div>
+  );
+}
+
+const NONE: readonly Trial[] = [];
+const Verdict = memo(VerdictPanel);
+const Next = memo(NextFlightCard);
+const Statistics = memo(StatisticsPanel);
+const Landscape = memo(LandscapePanel);
+
+interface View {
+  campaign: Campaign;
+  /** Null while they are read: of a thousand flights the charts need not wait for them. */
+  trials: readonly Trial[] | null;
+  trouble: unknown;
+}
+
+function CampaignView({ campaign, trials: read, trouble }: View) {
+  const trials = read ?? NONE;
+  const [chosen, setChosen] = useState<number | null>(null);
+  const standing = useCampaignStatus(campaign.id);
+  const unproposed = useProposal(campaign.id).error;
+  const experiment = campaign.definition.experiment ?? "takeoff";
+  const unit = useUnits(experiment).error;
+  const shown = selectedTrial(trials, chosen);
+  const watching = useReadOnlyReason(campaign.vehicle);
+  const choose = useCallback(
+    (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
+    [],
+  );
+  useEffect(() => () => pointAt(null), []);
+  return (
+    <>
+      <p className="visually-hidden" role="status">
+        {campaign.flying ? `Flight ${campaign.flying.trial_number} is under way.` : (trials.at(-1)?.verdict ?? "")}
+      </p>
+      <CampaignHeader campaign={campaign} />
+      <ReadOnlyNotice why={watching} />
+      <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
+        <div className={classes["flown"]}>
+          <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} onChoose={choose} />
+          {shown !== null && (
+            <Verdict
+              trial={shown}
+              trials={trials}
+              isBest={shown.id === campaign.best?.trial_id}
+              unit={unit}
+              experiment={experiment}
+            />
+          )}
+        </div>
+        <div className={classes["next"]}>
+          {standing !== null && <Next {...standing} onChoose={setChosen} />}
+          {standing === null &&
+            (unproposed || trouble ? (
+              <ErrorNotice error={unproposed ?? trouble} />
+            ) : (
+              <Skeleton height={480} radius="md" />
+            ))}
+        </div>
+      </div>
+      <div className={classes["halves"]}>
+        <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
+      </div>
+      <Landscape campaignId={campaign.id} />
+      <div className={classes["row"]}>{read !== null && <Statistics campaignId={campaign.id} />}</div>
+      <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
+    </>
+  );
+}

@@ -1,0 +1,34 @@
+import { IconAlertTriangle, IconCircleArrowDown, IconCircleArrowUp, IconCircleCheck } from "@tabler/icons-react";
+import type { Trial } from "../../api/types";
+import classes from "./FlightMarkers.module.css";
+import { marksOf, predictionResult } from "./verdict";
+
+/** What sets a flight apart: refused gains that were flown all the same, a record with glitches. */
+export function FlightMarkers({ trial }: { trial: Trial }) {
+  return marksOf(trial).map((mark) => (
+    <span key={mark} className={classes["mark"]} title={trial.overrule_reason || undefined}>
+      <IconAlertTriangle size={15} aria-hidden />
+      {mark}
+    </span>
+  ));
+}
+
+const ICONS = { inside: IconCircleCheck, above: IconCircleArrowUp, below: IconCircleArrowDown } as const;
+const PREDICTION_LABELS = {
+  inside: "inside the interval",
+  above: "above the interval",
+  below: "below the interval",
+} as const;
+
+/** Whether the flight ended where it was predicted to. */
+export function PredictionResult({ trial, brief = false }: { trial: Trial; brief?: boolean }) {
+  const kept = predictionResult(trial);
+  if (kept === null) return null;
+  const Icon = ICONS[kept];
+  return (
+    <small className={classes["kept"]} data-kept={kept} title={brief ? PREDICTION_LABELS[kept] : undefined}>
+      <Icon size={15} {...(brief ? { "aria-label": PREDICTION_LABELS[kept] } : { "aria-hidden": true })} />
+      {!brief && PREDICTION_LABELS[kept]}
+    </small>
+  );
+}

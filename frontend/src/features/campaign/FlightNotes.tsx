@@ -1,0 +1,98 @@
+import { Button, FileButton, InputBase } from "@mantine/core";
+import { IconCamera, IconTrash } from "@tabler/icons-react";
+import { useState } from "react";
+import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/photos";
+import type { Trial } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import classes from "./FlightNotes.module.css";
+
+const PICTURES = "image/jpeg,image/png,image/webp";
+
+/** What people keep of a flight beside its record: a note, and photos, straight from the camera on a tablet. */
+export function FlightNotes({ trial }: { trial: Trial }) {
+  const { data: photos = [], error } = usePhotos(trial.id);
+  const { add, remove } = usePhotoActions(trial.id);
+  const [asked, setAsked] = useState<number | null>(null);
+  const doomed = photos.findIndex(({ id }) => id === asked);
+  const kept = trial.note !== "" || photos.length > 0;
+  return (
+    <details className={classes["notes"]} open={kept || undefined}>
+      <summary>Note and photos</summary>
+      {/* What is being written outlives a verdict, which makes another version of the trial. */}
+      <Note key={`${trial.id} ${trial.note}`} trial={trial} />
+      {photos.length > 0 && (
+        <ul className={classes["photos"]}>
+          {photos.map(({ id }, index) => (
+            <li key={id}>
+              <a href={photoAddress(trial.id, id)} target="_blank" rel="noreferrer">
+                <img src={photoAddress(trial.id, id)} alt={`Flight ${trial.number}, ${index + 1}`} loading="lazy" />
+              </a>
+              <button
+                type="button"
+                aria-label={`Delete photo ${index + 1} of flight ${trial.number}`}
+                aria-expanded={id === asked}
+                onClick={() => setAsked(id === asked ? null : id)}
+              >
+                <IconTrash size={18} aria-hidden />
+              </button>
+            </li>
+          ))}
+        </ul>
+      )}
+      {asked !== null && doomed >= 0 && (
+        <div className={classes["asks"]}>
+          <p role="status">Delete photo {doomed + 1} for good? Nothing else keeps it.</p>
+          <Button variant="default" onClick={() => setAsked(null)}>
+            Keep it
+          </Button>
+          <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
+            Delete photo {doomed + 1}
+          </Button>
+        </div>
+      )}
+      <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
+        {(props) => (
+          <Button
+            {...props}
+            variant="default"
+            loading={add.isPending}
+            leftSection={<IconCamera size={20} aria-hidden />}
+          >
+            Add a photo
+          </Button>
+        )}
+      </FileButton>
+      <ErrorNotice error={add.error ?? remove.error ?? error} />
+    </details>
+  );
+}
+
+function Note({ trial }: { trial: Trial }) {
+  const [note, setNote] = useState(trial.note);
+  const save = useNote(trial);
+  return (
+    <form
+      className={classes["note"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        save.mutate(note);
+      }}
+    >
+      <InputBase
+        component="textarea"
+        multiline
+        label={`Note on flight ${trial.number}`}
+        rows={2}
+        maxLength={2000}
+        value={note}
+        onChange={(event) => setNote(event.currentTarget.value)}
+      />
+      {note !== trial.note && (
+        <Button type="submit" loading={save.isPending}>
+          Keep the note
+        </Button>
+      )}
+      <ErrorNotice error={save.error} />
+    </form>
+  );
+}

@@ -1,0 +1,62 @@
+import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Link, useParams } from "react-router";
+import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
+import { FigurePanel } from "../../charts/FigurePanel";
+import { grouped } from "../../ui/format";
+import { NotFound } from "../../ui/NotFound";
+import { NotFoundPage } from "../../ui/NotFoundPage";
+import { useTitle } from "../../ui/useTitle";
+import { useUnits } from "../../ui/useUnits";
+import classes from "./FlightPage.module.css";
+import { GateChecks } from "./GateChecks";
+import { VerdictPanel } from "./VerdictPanel";
+
+export function FlightPage() {
+  const { campaignId, trialId } = useParams();
+  const [campaign, trial] = [Number(campaignId), Number(trialId)];
+  if (!Number.isInteger(campaign) || !Number.isInteger(trial)) return <NotFoundPage />;
+  return <FlightById campaignId={campaign} trialId={trial} />;
+}
+
+/** One flight: its own curve and commands first, then what it was worth. */
+function FlightById({ campaignId, trialId }: { campaignId: number; trialId: number }) {
+  const theme = useComputedColorScheme("light");
+  const campaign = useCampaign(campaignId).data;
+  const trial = useTrial(trialId);
+  const trials = useTrials(campaignId).data ?? [];
+  const figure = useFlightFigure(trialId, theme);
+  const experiment = campaign?.definition.experiment ?? "takeoff";
+  const unit = useUnits(experiment).error;
+  useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
+  if (trial.error) return <NotFound error={trial.error} />;
+  if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
+  const { number, record, gate } = trial.data;
+  return (
+    <>
+      <Anchor component={Link} to={`/campaigns/${campaignId}`} className={classes["back"]}>
+        {campaign?.name ?? "The campaign"}
+      </Anchor>
+      <h1 className={classes["name"]}>Flight {number}</h1>
+      <FigurePanel title="Record" card={figure.data} error={figure.error} height={480} />
+      <div className={classes["row"]}>
+        <VerdictPanel
+          trial={trial.data}
+          trials={trials}
+          isBest={trialId === campaign?.best?.trial_id}
+          unit={unit}
+          experiment={experiment}
+          own
+        />
+      </div>
+      <div className={classes["facts"]}>
+        {record !== null && (
+          <p className="numbers">
+            {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
+            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
+          </p>
+        )}
+        <GateChecks gate={gate} />
+      </div>
+    </>
+  );
+}

@@ -1,0 +1,110 @@
+import { Button, Chip, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { useClassify } from "../../api/mutations";
+import { problemOf, reasonsByField } from "../../api/problems";
+import type { Trial } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { type Suggestion, suggestedClass } from "./review";
+import classes from "./Verdict.module.css";
+import { consequenceOf, INVALID_REASONS, otherClasses } from "./verdict";
+
+const WORDS = { valid: "Count it as valid", aborted: "Class as aborted", invalid: "Mark invalid" } as const;
+
+interface Props {
+  trial: Trial;
+  /** All of the campaign, to tell what a class would change. */
+  trials: readonly Trial[];
+}
+
+/** Say what a flight is worth: what is suggested first and in one tap, one tap to undo, a reason to throw out. */
+export function FlightReview({ trial, trials }: Props) {
+  const [asking, setAsking] = useState(false);
+  const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
+  const classify = useClassify();
+  const suggestion = suggestedClass(trial);
+  const others = otherClasses(trial).sort((one, other) => rank(one, suggestion) - rank(other, suggestion));
+  if (others.length === 0) return null;
+
+  function choose(outcome: Suggestion["outcome"]): void {
+    const suggested = suggestion?.outcome === outcome ? suggestion.why : "";
+    if (outcome === "invalid" && suggested === "") {
+      setAsking(true);
+      return;
+    }
+    const word = trial.state === "invalid" ? "counted again by the operator" : "judged by the operator";
+    classify.mutate({ trial, outcome, reason: outcome === "invalid" ? suggested : word });
+  }
+
+  if (asking) {
+    const refused = reasonsByField(problemOf(classify.error), ["reason"])["reason"];
+    return (
+      <form
+        className={classes["classify"]}
+        onSubmit={(event) => {
+          event.preventDefault();
+          classify.mutate({ trial, outcome: "invalid", reason });
+        }}
+      >
+        <p>
+          An invalid flight keeps its record, but nothing is computed from it.{" "}
+          <strong>{consequenceOf(trial, trials, "invalid")}</strong> Why is it invalid?
+        </p>
+        <Chip.Group value={reason} onChange={(value) => setReason(value)}>
+          <div className={classes["chips"]}>
+            {INVALID_REASONS.map((one) => (
+              <Chip key={one} value={one} size="sm" variant="outline">
+                {one}
+              </Chip>
+            ))}
+          </div>
+        </Chip.Group>
+        <TextInput
+          label="Reason"
+          value={reason}
+          maxLength={500}
+          error={refused}
+          onChange={(event) => setReason(event.currentTarget.value)}
+        />
+        <div className={classes["inSight"]}>
+          <Button type="submit" color="red" disabled={reason.trim() === ""} loading={classify.isPending}>
+            Mark invalid
+          </Button>
+          <Button variant="default" onClick={() => setAsking(false)}>
+            Keep it
+          </Button>
+        </div>
+        <ErrorNotice error={classify.error} shown={["reason"]} />
+      </form>
+    );
+  }
+  return (
+    <>
+      {suggestion !== null && (
+        <p className={classes["suggested"]}>
+          Suggested: <strong>{suggestion.outcome}</strong>, {suggestion.why}.
+          {suggestion.outcome === "invalid" && ` ${consequenceOf(trial, trials, "invalid")}`}
+        </p>
+      )}
+      {others.map((outcome) => (
+        <Button
+          key={outcome}
+          variant={standsOut(outcome, trial, suggestion) ? "filled" : "default"}
+          loading={classify.isPending}
+          title={consequenceOf(trial, trials, outcome)}
+          onClick={() => choose(outcome)}
+        >
+          {trial.state === "invalid" ? `Undo: ${WORDS[outcome].toLowerCase()}` : WORDS[outcome]}
+        </Button>
+      ))}
+      <ErrorNotice error={classify.error} />
+    </>
+  );
+}
+
+const rank = (outcome: Suggestion["outcome"], suggestion: Suggestion | null): number =>
+  outcome === suggestion?.outcome ? 0 : 1;
+
+function standsOut(outcome: Suggestion["outcome"], trial: Trial, suggestion: Suggestion | null): boolean {
+  if (suggestion !== null) return outcome === suggestion.outcome;
+  return outcome !== "invalid" && trial.state !== "invalid";
+}

@@ -1,0 +1,85 @@
+import { Button } from "@mantine/core";
+import { Link } from "react-router";
+import type { Campaign, Trial } from "../../api/types";
+import { useLiveFlight } from "../../live/store";
+import { type LiveFlight, readingOf } from "../../live/telemetry";
+import { NOTHING, withUnit } from "../../ui/format";
+import { gainsInBrackets } from "../../ui/gains";
+import { Panel } from "../../ui/Panel";
+import { percent, predictedText } from "../../ui/uncertainty";
+import { useUnits } from "../../ui/useUnits";
+import { FlightMarkers } from "./FlightMarkers";
+import classes from "./NextFlight.module.css";
+
+interface Props {
+  campaign: Campaign;
+  trial: Trial | undefined;
+  step: { trialId: number; trialNumber: number };
+}
+
+const STAGED = "Gains set, waiting for its operator";
+
+function stageWord(trial: Trial | undefined, live: LiveFlight | null): string {
+  const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
+  if (waits && live?.phase !== "flying") return STAGED;
+  if (live !== null && live.timeS.length > 0) return "Flying";
+  return trial?.state === "planned" ? "Waiting for the worker" : "Setting the gains";
+}
+
+/** What the flight under way says about itself. ABORT stands in the bar above, on every page. */
+export function FlyingCard({ campaign, trial, step }: Props) {
+  const live = useLiveFlight(step.trialId);
+  const unit = useUnits(campaign.definition.experiment ?? "").error;
+  const reading = readingOf(live?.channel ?? "altitude_m");
+  const { registered } = campaign.vehicle;
+  const stage = stageWord(trial, live);
+  return (
+    <Panel
+      title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
+      tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
+    >
+      <div className={classes["stack"]}>
+        <dl className={`${classes["big"]} numbers`}>
+          <div className={classes["reading"]} data-wide>
+            <dt>{reading.title}</dt>
+            <dd>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</dd>
+          </div>
+          <div className={classes["reading"]}>
+            <dt>Error so far</dt>
+            <dd>{withUnit(live?.errorSoFar, unit)}</dd>
+          </div>
+          <div className={classes["reading"]}>
+            <dt>Predicted error</dt>
+            <dd>{predictedText(trial?.predicted_error, trial?.predicted_interval, unit)}</dd>
+          </div>
+          <div className={classes["reading"]}>
+            <dt>Time</dt>
+            <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
+          </div>
+          {live?.thrust !== null && (
+            <div className={classes["reading"]}>
+              <dt>Thrust</dt>
+              <dd>{typeof live?.thrust === "number" ? percent(live.thrust) : NOTHING}</dd>
+            </div>
+          )}
+        </dl>
+        {trial && (
+          <p className={`${classes["quiet"]} numbers`}>
+            Gains {Object.keys(trial.gains).join(", ")} {gainsInBrackets(trial.gains)}
+            {trial.read_back && ", read back from the vehicle"}.
+          </p>
+        )}
+        {registered && (
+          <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
+            Open the fly screen
+          </Button>
+        )}
+        {stage !== STAGED && (
+          <p className={classes["quiet"]}>
+            ABORT above ends the flight at once and restores the safe gains; so does the Space key.
+          </p>
+        )}
+      </div>
+    </Panel>
+  );
+}

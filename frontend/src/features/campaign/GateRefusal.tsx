@@ -1,0 +1,82 @@
+import { Button } from "@mantine/core";
+import { Fragment } from "react";
+import { limitsOf, type Problem, reasonsByWeight } from "../../api/problems";
+import { count, gainText } from "../../ui/format";
+import classes from "./NextFlight.module.css";
+
+type Offer = [gain: string, value: number];
+
+interface RefusalProps {
+  problem: Problem;
+  offers: Offer[];
+  onUse: (offers: readonly Offer[]) => void;
+}
+
+/** What would happen, in a sentence, and what would pass; the other checks folded. */
+export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
+  const [first, ...reasons] = reasonsByWeight(problem);
+  const limits = limitsOf(problem);
+  const besides = limits.filter((limit) => limit !== first);
+  const others = reasons.filter((reason) => !limits.includes(reason));
+  return (
+    <div className={`${classes["failed"]} ${classes["stack"]}`} role="alert">
+      <div>
+        <strong>{problem.detail || problem.title}</strong>
+        <p>{first}</p>
+      </div>
+      {offers.length > 0 && (
+        <div>
+          <Button fullWidth variant="light" h="auto" onClick={() => onUse(offers)}>
+            <span className={classes["offer"]}>
+              Use{" "}
+              {offers.map(([name, value], index) => (
+                <Fragment key={name}>
+                  {index > 0 && ", "}
+                  <span>
+                    {name} {gainText(value)}
+                  </span>
+                </Fragment>
+              ))}
+            </span>
+          </Button>
+          <OfferNote several={offers.length > 1} above={limits.includes(first ?? "")} besides={besides} />
+        </div>
+      )}
+      {others.length > 0 && (
+        <details className={classes["more"]}>
+          <summary>{count(others.length, "more check")} refused</summary>
+          <ul className={classes["gate"]}>
+            {others.map((reason) => (
+              <li key={reason}>{reason}</li>
+            ))}
+          </ul>
+        </details>
+      )}
+      {problem.hint && <p className={classes["offerNote"]}>{problem.hint}</p>}
+    </div>
+  );
+}
+
+/** Why the offered values can lie below the largest ones that the refusal names: several limits hold at once. */
+function OfferNote({ several, above, besides }: { several: boolean; above: boolean; besides: readonly string[] }) {
+  const nearest = several
+    ? "These are the nearest values to yours that keep"
+    : "This is the nearest value to yours that keeps";
+  const limits = above
+    ? "all limits at once, the one above and these:"
+    : "these limits; the flights are simulated again:";
+  return (
+    <>
+      <p className={classes["offerNote"]}>
+        {nearest} {besides.length > 0 ? limits : "the limit above."}
+      </p>
+      {besides.length > 0 && (
+        <ul className={classes["offerNote"]}>
+          {besides.map((limit) => (
+            <li key={limit}>{limit}</li>
+          ))}
+        </ul>
+      )}
+    </>
+  );
+}

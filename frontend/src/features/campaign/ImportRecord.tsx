@@ -1,0 +1,66 @@
+import { Button, FileButton } from "@mantine/core";
+import { IconFileUpload } from "@tabler/icons-react";
+import type { RecordOrder, RecordUpload } from "../../api/mutations";
+import { problemOf } from "../../api/problems";
+import { RECORD_FILES, recordOf, takeoffsIn, wantsConfirmation } from "../../api/records";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import classes from "./NextFlight.module.css";
+
+interface Props {
+  upload: RecordUpload;
+  trialId?: number;
+  proposalId?: number;
+}
+
+/** Hand in the record of a flight made elsewhere with these gains. */
+export function ImportRecord({ upload, trialId, proposalId }: Props) {
+  const target = {
+    ...(trialId === undefined ? {} : { trialId }),
+    ...(proposalId === undefined ? {} : { proposalId }),
+  };
+  const problem = problemOf(upload.error);
+  const again = (answer: Partial<RecordOrder>) =>
+    upload.variables !== undefined && upload.mutate({ ...upload.variables, ...target, ...answer });
+  return (
+    <div className={classes["stack"]}>
+      <p className={classes["quiet"]}>
+        Set these gains on your vehicle, fly, and hand in the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
+        .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the command) and{" "}
+        <code>altitude_m</code>.
+      </p>
+      <FileButton
+        multiple
+        accept={RECORD_FILES}
+        onChange={(files) => {
+          const record = recordOf(files);
+          if (record !== null) upload.mutate({ ...record, ...target });
+        }}
+      >
+        {(props) => (
+          <Button
+            {...props}
+            fullWidth
+            size="lg"
+            loading={upload.isPending}
+            leftSection={<IconFileUpload size={22} aria-hidden />}
+          >
+            Upload flight record
+          </Button>
+        )}
+      </FileButton>
+      <ErrorNotice error={upload.error} shown={["takeoff"]} />
+      {takeoffsIn(problem).map(({ number, summary }) => (
+        <Button key={number} variant="default" h="auto" py="xs" onClick={() => again({ takeoff: number })}>
+          <span style={{ whiteSpace: "normal" }}>
+            Takeoff {number}: {summary}
+          </span>
+        </Button>
+      ))}
+      {wantsConfirmation(problem) && (
+        <Button variant="default" onClick={() => again({ confirm: true })}>
+          Take it with the gains it was flown with
+        </Button>
+      )}
+    </div>
+  );
+}

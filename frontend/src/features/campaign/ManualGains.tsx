@@ -1,0 +1,140 @@
+import { Button, TextInput } from "@mantine/core";
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { useState } from "react";
+import { useCreateTrial } from "../../api/mutations";
+import { isGateRefusal, offersOf, problemOf, reasonsByField } from "../../api/problems";
+import { useCatalogue } from "../../api/queries";
+import type { Campaign } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { gainText } from "../../ui/format";
+import { readNumber, typed, typedGain } from "../../ui/numbers";
+import { GateRefusal } from "./GateRefusal";
+import classes from "./NextFlight.module.css";
+import type { Speed } from "./nextStep";
+
+interface Props {
+  campaign: Campaign;
+  start: Record<string, number>;
+  speed: Speed;
+  onClose: () => void;
+}
+
+/** The operator's own gains, through the same checks as proposed ones. Only what reads as numbers can be flown. */
+export function ManualGains({ campaign, start, speed, onClose }: Props) {
+  const names = Object.keys(start);
+  const [texts, setTexts] = useState(() =>
+    Object.fromEntries(Object.entries(start).map(([name, value]) => [name, typedGain(value)])),
+  );
+  const create = useCreateTrial(campaign);
+  const experiment = useCatalogue().data?.experiments.find(({ name }) => name === campaign.definition.experiment);
+  const problem = problemOf(create.error);
+  const refused = isGateRefusal(problem);
+  const reasons = reasonsByField(problem, names);
+  const readings = names.map((name) => ({ name, ...readNumber(texts[name] ?? "") }));
+  const unread = readings.filter(({ reason }) => reason !== undefined).map(({ name }) => name);
+  const gains = Object.fromEntries(
+    readings.flatMap(({ name, value }) => (value === undefined ? [] : [[name, value] as const])),
+  );
+  const { can_fly, needs_staging } = campaign.vehicle;
+  const flies = can_fly && !needs_staging;
+  const act = flies ? "Fly" : "Plan";
+  const change = (name: string, text: string): void => {
+    setTexts({ ...texts, [name]: text });
+    create.reset();
+  };
+  function submit(overrule?: string): void {
+    if (unread.length > 0) return;
+    create.mutate(
+      {
+        gains,
+        ...(overrule === undefined ? {} : { overrule }),
+        ...(flies ? { fly: { speed } } : {}),
+      },
+      { onSuccess: onClose },
+    );
+  }
+  return (
+    <form
+      className={classes["stack"]}
+      noValidate
+      onSubmit={(event) => {
+        event.preventDefault();
+        submit();
+      }}
+    >
+      {readings.map(({ name, reason }) => {
+        const gain = experiment?.gains.find((one) => one.name === name);
+        return (
+          <TextInput
+            key={name}
+            label={`${name}${gain ? ` · ${gain.title}` : ""}`}
+            description={gain && `${gainText(gain.lower)} … ${gainText(gain.upper)} ${gain.unit}`}
+            inputMode={gain?.integer && gain.lower >= 0 ? "numeric" : "text"}
+            autoComplete="off"
+            value={texts[name] ?? ""}
+            onChange={(event) => change(name, event.currentTarget.value)}
+            error={reason ?? (reasons[name] === undefined ? undefined : refused ? "Refused, see below" : reasons[name])}
+          />
+        );
+      })}
+      {refused && problem !== null && (
+        <GateRefusal
+          problem={problem}
+          offers={names.flatMap((name) => offersOf(problem).filter(([gain]) => gain === name))}
+          onUse={(offers) => {
+            setTexts({ ...texts, ...Object.fromEntries(offers.map(([name, value]) => [name, typed(value)])) });
+            create.reset();
+          }}
+        />
+      )}
+      {refused && !campaign.vehicle.is_real && <Overrule pending={create.isPending} onFly={submit} />}
+      <p className={`${classes["quiet"]} numbers`} aria-live="polite">
+        {unread.length > 0
+          ? `Nothing can be flown before ${unread.join(", ")} ${unread.length === 1 ? "reads as a number" : "read as numbers"}.`
+          : `${act === "Fly" ? "Flies" : "Plans"} ${Object.entries(gains)
+              .map(([name, value]) => `${name} ${typed(value).replace("-", "−")}`)
+              .join(" · ")}`}
+      </p>
+      <Button type="submit" size="lg" disabled={unread.length > 0} loading={create.isPending}>
+        {act} these gains
+      </Button>
+      <Button variant="default" onClick={onClose}>
+        Back to the proposal
+      </Button>
+      {!refused && <ErrorNotice error={create.error} shown={names} />}
+    </form>
+  );
+}
+
+/** Only where nothing can break: fly what the checks refuse, with a reason that stays with the flight. */
+function Overrule({ pending, onFly }: { pending: boolean; onFly: (reason: string) => void }) {
+  const [reason, setReason] = useState("");
+  return (
+    <details className={classes["more"]}>
+      <summary>Overrule with a reason</summary>
+      <div className={classes["stack"]}>
+        <p className={classes["quiet"]}>
+          This vehicle is simulated, so the refused gains may fly all the same. The reason is kept with the flight and
+          shown wherever it is. On a real vehicle nobody can do this.
+        </p>
+        <TextInput
+          label="Reason"
+          placeholder="For example: the paper flew these gains"
+          value={reason}
+          maxLength={500}
+          onChange={(event) => setReason(event.currentTarget.value)}
+        />
+        <Button
+          color="red"
+          variant="outline"
+          leftSection={<IconAlertTriangle size={20} aria-hidden />}
+          disabled={reason.trim() === ""}
+          loading={pending}
+          onClick={() => onFly(reason.trim())}
+        >
+          Fly in spite of the refusal
+        </Button>
+      </div>
+    </details>
+  );
+}

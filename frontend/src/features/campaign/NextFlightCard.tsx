@@ -1,0 +1,93 @@
+import { Button, Loader } from "@mantine/core";
+import { useRecompute, useUploadRecord } from "../../api/mutations";
+import type { NextFlight } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Panel } from "../../ui/Panel";
+import { FinishedCard } from "./FinishedCard";
+import { FlyingCard } from "./FlyingCard";
+import classes from "./NextFlight.module.css";
+import { nextStep } from "./nextStep";
+import { PlannedCard } from "./PlannedCard";
+import { ProposalCard } from "./ProposalCard";
+import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
+import type { CampaignStatus } from "./useCampaignStatus";
+
+interface Props extends CampaignStatus {
+  onChoose: (trialNumber: number) => void;
+}
+
+/** Always one recommended thing to do, whatever state the campaign is in. */
+export function NextFlightCard(props: Props) {
+  return (
+    <>
+      {props.campaign.rehearses !== null && <RehearsalNote campaignId={props.campaign.rehearses} />}
+      <Step {...props} />
+    </>
+  );
+}
+
+function Step({ campaign, next, trials, onChoose }: Props) {
+  const step = nextStep(campaign, next, trials);
+  // Held here, so that a refused record is still explained when its trial has become a planned one.
+  const upload = useUploadRecord(campaign.id);
+  switch (step.kind) {
+    case "flying":
+      return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
+    case "finished":
+      return <FinishedCard campaign={campaign} trials={trials} onChoose={onChoose} />;
+    case "rehearse":
+      return <RehearsalCard campaign={campaign} />;
+    case "planned":
+      return <PlannedCard campaign={campaign} trial={step.trial} upload={upload} />;
+    case "propose":
+    case "nothing better":
+      return <ProposalCard campaign={campaign} proposal={step.proposal} trials={trials} upload={upload} />;
+    case "judge":
+      return (
+        <Panel title={`Flight ${step.trial.number} wants your word`}>
+          <p className={classes["lead"]}>
+            {step.trial.state === "lost"
+              ? "Nobody knows how this flight ended. Say what it was before the next one is proposed."
+              : "Say whether this flight counts before the next one is proposed."}
+          </p>
+          <Button fullWidth onClick={() => onChoose(step.trial.number)}>
+            Look at flight {step.trial.number}
+          </Button>
+        </Panel>
+      );
+    case "failed":
+      return <FailedCard campaignId={campaign.id} next={next} />;
+    case "computing":
+      return (
+        <Panel title="Next flight">
+          <div className={classes["computing"]} role="status">
+            <Loader size="md" aria-hidden />
+            <p>
+              <strong>Finding the next gains</strong>
+              <br />
+              from {trials.length === 0 ? "the start settings" : "all flights so far"}. This takes about a second.
+            </p>
+          </div>
+        </Panel>
+      );
+  }
+}
+
+function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight }) {
+  const recompute = useRecompute(campaignId);
+  return (
+    <Panel title="Next flight">
+      <div className={classes["stack"]}>
+        <div role="alert" className={classes["failed"]}>
+          <strong>{next.problem?.title ?? "The next gains could not be computed."}</strong>
+          <p>{next.problem?.detail}</p>
+          <p>{next.problem?.hint}</p>
+        </div>
+        <Button loading={recompute.isPending} onClick={() => recompute.mutate()}>
+          Compute again
+        </Button>
+        <ErrorNotice error={recompute.error} />
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,92 @@
+import { Button } from "@mantine/core";
+import { IconPlaneDeparture } from "@tabler/icons-react";
+import { Link } from "react-router";
+import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../api/mutations";
+import type { Campaign, Trial } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { gainText } from "../../ui/format";
+import { Panel } from "../../ui/Panel";
+import { predictedText } from "../../ui/uncertainty";
+import { useGainTitles, useUnits } from "../../ui/useUnits";
+import { FlightMarkers } from "./FlightMarkers";
+import { ImportRecord } from "./ImportRecord";
+import classes from "./NextFlight.module.css";
+import { speedOf } from "./nextStep";
+import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
+
+interface Props {
+  campaign: Campaign;
+  trial: Trial;
+  upload: RecordUpload;
+}
+
+/** A trial that is planned and has not flown: fly it, hand in its record, or give it up. */
+export function PlannedCard({ campaign, trial, upload }: Props) {
+  const [speed, setSpeed] = useSpeed();
+  const experiment = campaign.definition.experiment ?? "";
+  const unit = useUnits(experiment).error;
+  const titles = useGainTitles(experiment);
+  const fly = useFlyTrial(campaign);
+  const cancel = useCancelTrial();
+  const { can_fly, needs_staging, registered } = campaign.vehicle;
+  return (
+    <Panel title={`Flight ${trial.number} is planned`} tools={<FlightMarkers trial={trial} />}>
+      <div className={classes["stack"]}>
+        <dl className={`${classes["big"]} numbers`}>
+          {Object.entries(trial.gains).map(([name, value]) => (
+            <div key={name} className={classes["reading"]}>
+              <dt>
+                {name} {titles[name] && <small>{titles[name]}</small>}
+              </dt>
+              <dd title={String(value)}>{gainText(value)}</dd>
+            </div>
+          ))}
+          <div className={classes["reading"]} data-row>
+            <dt>Predicted error</dt>
+            <dd>{predictedText(trial.predicted_error, trial.predicted_interval, unit)}</dd>
+          </div>
+        </dl>
+        {trial.flight?.problem && <ErrorNotice error={new Error(trial.flight.problem)} />}
+        {can_fly ? (
+          <>
+            {!needs_staging && (
+              <Button
+                size="lg"
+                leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+                loading={fly.isPending}
+                disabled={!trial.actions.includes("fly")}
+                onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
+              >
+                Fly it
+              </Button>
+            )}
+            {registered ? (
+              <Button
+                component={Link}
+                to={`/fly/${trial.id}`}
+                size="lg"
+                variant={needs_staging ? "filled" : "default"}
+                leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+              >
+                Stage
+              </Button>
+            ) : (
+              <SpeedSwitch value={speed} onChange={setSpeed} />
+            )}
+          </>
+        ) : (
+          <ImportRecord upload={upload} trialId={trial.id} />
+        )}
+        <Button
+          variant="default"
+          loading={cancel.isPending}
+          disabled={!trial.actions.includes("cancel")}
+          onClick={() => cancel.mutate(trial.id)}
+        >
+          Give it up
+        </Button>
+        <ErrorNotice error={fly.error ?? cancel.error} />
+      </div>
+    </Panel>
+  );
+}

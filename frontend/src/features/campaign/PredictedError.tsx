@@ -1,0 +1,37 @@
+import type { Proposal } from "../../api/types";
+import { against, percentChange, withUnit } from "../../ui/format";
+import { HelpTip } from "../../ui/HelpTip";
+import { intervalText } from "../../ui/uncertainty";
+import classes from "./NextFlight.module.css";
+
+interface Props {
+  proposal: Proposal;
+  best: number | null;
+  unit: string;
+}
+
+/** What the flight is expected to score, as exactly as that is known. */
+export function PredictedError({ proposal, best, unit }: Props) {
+  const { predicted_error: error, interval } = proposal;
+  const change = percentChange(error, best);
+  if (error === null)
+    return <p className={classes["quiet"]}>Nothing is predicted: there is no model of these gains.</p>;
+  return (
+    <div className={`${classes["predicted"]} numbers`}>
+      <span>
+        Predicted
+        <HelpTip topic="predicted" />
+      </span>
+      <span>
+        <strong>{withUnit(error, unit)}</strong>
+        {interval && (
+          <small>
+            {intervalText(interval, unit)}
+            <HelpTip topic="interval" />
+          </small>
+        )}
+        {change !== null && <small>{against(change, "the best")}</small>}
+      </span>
+    </div>
+  );
+}

@@ -1,0 +1,73 @@
+import { Button, TextInput } from "@mantine/core";
+import { IconShieldCheck } from "@tabler/icons-react";
+import { useState } from "react";
+import { usePromote } from "../../api/mutations";
+import { problemOf, reasonsByField } from "../../api/problems";
+import type { Campaign } from "../../api/types";
+import { useVehicle } from "../../api/vehicles";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { gainsInBrackets, sameHeld } from "../../ui/gains";
+import classes from "./NextFlight.module.css";
+import { heldGainsNotice, promotable } from "./verdict";
+
+/** Make the best gains those that the vehicle is left with after every flight, once flights have shown that they are
+ * better. */
+export function PromoteGains({ campaign }: { campaign: Campaign }) {
+  const [asking, setAsking] = useState(false);
+  const [statement, setStatement] = useState("");
+  const promote = usePromote(campaign);
+  const vehicle = useVehicle(campaign.vehicle.registered ? campaign.vehicle.id : null);
+  if (vehicle === null || campaign.best === null) return null;
+  const { possible, why } = promotable(campaign, vehicle);
+  if (!possible) {
+    const isDone = sameHeld(vehicle.safe_gains, campaign.best.gains);
+    return (
+      <p className={classes["quiet"]}>
+        {why} {isDone && heldGainsNotice(vehicle)}
+      </p>
+    );
+  }
+  if (!asking) {
+    return (
+      <Button
+        variant="default"
+        h="auto"
+        mih={48}
+        py={8}
+        styles={{ label: { whiteSpace: "normal" } }}
+        leftSection={<IconShieldCheck size={20} aria-hidden />}
+        onClick={() => setAsking(true)}
+      >
+        Make the best gains the safe ones
+      </Button>
+    );
+  }
+  return (
+    <form
+      className={classes["stack"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        promote.mutate({ version: vehicle.version, statement }, { onSuccess: () => setAsking(false) });
+      }}
+    >
+      <p className={classes["quiet"]}>
+        Every flight and every abort of {vehicle.name} then ends with {gainsInBrackets(campaign.best.gains)} instead of{" "}
+        {gainsInBrackets(vehicle.safe_gains)}.
+      </p>
+      <TextInput
+        label="Who decided that, and why"
+        value={statement}
+        maxLength={500}
+        error={reasonsByField(problemOf(promote.error), ["statement"])["statement"]}
+        onChange={(event) => setStatement(event.currentTarget.value)}
+      />
+      <Button type="submit" disabled={statement.trim() === ""} loading={promote.isPending}>
+        These are the safe gains
+      </Button>
+      <Button variant="default" onClick={() => setAsking(false)}>
+        Leave them
+      </Button>
+      <ErrorNotice error={promote.error} shown={["statement"]} />
+    </form>
+  );
+}

@@ -1,0 +1,143 @@
+import { Button } from "@mantine/core";
+import { IconPlaneDeparture } from "@tabler/icons-react";
+import { useState } from "react";
+import { type RecordUpload, useCreateTrial } from "../../api/mutations";
+import type { Campaign, Proposal, Trial } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Panel } from "../../ui/Panel";
+import { useGainTitles, useUnits } from "../../ui/useUnits";
+import { Expectation, FlightAlternatives } from "./FlightAlternatives";
+import { GainTable } from "./GainTable";
+import { GateChecks } from "./GateChecks";
+import { ImportRecord } from "./ImportRecord";
+import { ManualGains } from "./ManualGains";
+import classes from "./NextFlight.module.css";
+import { speedOf } from "./nextStep";
+import { PredictedError } from "./PredictedError";
+import { ProposalExplanation } from "./ProposalExplanation";
+import { advised, choicesFor, KINDS, type Variant } from "./proposal";
+import { Recommendation } from "./Recommendation";
+import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
+import { StopCampaign } from "./StopCampaign";
+
+interface Props {
+  campaign: Campaign;
+  proposal: Proposal;
+  trials: readonly Trial[];
+  upload: RecordUpload;
+}
+
+/** The proposed flight: what to do and why, gains now and next, what it should bring, and one button that flies it. */
+export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
+  const [editing, setEditing] = useState(false);
+  const [speed, setSpeed] = useSpeed();
+  const create = useCreateTrial(campaign);
+  const experiment = campaign.definition.experiment ?? "";
+  const units = useUnits(experiment);
+  const titles = useGainTitles(experiment);
+  const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
+  const { can_fly, needs_staging, registered } = campaign.vehicle;
+  const order = can_fly && !needs_staging ? { fly: { speed: speedOf(speed) } } : {};
+  const advice = advised(proposal);
+  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order });
+  if (editing) {
+    return (
+      <Panel title={`Flight ${number}, gains of your own`}>
+        <ManualGains
+          campaign={campaign}
+          start={proposal.gains}
+          onClose={() => setEditing(false)}
+          speed={speedOf(speed)}
+        />
+      </Panel>
+    );
+  }
+  return (
+    <Panel title={`Next flight: ${number}`} tools={<span className={classes["quiet"]}>{KINDS[proposal.kind]}</span>}>
+      <div className={classes["stack"]}>
+        {trials.length > 0 && <Recommendation advice={advice} />}
+        {advice.variant !== null && (
+          <div>
+            <FlyButton
+              label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
+              loading={create.isPending}
+              onClick={() => advice.variant !== null && flyVariant(advice.variant)}
+            />
+            <Expectation campaignId={campaign.id} variant={advice.variant} />
+          </div>
+        )}
+        <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
+        <PredictedError proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />
+        {can_fly ? (
+          <>
+            {!needs_staging && (
+              <FlyButton
+                label={flyLabel(advice.variant === null, proposal)}
+                quiet={advice.variant !== null || advice.kind === "stop"}
+                loading={create.isPending}
+                disabled={!proposal.gate.passed}
+                onClick={() => create.mutate({ proposal_id: proposal.id, ...order })}
+              />
+            )}
+            {registered ? (
+              <FlyButton
+                label="Stage"
+                quiet={!needs_staging || advice.variant !== null || advice.kind === "stop"}
+                loading={create.isPending}
+                disabled={!proposal.gate.passed}
+                onClick={() => create.mutate({ proposal_id: proposal.id })}
+              />
+            ) : (
+              <SpeedSwitch value={speed} onChange={setSpeed} />
+            )}
+          </>
+        ) : (
+          <ImportRecord upload={upload} proposalId={proposal.id} />
+        )}
+        <FlightAlternatives
+          campaignId={campaign.id}
+          choices={choicesFor(campaign, proposal, trials).filter(({ variant }) => variant !== advice.variant)}
+          disabled={create.isPending}
+          onFly={flyVariant}
+          onEdit={() => setEditing(true)}
+        />
+        <ErrorNotice error={create.error} />
+        <div>
+          <ProposalExplanation explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
+          <GateChecks gate={proposal.gate} />
+        </div>
+        {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
+      </div>
+    </Panel>
+  );
+}
+
+function flyLabel(recommended: boolean, { kind }: Proposal): string {
+  if (kind === "manual") return "Fly these gains again";
+  if (recommended) return "Fly next trial";
+  return kind === "none" ? "Fly these gains" : "Fly the step";
+}
+
+interface FlyProps {
+  label: string;
+  loading: boolean;
+  onClick: () => void;
+  quiet?: boolean;
+  disabled?: boolean;
+}
+
+function FlyButton({ label, loading, onClick, quiet = false, disabled = false }: FlyProps) {
+  return (
+    <Button
+      fullWidth
+      size="lg"
+      variant={quiet ? "default" : "filled"}
+      leftSection={<IconPlaneDeparture size={22} aria-hidden />}
+      loading={loading}
+      disabled={disabled}
+      onClick={onClick}
+    >
+      {label}
+    </Button>
+  );
+}

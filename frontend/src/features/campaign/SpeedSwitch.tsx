@@ -1,0 +1,29 @@
+import { SegmentedControl } from "@mantine/core";
+import { useLocalStorage } from "@mantine/hooks";
+import classes from "./NextFlight.module.css";
+import { SPEEDS } from "./nextStep";
+
+/** The operator's own choice, kept on this device. */
+export function useSpeed(): [string, (value: string) => void] {
+  const [value, setValue] = useLocalStorage({
+    key: "gainline-speed",
+    defaultValue: "10",
+    getInitialValueInEffect: false,
+  });
+  return [value, setValue];
+}
+
+export function SpeedSwitch({ value, onChange }: { value: string; onChange: (value: string) => void }) {
+  return (
+    <div className={classes["speed"]}>
+      <span id="speed-label">Simulated at</span>
+      <SegmentedControl
+        aria-labelledby="speed-label"
+        size="md"
+        value={value}
+        onChange={onChange}
+        data={SPEEDS.map(({ value: name, label }) => ({ value: name, label }))}
+      />
+    </div>
+  );
+}

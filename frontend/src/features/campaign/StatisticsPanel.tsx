@@ -1,0 +1,186 @@
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { useStatistics } from "../../api/queries";
+import type { CampaignStatistics } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { count } from "../../ui/format";
+import { gainsInBrackets } from "../../ui/gains";
+import { HelpTip } from "../../ui/HelpTip";
+import { Panel } from "../../ui/Panel";
+import { confidenceText, percent, plusMinus, scatterSource } from "../../ui/uncertainty";
+import { useLastRows } from "../../ui/useLastRows";
+import classes from "./Statistics.module.css";
+import { VERDICTS } from "./verdict";
+
+/** What the flights say about the gains, and how sure that is. */
+export function StatisticsPanel({ campaignId }: { campaignId: number }) {
+  const statistics = useStatistics(campaignId);
+  return (
+    <Panel title="How sure is it?">
+      <ErrorNotice error={statistics.error} />
+      {statistics.isPending && <div className={classes["waiting"]} aria-busy="true" />}
+      {statistics.data && statistics.data.groups.length === 0 && (
+        <p className={classes["none"]}>
+          After the first valid flight this says how much errors scatter, whether the best gains are really better, and
+          how well the predictions hold.
+        </p>
+      )}
+      {statistics.data && statistics.data.groups.length > 0 && <Said {...statistics.data} />}
+    </Panel>
+  );
+}
+
+function Said(all: CampaignStatistics) {
+  const { comparison, drift, track_record: record, notes, trends } = all;
+  const said = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
+  return (
+    <div className={classes["said"]}>
+      <div className={classes["facts"]}>
+        <Verdict comparison={comparison} unit={all.error_unit} />
+        <Scatter {...all} />
+        <Predictions record={record} />
+      </div>
+      <Groups {...all} />
+      <ul className={classes["notes"]}>
+        {drift && (
+          <li>
+            {drift.sentence} <HelpTip topic="drift" />
+          </li>
+        )}
+        {trends.map(({ against, sentence }) => (
+          <li key={against}>{sentence}</li>
+        ))}
+        {notes
+          .filter((note) => !said.includes(note))
+          .map((note) => (
+            <li key={note}>{note}</li>
+          ))}
+      </ul>
+    </div>
+  );
+}
+
+function Verdict({ comparison, unit }: { comparison: CampaignStatistics["comparison"]; unit: string }) {
+  if (comparison === null) {
+    return (
+      <div className={classes["fact"]}>
+        <h3>Best against the first</h3>
+        <p className={classes["big"]}>The same gains</p>
+        <p>Nothing to compare: the first flight's gains are the best so far.</p>
+      </div>
+    );
+  }
+  const { verdict, confidence, difference, standard_error, further } = comparison;
+  const more = further === null ? null : further.best + further.baseline;
+  return (
+    <div className={classes["fact"]} data-verdict={verdict}>
+      <h3>
+        Best against the first
+        <HelpTip topic="difference" />
+      </h3>
+      <p className={classes["big"]}>
+        {VERDICTS[verdict]}
+        {confidence !== null && <small>{confidenceText(confidence)} confidence</small>}
+      </p>
+      <p className="numbers">
+        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
+        {standard_error !== null && <small className={classes["meaning"]}>(± standard error of the difference)</small>}
+        {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
+        {verdict === "unresolved" && more !== null && (
+          <strong className={classes["more"]}>
+            {count(more, "more flight")} would decide: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the
+            first gains
+          </strong>
+        )}
+      </p>
+    </div>
+  );
+}
+
+function Scatter({
+  sigma,
+  degrees_of_freedom: freedom,
+  groups,
+  error_unit: unit,
+  optimism,
+  shrunk_error,
+}: CampaignStatistics) {
+  const repeats = groups.reduce((sum, group) => sum + group.errors.length - 1, 0);
+  return (
+    <div className={classes["fact"]}>
+      <h3>
+        Scatter of one flight
+        <HelpTip topic="scatter" />
+      </h3>
+      {sigma === null ? (
+        <p className={classes["big"]}>Not known yet</p>
+      ) : (
+        <p className={`${classes["big"]} numbers`}>
+          {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
+          <small>± its own standard error</small>
+        </p>
+      )}
+      <p>{scatterSource(repeats, sigma === null ? null : freedom)}</p>
+      {sigma !== null && optimism > 0.1 * sigma && shrunk_error !== null && (
+        <p className={`${classes["fine"]} numbers`}>
+          Chosen as the best of {groups.length}, it looks {plusMinus(optimism, null, unit)} better than it is; likely{" "}
+          {plusMinus(shrunk_error, null, unit)}.
+        </p>
+      )}
+    </div>
+  );
+}
+
+function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
+  return (
+    <div className={classes["fact"]} data-verdict={record.trustworthy ? undefined : "worse"}>
+      <h3>
+        Predictions kept
+        <HelpTip topic="record" />
+      </h3>
+      <p className={`${classes["big"]} numbers`}>
+        {record.of === 0 ? "None tested yet" : `${record.inside} of ${record.of}`}
+        {record.of > 0 && record.share !== null && <small>{percent(record.share)} inside the 90&nbsp;% interval</small>}
+      </p>
+      {!record.trustworthy && (
+        <p className={classes["warning"]}>
+          <IconAlertTriangle size={18} aria-hidden /> Gradient not trustworthy
+        </p>
+      )}
+      <p className={classes["fine"]}>{record.sentence}</p>
+    </div>
+  );
+}
+
+/** Flights of the same gains are one line. */
+function Groups({ groups, error_unit: unit }: CampaignStatistics) {
+  const names = Object.keys(groups[0]?.gains ?? {});
+  const { more, listed } = useLastRows(groups, 4, "gain sets", (group) => group.is_best || group.is_baseline);
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+    <section className={`${classes["scroll"]} sideways`} aria-label="Gain sets flown" tabIndex={0}>
+      <table className={classes["groups"]}>
+        <thead>
+          <tr>
+            <th scope="col">[{names.join(" ")}]</th>
+            <th scope="col">Flights</th>
+            <th scope="col">
+              Mean error ± standard error <HelpTip topic="standardError" />
+            </th>
+            <th scope="col">Standing</th>
+          </tr>
+        </thead>
+        <tbody>
+          {more}
+          {listed.map((group) => (
+            <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
+              <th scope="row">{gainsInBrackets(group.gains)}</th>
+              <td>{group.trial_numbers.join(", ")}</td>
+              <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
+              <td>{[group.is_best ? "best" : "", group.is_baseline ? "first" : ""].filter(Boolean).join(", ")}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </section>
+  );
+}

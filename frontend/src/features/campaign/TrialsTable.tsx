@@ -1,0 +1,132 @@
+import { IconStarFilled } from "@tabler/icons-react";
+import { useEffect, useRef } from "react";
+import type { Campaign, Trial } from "../../api/types";
+import { onPointed, pointAt } from "../../charts/pointing";
+import { gainText, NOTHING, withUnit } from "../../ui/format";
+import { HelpTip } from "../../ui/HelpTip";
+import { StateBadge } from "../../ui/StateBadge";
+import { trialStateLabel, wasFlown } from "../../ui/states";
+import { rangeText } from "../../ui/uncertainty";
+import { useLastRows } from "../../ui/useLastRows";
+import { useGainTitles } from "../../ui/useUnits";
+import { FlightMarkers, PredictionResult } from "./FlightMarkers";
+import classes from "./TrialsTable.module.css";
+import { sentenceOf } from "./verdict";
+
+interface Props {
+  campaign: Campaign;
+  trials: readonly Trial[];
+  shown: number | null;
+  unit: string;
+  onChoose: (trialNumber: number) => void;
+}
+
+function flightOf(target: EventTarget): number | null {
+  const row = target instanceof Element ? target.closest<HTMLElement>("[data-flight]") : null;
+  return row === null ? null : Number(row.dataset["flight"]);
+}
+
+/** The campaign's flights like the paper's Table 1: gains, error, prediction, and what came of each. */
+export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) {
+  const names = Object.keys(trials[0]?.gains ?? {});
+  const titles = useGainTitles(campaign.definition.experiment ?? "");
+  const body = useRef<HTMLTableSectionElement>(null);
+  const best = campaign.best?.trial_id;
+  const isKept = ({ id, number }: Trial) => id === best || number === shown;
+  const { more, listed } = useLastRows(trials, names.length + 5, "flights", isKept);
+  useEffect(
+    () =>
+      onPointed((flight) => {
+        body.current?.querySelector("[data-pointed]")?.removeAttribute("data-pointed");
+        body.current?.querySelector(`[data-flight="${flight}"]`)?.setAttribute("data-pointed", "");
+      }),
+    [],
+  );
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+    <section className={`${classes["scroll"]} sideways`} aria-label="All flights" tabIndex={0}>
+      <table className={classes["table"]}>
+        <thead>
+          <tr>
+            <th scope="col">Flight</th>
+            {names.map((name) => (
+              <th key={name} scope="col">
+                {name} {titles[name] && <small>{titles[name]}</small>}
+              </th>
+            ))}
+            <th scope="col">
+              Error <HelpTip topic="error" />
+            </th>
+            <th scope="col">
+              Predicted <HelpTip topic="interval" />
+            </th>
+            <th scope="col" className={classes["text"]}>
+              State
+            </th>
+            <th scope="col" className={classes["text"]}>
+              Verdict
+            </th>
+          </tr>
+        </thead>
+        <tbody
+          ref={body}
+          onPointerOver={({ target }) => pointAt(flightOf(target))}
+          onPointerLeave={() => pointAt(null)}
+          onFocus={({ target }) => pointAt(flightOf(target))}
+          onBlur={() => pointAt(null)}
+        >
+          {more}
+          {listed.map((trial) => {
+            const isBest = trial.id === best;
+            return (
+              <tr
+                key={trial.id}
+                data-flight={trial.number}
+                data-best={isBest || undefined}
+                data-shown={trial.number === shown || undefined}
+              >
+                <th scope="row">
+                  {wasFlown(trial.state) ? (
+                    <button
+                      type="button"
+                      aria-pressed={trial.number === shown}
+                      aria-label={`Flight ${trial.number}${isBest ? ", best" : ""}`}
+                      onClick={() => onChoose(trial.number)}
+                    >
+                      {trial.number}
+                      {isBest && <IconStarFilled size={15} aria-hidden />}
+                    </button>
+                  ) : (
+                    <span>{trial.number}</span>
+                  )}
+                </th>
+                {names.map((name) => (
+                  <td key={name} title={String(trial.gains[name] ?? "")}>
+                    {gainText(trial.gains[name] ?? Number.NaN)}
+                  </td>
+                ))}
+                <td className={classes["error"]}>{withUnit(trial.error, unit)}</td>
+                <td>
+                  <span className={classes["predicted"]}>
+                    {withUnit(trial.predicted_error, unit)}
+                    <PredictionResult trial={trial} brief />
+                  </span>
+                  {trial.predicted_interval && (
+                    <small className={classes["range"]}>{rangeText(trial.predicted_interval, unit)}</small>
+                  )}
+                </td>
+                <td className={classes["text"]}>
+                  <span className={classes["state"]}>
+                    <StateBadge words={trialStateLabel(trial.state)} />
+                    <FlightMarkers trial={trial} />
+                  </span>
+                </td>
+                <td className={`${classes["text"]} ${classes["verdict"]}`}>{sentenceOf(trial) || NOTHING}</td>
+              </tr>
+            );
+          })}
+        </tbody>
+      </table>
+    </section>
+  );
+}

@@ -1,0 +1,172 @@
+import { Anchor, Button } from "@mantine/core";
+import { IconDownload } from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { Link } from "react-router";
+import { recordCsv, useCampaign, useStatistics } from "../../api/queries";
+import type { Trial } from "../../api/types";
+import type { Topic } from "../../ui/explanations";
+import { percentChange, percentText, withUnit } from "../../ui/format";
+import { GainList } from "../../ui/GainList";
+import { HelpTip } from "../../ui/HelpTip";
+import { Panel } from "../../ui/Panel";
+import { StateBadge } from "../../ui/StateBadge";
+import { trialStateLabel } from "../../ui/states";
+import { Time } from "../../ui/Time";
+import { intervalText, plusMinus } from "../../ui/uncertainty";
+import { AbortCause } from "./AbortCause";
+import { FlightMarkers, PredictionResult } from "./FlightMarkers";
+import { FlightNotes } from "./FlightNotes";
+import { FlightReview } from "./FlightReview";
+import { Glitches } from "./Glitches";
+import { PromoteGains } from "./PromoteGains";
+import { RetryGains } from "./RetryGains";
+import { TrialComparisons } from "./TrialComparisons";
+import classes from "./Verdict.module.css";
+import { bestBeforeOf, repeatPurpose, sentenceOf, standingWithout } from "./verdict";
+
+interface Props {
+  trial: Trial;
+  trials: readonly Trial[];
+  isBest: boolean;
+  unit: string;
+  experiment: string;
+  /** On the flight's own page there is no link to that page. */
+  own?: boolean;
+}
+
+/** `error` against `other`; two that print alike are the same. */
+function Change({ error, other, unit }: { error: number | null; other: number | null | undefined; unit: string }) {
+  const percent = percentChange(error, other);
+  if (percent === null) return null;
+  if (withUnit(error, unit) === withUnit(other, unit)) return <small>the same</small>;
+  const lower = percent < 0;
+  return (
+    <small data-better={lower || undefined}>
+      {percentText(Math.abs(percent))} {lower ? "lower" : "higher"}
+    </small>
+  );
+}
+
+interface FactProps {
+  title: string;
+  topic?: Topic;
+  wide?: boolean;
+  children: ReactNode;
+}
+
+function Fact({ title, topic, wide = false, children }: FactProps) {
+  return (
+    <div className={wide ? classes["wide"] : undefined}>
+      <dt>
+        {title} {topic && <HelpTip topic={topic} />}
+      </dt>
+      <dd>{children}</dd>
+    </div>
+  );
+}
+
+/** What happened in a flight: against the best before it, against its prediction, and what it counts for. */
+export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false }: Props) {
+  const bestBefore = bestBeforeOf(trial, trials);
+  const statistics = useStatistics(trial.campaign_id).data;
+  const campaign = useCampaign(trial.campaign_id).data;
+  const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
+  const asked = repeatPurpose(trial);
+  const without = standingWithout(trial, trials);
+  const scatter = trial.state === "valid" ? statistics?.sigma : null;
+  return (
+    <Panel
+      title={`Flight ${trial.number}${isBest && trial.state === "valid" ? " · best so far" : ""}`}
+      tools={
+        <span className={classes["when"]}>
+          <Time at={trial.flown_at} />
+          <FlightMarkers trial={trial} />
+          <StateBadge words={trialStateLabel(trial.state)} />
+        </span>
+      }
+    >
+      {asked && <p className={classes["sentence"]}>{asked}</p>}
+      <p className={asked ? classes["reason"] : classes["sentence"]}>{sentenceOf(trial)}</p>
+      {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
+        <p className={classes["reason"]}>{trial.reason}</p>
+      )}
+      <AbortCause trial={trial} />
+      <TrialComparisons trial={trial} unit={unit} />
+      {trial.overrule_reason && (
+        <p className={classes["overruled"]}>
+          <strong>The checks refused these gains, and were overruled:</strong> {trial.overrule_reason}
+        </p>
+      )}
+      <dl className={`${classes["figures"]} numbers`}>
+        <Fact title="Error" topic="error">
+          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± scatter of one flight)</small> : null}
+        </Fact>
+        <Fact title="Predicted" topic="predicted">
+          {withUnit(trial.predicted_error, unit)}{" "}
+          {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
+          <PredictionResult trial={trial} />
+        </Fact>
+        <Fact title={bestBefore ? `Best before, flight ${bestBefore.number}` : "Best before"}>
+          {withUnit(bestBefore?.error, unit)}{" "}
+          {!asked && <Change error={trial.error} other={bestBefore?.error} unit={unit} />}
+        </Fact>
+        {group !== undefined && group.errors.length > 1 && (
+          <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`} topic="standardError">
+            {plusMinus(group.mean, group.standard_error, unit)}{" "}
+            {group.standard_error !== null && <small>(± standard error)</small>}
+          </Fact>
+        )}
+        {trial.overshoot_m !== null && (
+          <Fact title="Overshoot" topic="overshoot">
+            {withUnit(trial.overshoot_m, "m", 2)}
+          </Fact>
+        )}
+        <Fact title="Gains" wide>
+          <span className={classes["gains"]}>
+            <GainList gains={trial.gains} experiment={experiment} />
+          </span>
+        </Fact>
+      </dl>
+      <Glitches trial={trial} unit={unit} />
+      {without && (
+        <p className={classes["sentence"]} role="status">
+          {without}
+        </p>
+      )}
+      <div className={classes["acts"]}>
+        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
+        {campaign && <RetryGains campaign={campaign} trial={trial} />}
+        {trial.record !== null && (
+          <Button
+            component="a"
+            href={recordCsv(trial.id)}
+            download
+            variant="default"
+            leftSection={<IconDownload size={18} aria-hidden />}
+          >
+            Record as CSV
+          </Button>
+        )}
+        <Anchor
+          component={Link}
+          to={`/compare?add=${trial.id}&campaign=${trial.campaign_id}`}
+          className={classes["link"]}
+          aria-label={`Compare flight ${trial.number}`}
+        >
+          Compare
+        </Anchor>
+        {!own && (
+          <Anchor
+            component={Link}
+            to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`}
+            className={classes["link"]}
+          >
+            Open the flight
+          </Anchor>
+        )}
+      </div>
+      <FlightNotes trial={trial} />
+      {campaign && isBest && campaign.state !== "finished" && <PromoteGains campaign={campaign} />}
+    </Panel>
+  );
+}

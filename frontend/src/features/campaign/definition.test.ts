@@ -1,0 +1,74 @@
+import { expect, test } from "vitest";
+import type { Campaign, Catalogue } from "../../api/types";
+import { settingsOf } from "./definition";
+
+const campaign = {
+  definition: {
+    experiment: "takeoff",
+    strategy: "gradient",
+    options: { scaled: false },
+    start: { kind: "given", gains: { kp: 400, ki: 20, kd: 100 } },
+    stop: { kind: "paper", max_flights: 7, improvement: 0.05 },
+    bounds: { kp: [0, 2000] },
+    first_step_fraction: 0.25,
+    step_fraction: 1,
+    seed: 3,
+  },
+  vehicle: { kind: "jsbsim", title: "JSBSim", options: { mass_kg: 0.42, wind_from_deg: 90 } },
+  definition_digest: "0123456789abcdef",
+} as unknown as Campaign;
+
+const MASS = { name: "mass_kg", title: "Mass", unit: "kg" };
+const WIND = { name: "wind_from_deg", title: "Wind from", unit: "°" };
+
+const catalogue = {
+  experiments: [{ name: "takeoff", title: "Takeoff to 3 m", gains: [{ name: "kp", unit: "counts" }] }],
+  strategies: [{ name: "gradient", title: "Gradient", options: [{ name: "scaled", title: "Scaled gains" }] }],
+  vehicle_kinds: [{ name: "jsbsim", options: [MASS, WIND] }],
+} as unknown as Catalogue;
+
+test("every setting that a proposal depends on is said in words", () => {
+  const rows = Object.fromEntries(settingsOf(campaign, catalogue));
+  expect(rows).toMatchObject({
+    Mass: "0.42 kg",
+    "Wind from": "90°",
+    Experiment: "Takeoff to 3 m",
+    Strategy: "Gradient",
+    "Scaled gains": "no",
+    Start: "[400 20 100]",
+    "Bounds of kp": "0 … 2000 counts",
+    "Largest step": "25\u00a0% of each range until a flight is valid, then 100\u00a0%",
+    Seed: "3",
+    "Frozen as": "0123456789ab",
+  });
+  expect(rows["Stop"]).toBe("Two flights in a row less than 5\u00a0% better than the best, or 7 flights");
+});
+
+test("a warm start and a stop on noise are said in words", () => {
+  const definition = {
+    ...campaign.definition,
+    start: {
+      kind: "campaign" as const,
+      gains: { kp: 900, ki: 200, kd: 200 },
+      donor: { campaign_id: 4, trial_number: 2, checksum: "ab" },
+    },
+    stop: { kind: "noise" as const, max_flights: 12, improvement: 0.05, confidence: 0.95, min_battery_v: 10.8 },
+  };
+  expect(Object.fromEntries(settingsOf({ ...campaign, definition }, catalogue))).toMatchObject({
+    Start: "[900 200 200], flight 2 of campaign 4",
+    Stop: "When nothing is left that flights could tell from noise with 95\u00a0% confidence, or 12 flights",
+    Battery: "Stops below 10.8 V after a flight",
+  });
+});
+
+test("until the catalogue is there, options stand under their names", () => {
+  expect(Object.fromEntries(settingsOf(campaign))).toMatchObject({
+    mass_kg: "0.42",
+    scaled: "no",
+    Experiment: "takeoff",
+  });
+});
+
+test("a draft is not frozen yet", () => {
+  expect(Object.fromEntries(settingsOf({ ...campaign, definition_digest: null }))).not.toHaveProperty("Frozen as");
+});

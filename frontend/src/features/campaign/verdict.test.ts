@@ -1,0 +1,133 @@
+import { expect, test } from "vitest";
+import type { Campaign, Trial } from "../../api/types";
+import {
+  abortSentence,
+  abortWords,
+  bestBeforeOf,
+  consequenceOf,
+  heldGainsNotice,
+  marksOf,
+  otherClasses,
+  predictionResult,
+  promotable,
+  repeatPurpose,
+  selectedTrial,
+  sentenceOf,
+  standingWithout,
+} from "./verdict";
+
+const trial = (number: number, state: Trial["state"], error: number | null, predicted_error: number | null = null) =>
+  ({ id: number, number, state, error, predicted_error, actions: ["classify"] }) as unknown as Trial;
+
+const first = trial(1, "valid", 0.3267);
+const glitch = trial(2, "invalid", 0.05);
+const third = trial(3, "valid", 0.1873, 0.2);
+const all = [first, glitch, third, trial(4, "planned", null)];
+
+test("a flight is compared with the best valid one before it", () => {
+  expect(bestBeforeOf(third, all)?.number).toBe(1);
+});
+
+test("the first flight has nothing before it", () => {
+  expect(bestBeforeOf(first, all)).toBeNull();
+});
+
+test("an aborted flight says why, and not twice that it was aborted", () => {
+  const aborted = { ...trial(5, "aborted", null), reason: "aborted by the operator", verdict: "Aborted: …" } as Trial;
+  expect(sentenceOf(aborted)).toBe("Aborted by the operator");
+  expect(sentenceOf({ ...third, verdict: "0.187 m: …", reason: "" } as Trial)).toBe("0.187 m: …");
+  expect(sentenceOf({ ...glitch, verdict: "", reason: "Wind gust" } as Trial)).toBe("Wind gust");
+});
+
+test("the latest flight is shown until another is chosen; a plan is no flight", () => {
+  expect(selectedTrial(all, null)?.number).toBe(3);
+  expect(selectedTrial(all, 2)?.number).toBe(2);
+  expect(selectedTrial(all, 4)?.number).toBe(3);
+  expect(selectedTrial([], null)).toBeNull();
+});
+
+test("what a flight may be classed as follows from what it is", () => {
+  expect(otherClasses(first)).toEqual(["invalid"]);
+  expect(otherClasses(glitch)).toEqual(["valid"]);
+  const stopped = { ...trial(5, "invalid", null), flight: { id: 1, state: "aborted", problem: "" } } as Trial;
+  expect(otherClasses(stopped)).toEqual(["aborted"]);
+  expect(otherClasses(trial(6, "captured", 0.2))).toEqual(["valid", "aborted", "invalid"]);
+  expect(otherClasses({ ...first, actions: [] })).toEqual([]);
+});
+
+test("an error lies inside of, above or below what was predicted", () => {
+  const expected = { ...third, predicted_interval: { lower: 0.18, upper: 0.22, confidence: 0.9 } };
+  expect(predictionResult(expected)).toBe("inside");
+  expect(predictionResult({ ...expected, error: 0.23 })).toBe("above");
+  expect(predictionResult({ ...expected, error: 0.1 })).toBe("below");
+  expect(predictionResult({ ...expected, error: null })).toBeNull();
+  expect(predictionResult(third)).toBeNull();
+});
+
+test("an overruled flight and one with glitches are marked", () => {
+  const gap = { kind: "gap" as const, start_s: 3, end_s: 3.4, sentence: "Nothing was recorded for 0.4 s." };
+  expect(marksOf({ ...third, overrule_reason: "the paper flew it", glitches: [gap, gap] })).toEqual([
+    "Overruled",
+    "2 glitches",
+  ]);
+  expect(marksOf(third)).toEqual([]);
+});
+
+test("a flight that repeats gains on purpose is held against its own prediction", () => {
+  const interval = { lower: 0.3, upper: 0.4, confidence: 0.9 };
+  const again = { ...first, kind: "baseline", predicted_interval: interval } as Trial;
+  expect(repeatPurpose(again)).toMatch(/^Asked for: the first flight's gains .* inside its prediction/);
+  expect(repeatPurpose({ ...again, error: 0.5 })).toContain("above its prediction");
+  expect(repeatPurpose({ ...again, kind: "step" })).toBe("");
+});
+
+test("what a class would change is said before: which flight is the best then, and that the gains are found anew", () => {
+  expect(consequenceOf(third, all, "invalid")).toBe(
+    "Flight 3 is the best; without it flight 1 is, and the next gains are computed anew.",
+  );
+  expect(consequenceOf(first, all, "invalid")).toBe(
+    "Flight 3 stays the best, and the next gains are computed anew without flight 1.",
+  );
+  expect(consequenceOf(first, [first, glitch], "invalid")).toBe(
+    "No other flight counts: without flight 1 the campaign begins again at its start gains.",
+  );
+  expect(consequenceOf(glitch, all, "valid")).toContain("is scored from its record");
+  expect(standingWithout(glitch, all)).toBe("Flight 3 is the best now; the next gains are computed without flight 2.");
+  expect(standingWithout(third, all)).toBe("");
+});
+
+test("the best gains become the safe ones only once flights have shown that they are better", () => {
+  const drone = { name: "Number 1", safe_gains: { kp: 283 } };
+  const best = { gains: { kp: 400 } } as unknown as NonNullable<Campaign["best"]>;
+  expect(promotable({ best, verdict: "better" }, drone)).toEqual({ possible: true, why: "" });
+  expect(promotable({ best, verdict: "unresolved" }, drone).why).toContain("whether they are better is unresolved");
+  expect(promotable({ best, verdict: null }, drone).possible).toBe(false);
+  expect(promotable({ best: { ...best, gains: { kp: 283 } }, verdict: "better" }, drone).why).toBe(
+    "The best gains are the safe ones of Number 1.",
+  );
+});
+
+test("after a change of the safe gains it is told what the vehicle holds until they are written to it", () => {
+  const vehicle = { name: "Bee", state: "ready", held: { kd: 82, kp: 283 }, safe_gains: { kp: 400, kd: 100 } } as const;
+  expect(heldGainsNotice(vehicle)).toBe(
+    "Bee itself still holds [283 82]: the safe ones are written to it with its next check, restore or flight.",
+  );
+  expect(heldGainsNotice({ ...vehicle, state: "disconnected" })).toContain("when it is next connected");
+  expect(heldGainsNotice({ ...vehicle, held: vehicle.safe_gains })).toBe("");
+  expect(heldGainsNotice({ ...vehicle, held: null })).toBe("");
+});
+
+test("an operator's abort asks why, and counts against its gains only when they behaved badly", () => {
+  const aborted = (abort_cause: Trial["abort_cause"]) => ({ ...trial(2, "aborted", null), abort_cause });
+  expect(abortSentence(aborted("operator"))).toContain("only if the vehicle behaved badly");
+  expect(abortSentence(aborted("something else"))).toContain("does not count against its gains");
+  expect(abortSentence(aborted("limit"))).toBe("A limit was met: the flight counts against its gains.");
+  expect(abortSentence(first)).toBe("");
+});
+
+test("the operator may say what they have not said already, where the server lets them", () => {
+  const actions = ["judge abort"];
+  expect(abortWords({ actions, abort_cause: "operator" })).toEqual(["behaved badly", "something else"]);
+  expect(abortWords({ actions, abort_cause: "behaved badly" })).toEqual(["something else"]);
+  expect(abortWords({ actions: [], abort_cause: "limit" })).toEqual([]);
+});

@@ -1,0 +1,209 @@
+import { SegmentedControl } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
+import type { ReactNode } from "react";
+import type { Catalogue, OptionInfo } from "../../api/types";
+import { NumberField } from "../../ui/NumberField";
+import { OptionField, type OptionValue } from "../../ui/OptionField";
+import { unitsOf } from "../../ui/units";
+import classes from "./AdvancedFields.module.css";
+import { type CampaignForm, gainsOf, hasModel, optionsOf, type StopKind } from "./newCampaign";
+
+interface Props {
+  form: CampaignForm;
+  catalogue: Catalogue;
+  reasons: Record<string, string>;
+  set: (change: Partial<CampaignForm>) => void;
+}
+
+function Group({ title, children }: { title: string; children: ReactNode }) {
+  return (
+    <fieldset className={classes["group"]}>
+      <legend>{title}</legend>
+      <div className={classes["fields"]}>{children}</div>
+    </fieldset>
+  );
+}
+
+/** Settings that have a good default each. */
+export function AdvancedFields(props: Props) {
+  const { form, catalogue, reasons, set } = props;
+  const options = optionsOf(form, catalogue);
+  const titled = (things: readonly { name: string; title: string }[], name: string): string =>
+    things.find((thing) => thing.name === name)?.title ?? name;
+  return (
+    <div className={classes["all"]}>
+      <StopFields {...props} />
+      <OptionGroup
+        title={`Strategy: ${titled(catalogue.strategies, form.strategy)}`}
+        options={options.strategy}
+        chosen={form.strategyOptions}
+        reasons={reasons}
+        prefix="definition.options"
+        onChange={(strategyOptions) => set({ strategyOptions })}
+      />
+      <OptionGroup
+        title={`Experiment: ${titled(catalogue.experiments, form.experiment)}`}
+        options={options.experiment}
+        chosen={form.experimentOptions}
+        reasons={reasons}
+        prefix="experiment_options"
+        onChange={(experimentOptions) => set({ experimentOptions })}
+      />
+      <BoundFields {...props} />
+      <OptionGroup
+        title={`Vehicle: ${titled(catalogue.vehicle_kinds, form.vehicle)}`}
+        options={options.vehicle}
+        chosen={form.vehicleOptions}
+        reasons={reasons}
+        prefix="vehicle.options"
+        onChange={(vehicleOptions) => set({ vehicleOptions })}
+      />
+      <Group title="Chance">
+        <NumberField
+          label="Seed"
+          description="The same seed gives the same scatter"
+          value={form.seed}
+          error={reasons["seed"]}
+          onChange={(seed) => set({ seed })}
+        />
+      </Group>
+    </div>
+  );
+}
+
+const STOPS: Record<StopKind, { label: string; line: string }> = {
+  paper: {
+    label: "Not improving",
+    line: "Ends after two flights in a row that are not clearly better than the best, as the paper did.",
+  },
+  noise: {
+    label: "Nothing but noise left",
+    line: "Ends when no further step could be told from noise, after the best has been flown again against the first gains.",
+  },
+  budget: { label: "All flights", line: "Flies until the budget is used." },
+};
+
+function StopFields({ form, reasons, set }: Props) {
+  const narrow = useMediaQuery("(max-width: 620px)", false, { getInitialValueInEffect: false });
+  return (
+    <Group title="Stop">
+      <SegmentedControl
+        aria-label="Stop rule"
+        size="md"
+        className={classes["wide"]}
+        orientation={narrow ? "vertical" : "horizontal"}
+        value={form.stop}
+        onChange={(value) => set({ stop: value as StopKind })}
+        data={Object.entries(STOPS).map(([value, { label }]) => ({ value, label }))}
+      />
+      <p className={classes["note"]}>{STOPS[form.stop].line}</p>
+      <NumberField
+        label="Flights at most"
+        value={form.maxFlights}
+        error={reasons["stop.max_flights"]}
+        onChange={(maxFlights) => set({ maxFlights })}
+      />
+      {form.stop === "paper" && (
+        <NumberField
+          label="An improvement is at least"
+          suffix=" %"
+          value={form.improvementPercent}
+          error={reasons["stop.improvement"]}
+          onChange={(improvementPercent) => set({ improvementPercent })}
+        />
+      )}
+      {form.stop === "noise" && (
+        <NumberField
+          label="Sure enough with a confidence of"
+          suffix=" %"
+          value={form.confidencePercent}
+          error={reasons["stop.confidence"]}
+          onChange={(confidencePercent) => set({ confidencePercent })}
+        />
+      )}
+      <NumberField
+        label="Stop when a flight ends below"
+        placeholder="no battery limit"
+        suffix=" V"
+        value={form.minBatteryV}
+        error={reasons["stop.min_battery_v"]}
+        onChange={(minBatteryV) => set({ minBatteryV })}
+      />
+    </Group>
+  );
+}
+
+interface OptionsProps {
+  title: string;
+  options: readonly OptionInfo[];
+  chosen: Record<string, OptionValue>;
+  reasons: Record<string, string>;
+  prefix: string;
+  onChange: (chosen: Record<string, OptionValue>) => void;
+}
+
+function OptionGroup({ title, options, chosen, reasons, prefix, onChange }: OptionsProps) {
+  if (options.length === 0) return null;
+  return (
+    <Group title={title}>
+      {options.map((option) => (
+        <OptionField
+          key={option.name}
+          option={option}
+          value={chosen[option.name]}
+          error={reasons[`${prefix}.${option.name}`]}
+          onChange={(value) => onChange({ ...chosen, [option.name]: value })}
+        />
+      ))}
+    </Group>
+  );
+}
+
+function BoundFields({ form, catalogue, reasons, set }: Props) {
+  return (
+    <Group title="Bounds and steps">
+      {gainsOf(catalogue, form.experiment).map((gain) => {
+        const [low, high] = form.bounds[gain.name] ?? [gain.lower, gain.upper];
+        const change = (pair: [number | string, number | string]): void =>
+          set({ bounds: { ...form.bounds, [gain.name]: pair } });
+        return (
+          <div key={gain.name} className={classes["bounds"]}>
+            <NumberField label={`${gain.name} at least`} value={low} onChange={(value) => change([value, high])} />
+            <NumberField
+              label={`${gain.name} at most`}
+              value={high}
+              error={reasons[`bounds.${gain.name}`]}
+              onChange={(value) => change([low, value])}
+            />
+          </div>
+        );
+      })}
+      <NumberField
+        label="First step at most"
+        description="of each range, until a flight is valid"
+        suffix=" %"
+        value={form.firstStepPercent}
+        error={reasons["first_step_fraction"]}
+        onChange={(firstStepPercent) => set({ firstStepPercent })}
+      />
+      <NumberField
+        label="Later steps at most"
+        description="of each range"
+        suffix=" %"
+        value={form.stepPercent}
+        error={reasons["step_fraction"]}
+        onChange={(stepPercent) => set({ stepPercent })}
+      />
+      {hasModel(catalogue, form.experiment) && unitsOf(catalogue, form.experiment).output === "m" && (
+        <NumberField
+          label="Ceiling of the checks"
+          description="Gains that might rise higher are refused"
+          suffix=" m"
+          value={form.ceilingM}
+          error={reasons["ceiling_m"]}
+          onChange={(ceilingM) => set({ ceilingM })}
+        />
+      )}
+    </Group>
+  );
+}

@@ -1,0 +1,79 @@
+import { Button } from "@mantine/core";
+import { IconArchive } from "@tabler/icons-react";
+import { useState } from "react";
+import { Link } from "react-router";
+import { useArchive } from "../../api/mutations";
+import type { CampaignSummary } from "../../api/types";
+import { Sparkline } from "../../charts/Sparkline";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { count } from "../../ui/format";
+import { StateBadge } from "../../ui/StateBadge";
+import { campaignStateLabel } from "../../ui/states";
+import { plusMinus } from "../../ui/uncertainty";
+import { useUnits } from "../../ui/useUnits";
+import { VehicleBadge } from "../../ui/VehicleBadge";
+import classes from "./CampaignCard.module.css";
+import { CloneForm } from "./CloneForm";
+import { progress } from "./campaignList";
+
+/** A campaign at a glance: what it reached, how its curves look, what to do next. */
+export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
+  const { id, name, state, outcome, vehicle, best, flights, rehearsal, next_action, spark } = campaign;
+  const units = useUnits(campaign.experiment);
+  return (
+    <li className={classes["card"]}>
+      <div className={classes["top"]}>
+        <VehicleBadge isReal={vehicle.is_real} />
+        <StateBadge words={campaignStateLabel(state, outcome, rehearsal)} />
+      </div>
+      <h2 className={classes["name"]}>
+        <Link to={`/campaigns/${id}`}>{name}</Link>
+      </h2>
+      <p className={classes["vehicle"]}>{vehicle.registered ? vehicle.name : vehicle.title}</p>
+      <Sparkline curves={spark} setPoint={units.setPoint} />
+      <dl className={`${classes["figures"]} numbers`}>
+        <div>
+          <dt>{best === null ? "Best error" : "Best error ± standard error"}</dt>
+          <dd>{plusMinus(best?.mean, best?.standard_error, units.error)}</dd>
+        </div>
+        <div>
+          <dt>{count(flights, "flight")}</dt>
+          <dd className={classes["progress"]} data-better={campaign.verdict === "better" || undefined}>
+            {progress(campaign) ?? " "}
+          </dd>
+        </div>
+      </dl>
+      <p className={classes["next"]}>{next_action}</p>
+      <More campaign={campaign} />
+    </li>
+  );
+}
+
+/** What can be done with a campaign without opening it. */
+function More({ campaign }: { campaign: CampaignSummary }) {
+  const [open, setOpen] = useState(false);
+  const archive = useArchive(campaign.id);
+  return (
+    <details className={classes["more"]} onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary aria-label={`More to do with ${campaign.name}`}>
+        {campaign.state === "finished" ? "Clone or archive" : "Clone"}
+      </summary>
+      {open && (
+        <div className={classes["acts"]}>
+          <CloneForm {...campaign} />
+          {campaign.state === "finished" && (
+            <Button
+              variant="default"
+              leftSection={<IconArchive size={18} aria-hidden />}
+              loading={archive.isPending}
+              onClick={() => archive.mutate()}
+            >
+              Archive
+            </Button>
+          )}
+          <ErrorNotice error={archive.error} />
+        </div>
+      )}
+    </details>
+  );
+}

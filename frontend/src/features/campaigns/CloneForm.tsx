@@ -1,0 +1,69 @@
+import { Button, Switch } from "@mantine/core";
+import { IconCopy } from "@tabler/icons-react";
+import { useState } from "react";
+import { useNavigate } from "react-router";
+import { useClone } from "../../api/mutations";
+import { useCatalogue } from "../../api/queries";
+import type { Campaign } from "../../api/types";
+import { useVehicles } from "../../api/vehicles";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { HelpTip } from "../../ui/HelpTip";
+import { SelectField } from "../../ui/SelectField";
+import classes from "./CloneForm.module.css";
+import { kindsFor, registeredFor } from "./newCampaign";
+
+interface Props extends Pick<Campaign, "id" | "vehicle" | "best"> {
+  experiment: string;
+}
+
+/** The same settings again, on this vehicle or another, from the start or from what this campaign has reached. */
+export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props) {
+  const navigate = useNavigate();
+  const ownKey = own.registered ? String(own.id) : own.kind;
+  const [vehicle, setVehicle] = useState(ownKey);
+  const [warm, setWarm] = useState(false);
+  const clone = useClone(origin);
+  const catalogue = useCatalogue().data;
+  const registered = registeredFor(useVehicles().data ?? [], experiment);
+  const kinds = catalogue === undefined ? [] : kindsFor(catalogue, experiment);
+  const chosen = registered.find(({ id }) => String(id) === vehicle);
+  const choice = chosen === undefined ? { kind: vehicle } : { kind: chosen.kind, id: chosen.id };
+  return (
+    <div className={classes["form"]}>
+      <SelectField
+        label="Same settings again, on"
+        data={[
+          ...registered.map(({ id, name }) => ({ value: String(id), label: name })),
+          ...kinds.map(({ name, title }) => ({ value: name, label: title })),
+        ]}
+        value={vehicle}
+        onChange={setVehicle}
+      />
+      {best !== null && (
+        <div className={classes["start"]}>
+          <Switch
+            size="md"
+            label={`Start from flight ${best.trial_number}`}
+            checked={warm}
+            onChange={(event) => setWarm(event.currentTarget.checked)}
+          />
+          <HelpTip topic="warmStart" />
+        </div>
+      )}
+      <Button
+        leftSection={<IconCopy size={20} aria-hidden />}
+        loading={clone.isPending}
+        onClick={() =>
+          // The same vehicle keeps its settings, another one starts from its own defaults.
+          clone.mutate(
+            { warmStart: warm, ...(vehicle === ownKey ? {} : { vehicle: choice }) },
+            { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
+          )
+        }
+      >
+        Clone
+      </Button>
+      <ErrorNotice error={clone.error} />
+    </div>
+  );
+}

@@ -1,0 +1,200 @@
+import { Accordion, Button, Skeleton, TextInput } from "@mantine/core";
+import { IconPlus } from "@tabler/icons-react";
+import { useState } from "react";
+import { useNavigate, useSearchParams } from "react-router";
+import { useCreateCampaign } from "../../api/mutations";
+import { problemOf, reasonsByField } from "../../api/problems";
+import { useCatalogue } from "../../api/queries";
+import type { Catalogue, Vehicle } from "../../api/types";
+import { useVehicles } from "../../api/vehicles";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import classes from "../../ui/Form.module.css";
+import { NumberField } from "../../ui/NumberField";
+import { SelectField } from "../../ui/SelectField";
+import { useTitle } from "../../ui/useTitle";
+import { AdvancedFields } from "./AdvancedFields";
+import { DonorPicker } from "./DonorPicker";
+import {
+  type CampaignForm,
+  fieldsOf,
+  flyingOther,
+  gainsOf,
+  kindsFor,
+  registeredFor,
+  requestFrom,
+  type StartKind,
+  startingForm,
+  startsFor,
+  strategiesFor,
+  unreadable,
+  withExperiment,
+  withRegistered,
+  withVehicle,
+} from "./newCampaign";
+import { VehiclePicker } from "./VehiclePicker";
+
+/** With `?vehicle=ID` that registered vehicle is chosen already. */
+export function NewCampaignPage() {
+  useTitle("New campaign");
+  const catalogue = useCatalogue();
+  const vehicles = useVehicles();
+  const wanted = Number(useSearchParams()[0].get("vehicle"));
+  const error = catalogue.error ?? vehicles.error;
+  return (
+    <div className={classes["page"]}>
+      <h1 className={classes["title"]}>New campaign</h1>
+      {catalogue.data && vehicles.data && (
+        <NewCampaignForm
+          catalogue={catalogue.data}
+          vehicles={vehicles.data}
+          wanted={vehicles.data.find(({ id, registered }) => registered && id === wanted)}
+        />
+      )}
+      {error && <ErrorNotice error={error} />}
+      {(catalogue.isPending || vehicles.isPending) && <Skeleton height={420} radius="md" aria-busy="true" />}
+    </div>
+  );
+}
+
+const STARTS: Record<StartKind, string> = {
+  default: "The vehicle's default gains",
+  simplex: "Best gains on the model (simplex)",
+  campaign: "Best of another campaign",
+  given: "Gains of my own",
+};
+
+interface FormProps {
+  catalogue: Catalogue;
+  vehicles: readonly Vehicle[];
+  wanted: Vehicle | undefined;
+}
+
+function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
+  const [form, setForm] = useState<CampaignForm>(() => {
+    const start = startingForm(catalogue);
+    return wanted === undefined ? start : withRegistered(start, catalogue, wanted);
+  });
+  const navigate = useNavigate();
+  const create = useCreateCampaign();
+  const { plain, advanced } = fieldsOf(form, catalogue);
+  const reasons = reasonsByField(problemOf(create.error), [...plain, ...advanced]);
+  const [opened, setOpened] = useState<string | null>(null);
+  const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
+  const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
+  const strategies = strategiesFor(catalogue, form.experiment);
+  const strategy = strategies.find(({ name }) => name === form.strategy);
+  const recommended = strategies[0]?.name;
+  const unread = unreadable(form, catalogue);
+  const isReal = vehicles.some(({ id, is_real }) => id === form.registered?.id && is_real);
+  return (
+    <form
+      noValidate
+      className={classes["form"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        create.mutate(requestFrom(form, catalogue), { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
+      }}
+    >
+      {catalogue.experiments.length > 1 && (
+        <SelectField
+          label="Experiment"
+          data={catalogue.experiments.map(({ name, title }) => ({ value: name, label: title }))}
+          value={form.experiment}
+          error={reasons["definition.experiment"]}
+          onChange={(value) => setForm(withExperiment(form, catalogue, value))}
+        />
+      )}
+      <VehiclePicker
+        kinds={kindsFor(catalogue, form.experiment)}
+        registered={registeredFor(vehicles, form.experiment)}
+        others={flyingOther(vehicles, form.experiment)}
+        kind={form.vehicle}
+        vehicleId={form.registered?.id ?? null}
+        error={reasons["vehicle.kind"] ?? reasons["vehicle.id"]}
+        onKind={(kind) => setForm(withVehicle(form, catalogue, kind))}
+        onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
+      />
+      {isReal && (
+        <p className={classes["rehearse"]}>
+          {form.registered?.name} is a real vehicle: before its first flight the campaign is rehearsed on a simulation,
+          in one click from its page.
+        </p>
+      )}
+      <TextInput
+        label="Name"
+        value={form.name}
+        maxLength={120}
+        error={reasons["name"]}
+        onChange={(event) => set({ name: event.currentTarget.value })}
+      />
+      <div className={classes["pair"]}>
+        <SelectField
+          label="Start from"
+          data={startsFor(catalogue, form.experiment).map((value) => ({ value, label: STARTS[value] }))}
+          value={form.start}
+          error={reasons["start.kind"]}
+          onChange={(value) => set({ start: value })}
+        />
+        <SelectField
+          label="Strategy"
+          description={`${form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
+          data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
+          value={form.strategy}
+          error={reasons["strategy"]}
+          onChange={(value) => set({ strategy: value, strategyOptions: {} })}
+        />
+      </div>
+      {form.start === "campaign" && (
+        <DonorPicker
+          experiment={form.experiment}
+          donor={form.donor}
+          error={reasons["start.donor"]}
+          onChange={(donor) => set({ donor })}
+        />
+      )}
+      {form.start === "given" && (
+        <fieldset className={classes["gains"]}>
+          <legend>Start gains</legend>
+          {gainsOf(catalogue, form.experiment).map((gain) => (
+            <NumberField
+              key={gain.name}
+              required
+              withAsterisk={false}
+              label={gain.name}
+              description={`${gain.lower} … ${gain.upper} ${gain.unit}`}
+              value={form.startGains[gain.name] ?? ""}
+              error={reasons[`start.gains.${gain.name}`]}
+              onChange={(value) => set({ startGains: { ...form.startGains, [gain.name]: value } })}
+            />
+          ))}
+        </fieldset>
+      )}
+      <Accordion
+        variant="contained"
+        chevronPosition="left"
+        value={refusedBelow ? "advanced" : opened}
+        onChange={setOpened}
+      >
+        <Accordion.Item value="advanced">
+          <Accordion.Control mih={56}>Advanced: stop rule, bounds, vehicle settings, seed</Accordion.Control>
+          <Accordion.Panel>
+            <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
+          </Accordion.Panel>
+        </Accordion.Item>
+      </Accordion>
+      <ErrorNotice error={create.error} shown={[...plain, ...advanced]} />
+      {unread.length > 0 && <p role="status">Not a number yet: {unread.join(", ")}.</p>}
+      <div className={classes["create"]}>
+        <Button
+          type="submit"
+          size="lg"
+          disabled={unread.length > 0}
+          loading={create.isPending}
+          leftSection={<IconPlus size={22} aria-hidden />}
+        >
+          Create campaign
+        </Button>
+      </div>
+    </form>
+  );
+}

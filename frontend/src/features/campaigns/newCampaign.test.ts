@@ -1,0 +1,219 @@
+import { expect, test } from "vitest";
+import type { CampaignSummary, Catalogue, Vehicle } from "../../api/types";
+import {
+  fieldsOf,
+  firstPreset,
+  flyingOther,
+  kindsFor,
+  optionsOf,
+  registeredFor,
+  requestFrom,
+  startingForm,
+  startsFor,
+  strategiesFor,
+  withExperiment,
+  withRegistered,
+  withVehicle,
+} from "./newCampaign";
+
+const gain = (name: string, upper: number, value: number) => ({
+  name,
+  title: name,
+  unit: "counts",
+  lower: 0,
+  upper,
+  scale: upper / 10,
+  default: value,
+  integer: true,
+});
+
+const catalogue = {
+  experiments: [
+    {
+      name: "takeoff",
+      title: "Takeoff to 3 m",
+      has_model: true,
+      gains: [gain("kp", 4000, 283), gain("ki", 1073, 13), gain("kd", 409, 82)],
+      options: [],
+    },
+    {
+      name: "takeoff-px4",
+      title: "Takeoff under PX4",
+      has_model: false,
+      gains: [gain("MPC_Z_P", 1.5, 1)],
+      options: [],
+    },
+    {
+      name: "pitch-tracking",
+      title: "Pitch tracking",
+      has_model: true,
+      gains: [gain("theta_3", 0, -15)],
+      options: [{ name: "perturbation", title: "Model off by", default: 0.45, choices: [] }],
+    },
+  ],
+  strategies: [
+    { name: "calibrated", options: [], experiments: ["takeoff"] },
+    {
+      name: "gradient",
+      options: [{ name: "scaled", title: "Scaled", default: true, choices: [true, false] }],
+      experiments: ["takeoff", "pitch-tracking"],
+    },
+    { name: "identified", options: [], experiments: ["pitch-tracking"] },
+    { name: "manual", options: [], experiments: ["takeoff", "takeoff-px4", "pitch-tracking"] },
+  ],
+  vehicle_kinds: [
+    { name: "import", can_fly: false, options: [], experiments: ["takeoff", "takeoff-px4"] },
+    { name: "lti", can_fly: true, options: [], experiments: ["pitch-tracking"] },
+    { name: "twin", can_fly: true, options: [], experiments: ["takeoff"] },
+    { name: "jsbsim", can_fly: true, options: [{ name: "mass_kg" }], experiments: ["takeoff"] },
+  ],
+  presets: [
+    { name: "twin", title: "Twin takeoff", campaign: { vehicle: { kind: "twin" } } },
+    { name: "ardrone", title: "Simulated takeoff", campaign: { vehicle: { kind: "jsbsim" } } },
+  ],
+} as unknown as Catalogue;
+
+const bee = { id: 7, kind: "mavlink", name: "Bee", registered: true, experiments: ["takeoff"] } as Vehicle;
+const wasp = { ...bee, id: 8, name: "Wasp", experiments: ["takeoff-px4"] };
+const shared = { ...bee, id: 1, kind: "twin", registered: false };
+
+test("the form as it comes creates the recommended campaign on the simulation", () => {
+  const form = startingForm(catalogue);
+  expect(requestFrom(form, catalogue)).toEqual({
+    name: "Simulated takeoff",
+    vehicle: { kind: "jsbsim", options: {} },
+    definition: {
+      experiment: "takeoff",
+      experiment_options: {},
+      strategy: "calibrated",
+      options: {},
+      start: { kind: "default" },
+      bounds: {},
+      first_step_fraction: 0.25,
+      step_fraction: 1,
+      ceiling_m: 4.5,
+      stop: { kind: "paper", max_flights: 7, improvement: 0.05, confidence: 0.9, min_battery_v: null },
+      seed: 1,
+    },
+  });
+});
+
+test("bounds are sent only where they are tighter", () => {
+  const form = { ...startingForm(catalogue), bounds: { kp: [0, 2000], ki: [0, 1073], kd: ["", 409] } } as ReturnType<
+    typeof startingForm
+  >;
+  expect(requestFrom(form, catalogue).definition?.bounds).toEqual({ kp: [0, 2000] });
+});
+
+test("given start gains leave out what is empty, so that the server names it", () => {
+  const form = { ...startingForm(catalogue), start: "given" as const, startGains: { kp: 400, ki: "", kd: -1 } };
+  expect(requestFrom(form, catalogue).definition?.start).toEqual({ kind: "given", gains: { kp: 400, kd: -1 } });
+});
+
+test("a wrong number is sent as it is, for the server to refuse", () => {
+  const form = { ...startingForm(catalogue), maxFlights: -3, improvementPercent: 7.5 };
+  expect(requestFrom(form, catalogue).definition?.stop).toMatchObject({ max_flights: -3, improvement: 0.075 });
+});
+
+test("a name follows the vehicle until somebody has changed it", () => {
+  const form = startingForm(catalogue);
+  expect(withVehicle(form, catalogue, "twin").name).toBe("Twin takeoff");
+  expect(withVehicle({ ...form, name: "Mine" }, catalogue, "twin").name).toBe("Mine");
+  expect(withVehicle({ ...form, vehicleOptions: { mass_kg: 0.5 } }, catalogue, "twin").vehicleOptions).toEqual({});
+});
+
+test("a warm start names the other campaign, and nothing until one is chosen", () => {
+  const form = { ...startingForm(catalogue), start: "campaign" as const };
+  expect(requestFrom(form, catalogue).definition?.start).toEqual({ kind: "campaign", donor: null });
+  const donor = { id: 12, name: "Yesterday's" } as CampaignSummary;
+  expect(requestFrom({ ...form, donor }, catalogue).definition?.start).toEqual({
+    kind: "campaign",
+    donor: { campaign_id: 12 },
+  });
+});
+
+test("stopping on noise carries its confidence and the battery's limit", () => {
+  const form = { ...startingForm(catalogue), stop: "noise" as const, confidencePercent: 95, minBatteryV: 10.8 };
+  expect(requestFrom(form, catalogue).definition?.stop).toMatchObject({
+    kind: "noise",
+    confidence: 0.95,
+    min_battery_v: 10.8,
+  });
+});
+
+test("the simulation is offered first, flights made elsewhere last", () => {
+  expect(kindsFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["jsbsim", "twin", "import"]);
+  expect(firstPreset(catalogue)?.name).toBe("ardrone");
+});
+
+test("an experiment is offered the vehicles and strategies that fit it", () => {
+  expect(kindsFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual(["lti"]);
+  expect(strategiesFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["calibrated", "gradient", "manual"]);
+  expect(strategiesFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual([
+    "gradient",
+    "identified",
+    "manual",
+  ]);
+});
+
+test("another experiment begins with its own gains, vehicle and strategy, and keeps the stop rule", () => {
+  const form = withExperiment({ ...startingForm(catalogue), maxFlights: 25 }, catalogue, "pitch-tracking");
+  expect(form).toMatchObject({
+    experiment: "pitch-tracking",
+    vehicle: "lti",
+    strategy: "gradient",
+    startGains: { theta_3: -15 },
+    maxFlights: 25,
+    name: "Pitch tracking, lti",
+  });
+  expect(requestFrom(form, catalogue).definition?.bounds).toEqual({});
+});
+
+test("every refusable field has its place in the form", () => {
+  const form = { ...startingForm(catalogue), strategy: "gradient" };
+  expect(fieldsOf(form, catalogue).plain).not.toContain("start.gains.kp");
+  expect(fieldsOf({ ...form, start: "given" }, catalogue).plain).toContain("start.gains.kp");
+  expect(fieldsOf(form, catalogue).advanced).toEqual(
+    expect.arrayContaining(["stop.max_flights", "bounds.kd", "vehicle.options.mass_kg", "definition.options.scaled"]),
+  );
+});
+
+test("without a model gains are chosen by hand, in small steps, and no start is searched", () => {
+  const form = withExperiment(startingForm(catalogue), catalogue, "takeoff-px4");
+  expect(form).toMatchObject({ strategy: "manual", vehicle: "import", firstStepPercent: 25, stepPercent: 25 });
+  expect(startsFor(catalogue, "takeoff-px4")).toEqual(["default", "campaign", "given"]);
+  expect(startsFor(catalogue, "takeoff")).toContain("simplex");
+});
+
+test("registered vehicles are offered where they have the experiment's gains, shared ones by their kinds alone", () => {
+  const vehicles = [shared, bee, wasp];
+  expect(registeredFor(vehicles, "takeoff")).toEqual([bee]);
+  expect(flyingOther(vehicles, "takeoff")).toEqual([wasp]);
+});
+
+test("a registered vehicle is asked for by its id, with the settings that stand at it", () => {
+  const mine = { ...startingForm(catalogue), vehicleOptions: { mass_kg: 0.5 } };
+  const form = withRegistered(mine, catalogue, bee);
+  expect(requestFrom(form, catalogue)).toMatchObject({
+    name: "Takeoff to 3 m, Bee",
+    vehicle: { kind: "mavlink", id: 7 },
+  });
+  expect(requestFrom(form, catalogue).vehicle).not.toHaveProperty("options");
+  expect(optionsOf(form, catalogue).vehicle).toEqual([]);
+  expect(requestFrom(withVehicle(form, catalogue, "twin"), catalogue)).toMatchObject({
+    name: "Twin takeoff",
+    vehicle: { kind: "twin", options: {} },
+  });
+});
+
+test("a vehicle that flies another experiment brings it along, with its gains; a name of one's own stays", () => {
+  const form = withRegistered({ ...startingForm(catalogue), name: "Mine", maxFlights: 12 }, catalogue, wasp);
+  expect(form).toMatchObject({
+    experiment: "takeoff-px4",
+    strategy: "manual",
+    startGains: { MPC_Z_P: 1 },
+    maxFlights: 12,
+    name: "Mine",
+  });
+  expect(requestFrom(form, catalogue).vehicle).toEqual({ kind: "mavlink", id: 8 });
+});

@@ -1,0 +1,304 @@
+/** The form of a new campaign: working defaults in, the request out. Number fields hold text while it is not a number. */
+
+import type {
+  CampaignSummary,
+  Catalogue,
+  NewCampaign,
+  OptionInfo,
+  PresetInfo,
+  Vehicle,
+  VehicleKindInfo,
+} from "../../api/types";
+import type { NumberEntry } from "../../ui/NumberField";
+import type { OptionValue } from "../../ui/OptionField";
+
+export type StartKind = "default" | "simplex" | "given" | "campaign";
+export type StopKind = "paper" | "noise" | "budget";
+
+/** A registered vehicle, as far as the form needs it: its settings stand at the vehicle. */
+export type Chosen = Pick<Vehicle, "id" | "kind" | "name" | "experiments">;
+
+export interface CampaignForm {
+  name: string;
+  experiment: string;
+  experimentOptions: Record<string, OptionValue>;
+  vehicle: string;
+  registered: Chosen | null;
+  vehicleOptions: Record<string, OptionValue>;
+  strategy: string;
+  strategyOptions: Record<string, OptionValue>;
+  start: StartKind;
+  startGains: Record<string, NumberEntry>;
+  donor: CampaignSummary | null;
+  stop: StopKind;
+  maxFlights: NumberEntry;
+  improvementPercent: NumberEntry;
+  confidencePercent: NumberEntry;
+  minBatteryV: NumberEntry;
+  bounds: Record<string, [NumberEntry, NumberEntry]>;
+  firstStepPercent: NumberEntry;
+  stepPercent: NumberEntry;
+  ceilingM: NumberEntry;
+  seed: NumberEntry;
+}
+
+export function gainsOf(catalogue: Catalogue, experiment: string) {
+  return catalogue.experiments.find(({ name }) => name === experiment)?.gains ?? [];
+}
+
+/** Whether flights can be foretold: without a model gains are chosen by hand, and nothing is searched or simulated. */
+export function hasModel(catalogue: Catalogue, experiment: string): boolean {
+  return catalogue.experiments.find(({ name }) => name === experiment)?.has_model ?? false;
+}
+
+/** Where the first gains may come from. */
+export function startsFor(catalogue: Catalogue, experiment: string): StartKind[] {
+  return hasModel(catalogue, experiment)
+    ? ["default", "simplex", "campaign", "given"]
+    : ["default", "campaign", "given"];
+}
+
+/** Whether something that works with `experiments` works with this one; an empty list is all of them. */
+function fits(experiments: readonly string[] | undefined, experiment: string): boolean {
+  return experiments === undefined || experiments.length === 0 || experiments.includes(experiment);
+}
+
+/** Shared vehicles that fly this experiment. The simulation comes first, a vehicle that is flown elsewhere last. */
+export function kindsFor(catalogue: Catalogue, experiment: string): VehicleKindInfo[] {
+  const rank = (kind: VehicleKindInfo): number => (kind.name === "jsbsim" ? 0 : kind.can_fly ? 1 : 2);
+  const kinds: readonly VehicleKindInfo[] = catalogue.vehicle_kinds;
+  const shared = kinds.filter((kind) => !kind.registered && fits(kind.experiments, experiment));
+  return shared.sort((one, other) => rank(one) - rank(other));
+}
+
+/** Registered vehicles that fly this experiment. */
+export function registeredFor<T extends Vehicle>(vehicles: readonly T[], experiment: string): T[] {
+  return vehicles.filter(({ registered, experiments }) => registered && fits(experiments, experiment));
+}
+
+/** Registered vehicles that fly another one. */
+export function flyingOther<T extends Vehicle>(vehicles: readonly T[], experiment: string): T[] {
+  return vehicles.filter(({ registered, experiments }) => registered && !fits(experiments, experiment));
+}
+
+/** Strategies that work with this experiment, in the catalogue's order: the first one is recommended. */
+export function strategiesFor(catalogue: Catalogue, experiment: string) {
+  return catalogue.strategies.filter((strategy) => fits(strategy.experiments, experiment));
+}
+
+function presetFor(catalogue: Catalogue, experiment: string, vehicle: string): PresetInfo | undefined {
+  return catalogue.presets.find(
+    ({ campaign }) =>
+      campaign.vehicle?.kind === vehicle && (campaign.definition?.experiment ?? "takeoff") === experiment,
+  );
+}
+
+export function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
+  const title = catalogue.experiments.find(({ name }) => name === experiment)?.title ?? experiment;
+  return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${vehicle}`;
+}
+
+/** The preset that one click creates: the simulated takeoff. */
+export function firstPreset(catalogue: Catalogue): PresetInfo | undefined {
+  return catalogue.presets.find(({ campaign }) => campaign.vehicle?.kind === "jsbsim") ?? catalogue.presets[0];
+}
+
+export function startingForm(
+  catalogue: Catalogue,
+  experiment: string = catalogue.experiments[0]?.name ?? "takeoff",
+): CampaignForm {
+  const vehicle = kindsFor(catalogue, experiment)[0]?.name ?? "";
+  const gains = gainsOf(catalogue, experiment);
+  return {
+    name: nameFor(catalogue, experiment, vehicle),
+    experiment,
+    experimentOptions: {},
+    vehicle,
+    registered: null,
+    vehicleOptions: {},
+    strategy: strategiesFor(catalogue, experiment)[0]?.name ?? "gradient",
+    strategyOptions: {},
+    start: "default",
+    startGains: Object.fromEntries(gains.map((gain) => [gain.name, gain.default])),
+    donor: null,
+    stop: "paper",
+    maxFlights: 7,
+    improvementPercent: 5,
+    confidencePercent: 90,
+    minBatteryV: "",
+    bounds: Object.fromEntries(gains.map((gain) => [gain.name, [gain.lower, gain.upper]])),
+    firstStepPercent: 25,
+    stepPercent: hasModel(catalogue, experiment) ? 100 : 25,
+    ceilingM: 4.5,
+    seed: 1,
+  };
+}
+
+function isNamedByHand({ name, experiment, vehicle, registered }: CampaignForm, catalogue: Catalogue): boolean {
+  return name !== nameFor(catalogue, experiment, registered?.name ?? vehicle);
+}
+
+/** Another vehicle has other settings; a name that nobody has changed follows it. */
+export function withVehicle(form: CampaignForm, catalogue: Catalogue, vehicle: string): CampaignForm {
+  const name = isNamedByHand(form, catalogue) ? form.name : nameFor(catalogue, form.experiment, vehicle);
+  return { ...form, vehicle, registered: null, vehicleOptions: {}, name };
+}
+
+/** A registered vehicle has settings of its own, and brings its experiment where it does not fly the chosen one. */
+export function withRegistered(form: CampaignForm, catalogue: Catalogue, registered: Chosen): CampaignForm {
+  const own = registered.experiments[0] ?? form.experiment;
+  const suited = fits(registered.experiments, form.experiment) ? form : withExperiment(form, catalogue, own);
+  const name = isNamedByHand(suited, catalogue) ? suited.name : nameFor(catalogue, suited.experiment, registered.name);
+  return { ...suited, vehicle: registered.kind, registered, vehicleOptions: {}, name };
+}
+
+/** Another experiment has other gains, vehicles and strategies: everything but the stop rule begins anew. */
+export function withExperiment(form: CampaignForm, catalogue: Catalogue, experiment: string): CampaignForm {
+  const { stop, maxFlights, improvementPercent, confidencePercent, seed } = form;
+  const fresh = startingForm(catalogue, experiment);
+  const name = isNamedByHand(form, catalogue) ? form.name : fresh.name;
+  return { ...fresh, name, stop, maxFlights, improvementPercent, confidencePercent, seed };
+}
+
+function number(entry: NumberEntry, fallback: number): number {
+  return typeof entry === "number" ? entry : fallback;
+}
+
+function share(entry: NumberEntry, fallback: number): number {
+  return typeof entry === "number" ? Number((entry / 100).toPrecision(12)) : fallback;
+}
+
+/** Only what differs from the experiment's own bounds narrows them. */
+function narrowed(form: CampaignForm, catalogue: Catalogue): Record<string, [number, number]> {
+  const bounds: Record<string, [number, number]> = {};
+  for (const gain of gainsOf(catalogue, form.experiment)) {
+    const [low, high] = form.bounds[gain.name] ?? [gain.lower, gain.upper];
+    const pair: [number, number] = [number(low, gain.lower), number(high, gain.upper)];
+    if (pair[0] !== gain.lower || pair[1] !== gain.upper) bounds[gain.name] = pair;
+  }
+  return bounds;
+}
+
+type Definition = NonNullable<NewCampaign["definition"]>;
+
+function startFrom({ start, startGains, donor }: CampaignForm): NonNullable<Definition["start"]> {
+  if (start === "given") {
+    const gains = Object.entries(startGains).flatMap(([name, entry]) =>
+      typeof entry === "number" ? [[name, entry]] : [],
+    );
+    return { kind: start, gains: Object.fromEntries(gains) };
+  }
+  if (start === "campaign") return { kind: start, donor: donor === null ? null : { campaign_id: donor.id } };
+  return { kind: start };
+}
+
+function stopFrom(form: CampaignForm): NonNullable<Definition["stop"]> {
+  return {
+    kind: form.stop,
+    max_flights: number(form.maxFlights, 7),
+    improvement: share(form.improvementPercent, 0.05),
+    confidence: share(form.confidencePercent, 0.9),
+    min_battery_v: typeof form.minBatteryV === "number" ? form.minBatteryV : null,
+  };
+}
+
+export function requestFrom(form: CampaignForm, catalogue: Catalogue): NewCampaign {
+  return {
+    name: form.name,
+    vehicle: form.registered
+      ? { kind: form.registered.kind, id: form.registered.id }
+      : { kind: form.vehicle, options: form.vehicleOptions },
+    definition: {
+      experiment: form.experiment,
+      experiment_options: form.experimentOptions,
+      strategy: form.strategy,
+      options: form.strategyOptions,
+      start: startFrom(form),
+      bounds: narrowed(form, catalogue),
+      first_step_fraction: share(form.firstStepPercent, 0.25),
+      step_fraction: share(form.stepPercent, 1),
+      ceiling_m: number(form.ceilingM, 4.5),
+      stop: stopFrom(form),
+      seed: number(form.seed, 1),
+    },
+  };
+}
+
+export interface OffersOptions {
+  experiment: readonly OptionInfo[];
+  strategy: readonly OptionInfo[];
+  vehicle: readonly OptionInfo[];
+}
+
+/** The settings that the chosen experiment, strategy and vehicle have. */
+export function optionsOf(form: CampaignForm, catalogue: Catalogue): OffersOptions {
+  return {
+    experiment: catalogue.experiments.find(({ name }) => name === form.experiment)?.options ?? [],
+    strategy: catalogue.strategies.find(({ name }) => name === form.strategy)?.options ?? [],
+    vehicle: form.registered ? [] : (catalogue.vehicle_kinds.find(({ name }) => name === form.vehicle)?.options ?? []),
+  };
+}
+
+/** The names under which the server refuses a field, as far as the form shows it: first the plain ones. */
+export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: string[]; advanced: string[] } {
+  const gains = gainsOf(catalogue, form.experiment).map(({ name }) => name);
+  const options = optionsOf(form, catalogue);
+  return {
+    plain: [
+      "name",
+      "definition.experiment",
+      "vehicle.kind",
+      "vehicle.id",
+      "strategy",
+      "start.kind",
+      ...(form.start === "given" ? gains.map((name) => `start.gains.${name}`) : []),
+      ...(form.start === "campaign" ? ["start.donor"] : []),
+    ],
+    advanced: [
+      ...options.strategy.map(({ name }) => `definition.options.${name}`),
+      ...options.experiment.map(({ name }) => `experiment_options.${name}`),
+      "stop.max_flights",
+      "stop.improvement",
+      "stop.confidence",
+      "stop.min_battery_v",
+      ...gains.map((name) => `bounds.${name}`),
+      "first_step_fraction",
+      "step_fraction",
+      "ceiling_m",
+      ...options.vehicle.map(({ name }) => `vehicle.options.${name}`),
+      "seed",
+    ],
+  };
+}
+
+/** What is typed and does not read as a number, by the words of its field: until then there is nothing to create. */
+export function unreadable(form: CampaignForm, catalogue: Catalogue): string[] {
+  const isText = (entry: NumberEntry): boolean => typeof entry === "string" && entry.trim() !== "";
+  const gains = gainsOf(catalogue, form.experiment).map(({ name }) => name);
+  const options = optionsOf(form, catalogue);
+  const typedOptions = (offered: readonly OptionInfo[], chosen: Record<string, OptionValue>): string[] =>
+    offered
+      .filter(({ name, default: standard }) => typeof standard === "number" && typeof chosen[name] === "string")
+      .map(({ title }) => title);
+  const entries: [string, NumberEntry][] = [
+    ["Flights at most", form.maxFlights],
+    ["An improvement is at least", form.stop === "paper" ? form.improvementPercent : ""],
+    ["Sure enough with a confidence of", form.stop === "noise" ? form.confidencePercent : ""],
+    ["Stop when a flight ends below", form.minBatteryV],
+    ["First step at most", form.firstStepPercent],
+    ["Later steps at most", form.stepPercent],
+    ["Ceiling of the checks", form.ceilingM],
+    ["Seed", form.seed],
+    ...gains.flatMap((name): [string, NumberEntry][] => [
+      [`${name} at least`, form.bounds[name]?.[0] ?? ""],
+      [`${name} at most`, form.bounds[name]?.[1] ?? ""],
+    ]),
+  ];
+  return [
+    ...(form.start === "given" ? gains.filter((name) => typeof form.startGains[name] !== "number") : []),
+    ...entries.filter(([, entry]) => isText(entry)).map(([title]) => title),
+    ...typedOptions(options.strategy, form.strategyOptions),
+    ...typedOptions(options.experiment, form.experimentOptions),
+    ...typedOptions(options.vehicle, form.vehicleOptions),
+  ];
+}

@@ -1,0 +1,111 @@
+import { ActionIcon, Anchor, Button, Skeleton } from "@mantine/core";
+import { IconTrash } from "@tabler/icons-react";
+import { type DragEvent, useState } from "react";
+import { Link, useNavigate, useParams } from "react-router";
+import { useCheckRecording, useChecks, useDeleteCheck } from "../../api/checks";
+import { recordOf } from "../../api/records";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import classes from "../../ui/Page.module.css";
+import { addPage } from "../../ui/paging";
+import { StateBadge } from "../../ui/StateBadge";
+import { Time } from "../../ui/Time";
+import { useTitle } from "../../ui/useTitle";
+import jobs from "../jobs/JobCard.module.css";
+import { CheckForm } from "./CheckForm";
+import { CheckResult } from "./CheckResult";
+import { checkStateLabel, KINDS } from "./checks";
+
+/** Is the controller in the model the one in the vehicle? A recorded run of it, held against the replica. */
+export function ControllerPage() {
+  useTitle("Controller check");
+  const checkId = Number(useParams()["checkId"] ?? 0);
+  const navigate = useNavigate();
+  const upload = useCheckRecording();
+  const [over, setOver] = useState(false);
+  const check = (files: readonly File[], gains?: string) => {
+    const recording = recordOf(files);
+    if (recording === null) return;
+    upload.mutate(
+      { ...recording, ...(gains === undefined ? {} : { gains }) },
+      { onSuccess: ({ id }) => void navigate(`/controller/${id}`) },
+    );
+  };
+  const drop = (event: DragEvent) => {
+    event.preventDefault();
+    setOver(false);
+    check([...event.dataTransfer.files]);
+  };
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: dropping a file is a shortcut for the button below
+    <div
+      className={classes["stack"]}
+      onDragOver={(event) => {
+        event.preventDefault();
+        setOver(true);
+      }}
+      onDragLeave={() => setOver(false)}
+      onDrop={drop}
+    >
+      <h1 className={classes["title"]}>Controller check</h1>
+      {checkId > 0 && <CheckResult key={checkId} checkId={checkId} upload={upload} onCheck={check} />}
+      <CheckForm upload={upload} onCheck={check} over={over} brief={checkId > 0} />
+      <EarlierChecks shown={checkId} />
+    </div>
+  );
+}
+
+/** What was checked before, the newest first. */
+function EarlierChecks({ shown }: { shown: number }) {
+  const checks = useChecks();
+  const remove = useDeleteCheck();
+  const navigate = useNavigate();
+  const found = checks.data?.pages.flatMap((page) => page.items) ?? [];
+  const total = checks.data?.pages[0]?.total ?? 0;
+  return (
+    <section>
+      <ErrorNotice error={checks.error ?? remove.error} />
+      {checks.isPending && <Skeleton height={90} radius="md" aria-busy="true" />}
+      {found.length > 0 && <h2 className={classes["section"]}>Checked so far</h2>}
+      <ul className={classes["list"]} aria-label="Checked so far">
+        {found.map(({ id, file_name, kind, passed, checked_at }) => (
+          <li key={id} className={jobs["job"]}>
+            <div className={jobs["what"]}>
+              <h3 className={jobs["title"]}>
+                <Anchor
+                  component={Link}
+                  to={`/controller/${id}`}
+                  className={jobs["link"]}
+                  aria-current={id === shown || undefined}
+                >
+                  {file_name}
+                </Anchor>
+              </h3>
+              <p className={`${jobs["facts"]} numbers`}>
+                <StateBadge words={checkStateLabel(passed)} />
+                <span>{KINDS[kind]}</span>
+                <Time at={checked_at} />
+              </p>
+            </div>
+            <ActionIcon
+              color="gray"
+              aria-label={`Remove the check of ${file_name}`}
+              title="Remove"
+              onClick={() =>
+                remove.mutate(id, { onSuccess: () => id === shown && void navigate("/controller", { replace: true }) })
+              }
+            >
+              <IconTrash size={20} color="var(--dim)" />
+            </ActionIcon>
+          </li>
+        ))}
+      </ul>
+      {checks.hasNextPage && (
+        <div className={classes["more"]}>
+          <Button variant="default" loading={checks.isFetchingNextPage} onClick={() => void addPage(checks)}>
+            Show more ({found.length} of {total})
+          </Button>
+        </div>
+      )}
+    </section>
+  );
+}

@@ -1,0 +1,40 @@
+import { describe, expect, it } from "vitest";
+import type { CheckedSignal } from "../../api/checks";
+import { allowances, signalsTable } from "./checks";
+
+const signal = (more: Partial<CheckedSignal>): CheckedSignal => ({
+  name: "thrust",
+  title: "Commanded thrust",
+  largest_difference: 0,
+  difference_unit: "counts",
+  tolerance: 0,
+  allowance: "to the last bit",
+  verdict: "exact",
+  different: 0,
+  first_different_s: null,
+  ...more,
+});
+
+describe("a controller check", () => {
+  it("has one line for each signal, with where it differs", () => {
+    const wrong = signal({
+      name: "z_ref",
+      title: "Reference altitude",
+      largest_difference: 0.123456,
+      difference_unit: "m",
+      tolerance: 0.01,
+      verdict: "differs",
+      different: 3,
+      first_different_s: 1.953125,
+    });
+    expect(signalsTable([signal({}), wrong]).rows).toEqual([
+      ["thrust, commanded thrust", "0 counts", "0 counts", "exact", "–"],
+      ["z_ref, reference altitude", "0.12 m", "0.01 m", "differs", "3 samples, from 1.953 s"],
+    ]);
+  });
+
+  it("says once what is allowed of several signals", () => {
+    const signals = [signal({ name: "ff_cmd" }), signal({}), signal({ name: "z_ref", allowance: "within 20 ms" })];
+    expect(allowances(signals)).toEqual(["ff_cmd, thrust: to the last bit.", "z_ref: within 20 ms."]);
+  });
+});

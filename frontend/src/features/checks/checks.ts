@@ -1,0 +1,59 @@
+/** Controller checks in words. */
+
+import type { CheckedSignal, ControllerCheckSummary } from "../../api/checks";
+import type { FigureTable } from "../../api/types";
+import { gainText, NOTHING } from "../../ui/format";
+import type { StateLabel } from "../../ui/states";
+
+/** For the file chooser. A .log goes with Paparazzi's .data file. */
+export const RECORDINGS = ".data,.log,.csv,.gz,text/csv";
+
+export const KINDS: Record<ControllerCheckSummary["kind"], string> = {
+  log: "Log of a flight",
+  trace: "Recording of every step",
+};
+
+export function checkStateLabel(passed: boolean): StateLabel {
+  return passed ? { word: "Agrees", tone: "good" } : { word: "Differs", tone: "bad" };
+}
+
+export function gainsText(gains: Record<string, number>): string {
+  return Object.entries(gains)
+    .map(([name, value]) => `${name} ${gainText(value)}`)
+    .join(", ");
+}
+
+/** Counts are exact; of what is measured two digits say enough. */
+function brief(value: number): string {
+  return gainText(Number.isInteger(value) ? value : Number(value.toPrecision(2)));
+}
+
+/** One line for each signal. */
+export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
+  const column = (name: string, title: string) => ({ name, title, unit: "", digits: null });
+  return {
+    columns: [
+      column("signal", "Signal"),
+      column("difference", "Largest difference"),
+      column("allowed", "Allowed"),
+      column("verdict", "Result"),
+      column("where", "Differs in"),
+    ],
+    rows: signals.map((one) => [
+      `${one.name}, ${one.title.toLowerCase()}`,
+      `${brief(one.largest_difference)} ${one.difference_unit}`,
+      `${gainText(one.tolerance)} ${one.difference_unit}`,
+      one.verdict,
+      one.first_different_s === null
+        ? NOTHING
+        : `${one.different === 1 ? "1 sample, at" : `${one.different} samples, from`} ${one.first_different_s.toFixed(3)} s`,
+    ]),
+  };
+}
+
+/** What is allowed of which signals: "ff_cmd, fb_cmd, thrust: to the last bit". */
+export function allowances(signals: readonly CheckedSignal[]): string[] {
+  const names = new Map<string, string[]>();
+  for (const { name, allowance } of signals) names.set(allowance, [...(names.get(allowance) ?? []), name]);
+  return [...names].map(([allowance, who]) => `${who.join(", ")}: ${allowance}.`);
+}

@@ -1,0 +1,249 @@
+import { ActionIcon, Anchor } from "@mantine/core";
+import { IconArrowBarToUp, IconX } from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { Link } from "react-router";
+import type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "../../api/compare";
+import { count, gainText, NOTHING } from "../../ui/format";
+import { StateBadge } from "../../ui/StateBadge";
+import { trialStateLabel } from "../../ui/states";
+import { Time } from "../../ui/Time";
+import { confidenceText, plusMinus } from "../../ui/uncertainty";
+import { VehicleBadge } from "../../ui/VehicleBadge";
+import { VERDICTS } from "../campaign/verdict";
+import classes from "./Compare.module.css";
+import { againstFirst } from "./chosenFlights";
+import { LineSample, type LineStyle } from "./LineSample";
+
+interface Props {
+  comparison: FlightComparison;
+  pens: ReadonlyMap<number, LineStyle>;
+  onFirst: (trial: number) => void;
+  onRemove: (trial: number) => void;
+}
+
+/** The flights in the order of the address: what each was worth, how it stands against the first, what differs. */
+export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) {
+  const { flights, gains, pairs, error_unit: unit } = comparison;
+  const [first] = flights;
+  if (first === undefined) return null;
+  const several = flights.some(({ campaign_id }) => campaign_id !== first.campaign_id);
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+    <section className={`${classes["scroll"]} sideways`} aria-label="Flights compared" tabIndex={0}>
+      <table className={classes["table"]}>
+        <thead>
+          <tr>
+            <th scope="col">Flight</th>
+            <th scope="col">Error</th>
+            <th scope="col">Against {first.label}</th>
+            {gains.map(({ title, unit: of }) => (
+              <th key={`${title} ${of}`} scope="col">
+                {title}
+                {of && ` (${of})`}
+              </th>
+            ))}
+            <th scope="col">
+              <span className="visually-hidden">Choose</span>
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {flights.map((flight, index) => (
+            <tr key={flight.trial_id}>
+              <th scope="row">
+                <Name flight={flight} several={several} pen={pens.get(flight.trial_id)} />
+              </th>
+              <td>
+                <ErrorCell flight={flight} unit={unit} />
+              </td>
+              <td>
+                <Against pair={againstFirst(pairs, first.trial_id, flight.trial_id)} first={first.label} unit={unit} />
+              </td>
+              {gains.map((difference) => (
+                <td key={`${difference.title} ${difference.unit}`}>
+                  <Value difference={difference} index={index} />
+                </td>
+              ))}
+              <td>
+                <span className={classes["acts"]}>
+                  {index > 0 && (
+                    <Act title={`Hold the others against ${flight.name}`} onClick={() => onFirst(flight.trial_id)}>
+                      <IconArrowBarToUp size={20} color="var(--dim)" />
+                    </Act>
+                  )}
+                  <Act title={`Remove ${flight.name}`} onClick={() => onRemove(flight.trial_id)}>
+                    <IconX size={20} color="var(--dim)" />
+                  </Act>
+                </span>
+              </td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </section>
+  );
+}
+
+function Act({ title, onClick, children }: { title: string; onClick: () => void; children: ReactNode }) {
+  return (
+    <ActionIcon color="gray" aria-label={title} title={title} onClick={onClick}>
+      {children}
+    </ActionIcon>
+  );
+}
+
+function Name({ flight, several, pen }: { flight: ComparedFlight; several: boolean; pen: LineStyle | undefined }) {
+  const { label, number, campaign_id, trial_id, campaign_name, is_real, state, flown_at } = flight;
+  return (
+    <span className={classes["name"]}>
+      <span className={classes["key"]}>
+        {label}
+        {pen && <LineSample pen={pen} />}
+      </span>
+      <span>
+        <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`} className={classes["link"]}>
+          Flight {number}
+        </Anchor>
+        {several && <small className={`${classes["small"]} ${classes["campaignName"]}`}>{campaign_name}</small>}
+        <small className={classes["small"]}>
+          <VehicleBadge isReal={is_real} />
+        </small>
+        <small className={classes["small"]}>
+          <Time at={flown_at} />
+        </small>
+        {state !== "valid" && <StateBadge words={trialStateLabel(state)} />}
+      </span>
+    </span>
+  );
+}
+
+function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: ComparedFlight; unit: string }) {
+  if (error === null || group === null) return <>{NOTHING}</>;
+  if (group.n === 1) {
+    return (
+      <>
+        <strong>{plusMinus(error, scatter, unit)}</strong>
+        {scatter !== null && <small className={classes["small"]}>± scatter of one flight</small>}
+      </>
+    );
+  }
+  return (
+    <>
+      <strong>{plusMinus(group.mean, group.standard_error, unit)}</strong>
+      <small className={classes["small"]}>
+        mean of {group.n}; this one {error.toFixed(3)} {unit}
+      </small>
+    </>
+  );
+}
+
+const UNJUDGED = { gains: "", repeats: "Same gains", apart: "Not judged", "no error": "No error" } as const;
+
+function Against({ pair, first, unit }: { pair: FlightPair | null; first: string; unit: string }) {
+  if (pair === null) return <small className={classes["small"]}>the first</small>;
+  const { verdict, basis, difference, standard_error, confidence, further } = pair;
+  const same = basis === "repeats" && verdict !== null ? "Same gains, " : "";
+  const word = verdict === null ? UNJUDGED[basis] : VERDICTS[verdict];
+  return (
+    <>
+      <strong data-verdict={verdict ?? undefined}>{same ? same + word.toLowerCase() : word}</strong>
+      {difference !== null && (
+        <small className={classes["small"]}>
+          {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
+        </small>
+      )}
+      {confidence !== null && (
+        <small className={classes["small"]}>
+          {confidenceText(confidence)} confidence{verdict === null ? " of a change" : ""}
+        </small>
+      )}
+      {further && (
+        <small className={classes["small"]}>
+          {further.trial} more of its gains and {further.against} of {first} would decide
+        </small>
+      )}
+    </>
+  );
+}
+
+/** With a sign, and as many digits as a gain has. */
+function changeText(change: number): string {
+  return change > 0 ? `+${gainText(change)}` : gainText(change);
+}
+
+interface ValueProps {
+  difference: Pick<FlightDifference, "values" | "changes">;
+  index: number;
+}
+
+function Value({ difference: { values, changes }, index }: ValueProps) {
+  const value = values[index] ?? null;
+  const change = changes[index] ?? null;
+  return (
+    <>
+      {value === null ? NOTHING : typeof value === "number" ? gainText(value) : String(value)}
+      {index > 0 && change !== null && change !== 0 && <small className={classes["small"]}>{changeText(change)}</small>}
+    </>
+  );
+}
+
+/** What else was not the same: a row for each setting, a column for each flight. */
+export function SettingsTable({ comparison: { flights, settings } }: { comparison: FlightComparison }) {
+  const everywhere = settings.filter(({ values }) => values.every((value) => value !== null));
+  const somewhere = settings.filter((setting) => !everywhere.includes(setting));
+  return (
+    <>
+      {settings.length === 0 && (
+        <p className={classes["quiet"]}>All else was the same: vehicle, experiment, strategy and their settings.</p>
+      )}
+      {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
+      {somewhere.length > 0 && (
+        <details className={classes["words"]}>
+          <summary>{count(somewhere.length, "setting")} that only some of the flights have</summary>
+          <Settings flights={flights} settings={somewhere} title="Settings of some flights" />
+        </details>
+      )}
+    </>
+  );
+}
+
+interface SettingsProps {
+  flights: readonly ComparedFlight[];
+  settings: readonly FlightDifference[];
+  title: string;
+}
+
+function Settings({ flights, settings, title }: SettingsProps) {
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+    <section className={`${classes["scroll"]} sideways`} aria-label={title} tabIndex={0}>
+      <table className={`${classes["table"]} ${classes["settings"]}`}>
+        <thead>
+          <tr>
+            <th scope="col">{title}</th>
+            {flights.map(({ trial_id, label }) => (
+              <th key={trial_id} scope="col">
+                {label}
+              </th>
+            ))}
+          </tr>
+        </thead>
+        <tbody>
+          {settings.map(({ title: name, unit, values, changes }) => (
+            <tr key={`${name} ${unit}`}>
+              <th scope="row">
+                {name}
+                {unit && ` (${unit})`}
+              </th>
+              {flights.map(({ trial_id }, index) => (
+                <td key={trial_id}>
+                  <Value difference={{ values, changes }} index={index} />
+                </td>
+              ))}
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </section>
+  );
+}

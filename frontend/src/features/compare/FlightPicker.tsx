@@ -1,0 +1,134 @@
+import { Button, TextInput } from "@mantine/core";
+import { useDebouncedValue } from "@mantine/hooks";
+import { IconSearch } from "@tabler/icons-react";
+import { useState } from "react";
+import { useCampaign, useCampaigns, useTrials } from "../../api/queries";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { count, withUnit } from "../../ui/format";
+import { gainsInBrackets } from "../../ui/gains";
+import { Panel } from "../../ui/Panel";
+import { addPage } from "../../ui/paging";
+import { trialStateLabel, wasFlown } from "../../ui/states";
+import { useUnits } from "../../ui/useUnits";
+import classes from "./Compare.module.css";
+import { MOST_FLIGHTS } from "./chosenFlights";
+
+interface Props {
+  chosen: readonly number[];
+  onToggle: (trial: number) => void;
+  /** The campaign that one came from stands first, opened. */
+  from: number | null;
+}
+
+/** Campaigns by name, and the flights of each to be ticked. */
+export function FlightPicker({ chosen, onToggle, from }: Props) {
+  const [search, setSearch] = useState("");
+  const [sought] = useDebouncedValue(search.trim(), 200);
+  const campaigns = useCampaigns({ search: sought, state: [], vehicle: [], sort: "-updated" });
+  const found = campaigns.data?.pages.flatMap((page) => page.items) ?? [];
+  const flown = found.filter(({ flights, id }) => flights > 0 && id !== from);
+  const full = chosen.length >= MOST_FLIGHTS;
+  return (
+    <Panel title="Choose flights">
+      <TextInput
+        aria-label="Search campaigns by name"
+        placeholder="Search campaigns"
+        leftSection={<IconSearch size={18} aria-hidden />}
+        value={search}
+        onChange={(event) => setSearch(event.currentTarget.value)}
+      />
+      {full && <p className={classes["quiet"]}>At most {MOST_FLIGHTS} flights can be compared at once.</p>}
+      <ErrorNotice error={campaigns.error} />
+      {from !== null && sought === "" && <From campaignId={from} chosen={chosen} onToggle={onToggle} />}
+      {flown.map(({ id, name, experiment, flights }) => (
+        <Campaign key={id} id={id} title={name} flights={flights} {...{ experiment, chosen, onToggle }} />
+      ))}
+      {campaigns.data && flown.length === 0 && from === null && (
+        <p className={classes["quiet"]}>
+          {sought === ""
+            ? "Nothing has flown yet: fly a campaign first."
+            : "No campaign with a flight fits this search."}
+        </p>
+      )}
+      {campaigns.hasNextPage && (
+        <Button variant="default" mt={8} loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
+          Show more campaigns
+        </Button>
+      )}
+    </Panel>
+  );
+}
+
+interface Ticks {
+  chosen: readonly number[];
+  onToggle: (trial: number) => void;
+}
+
+function From({ campaignId, ...ticks }: Ticks & { campaignId: number }) {
+  const campaign = useCampaign(campaignId);
+  if (campaign.data === undefined) return <ErrorNotice error={campaign.error} />;
+  const { name, definition, trials } = campaign.data;
+  return (
+    <Campaign
+      id={campaignId}
+      title={name}
+      flights={trials.flown}
+      experiment={definition.experiment ?? "takeoff"}
+      open
+      {...ticks}
+    />
+  );
+}
+
+interface CampaignProps extends Ticks {
+  id: number;
+  title: string;
+  flights: number;
+  experiment: string;
+  open?: boolean;
+}
+
+function Campaign({ id, title, flights, experiment, open = false, chosen, onToggle }: CampaignProps) {
+  const [opened, setOpened] = useState(open);
+  return (
+    <details
+      className={classes["campaign"]}
+      open={opened}
+      onToggle={(event) => setOpened((event.currentTarget as HTMLDetailsElement).open)}
+    >
+      <summary>
+        {title} <small className={classes["dim"]}>{count(flights, "flight")}</small>
+      </summary>
+      {opened && <Flights campaignId={id} {...{ experiment, chosen, onToggle }} />}
+    </details>
+  );
+}
+
+function Flights({ campaignId, experiment, chosen, onToggle }: Ticks & { campaignId: number; experiment: string }) {
+  const trials = useTrials(campaignId);
+  const unit = useUnits(experiment).error;
+  if (trials.data === undefined) return <ErrorNotice error={trials.error} />;
+  return (
+    <ul className={`${classes["flights"]} numbers`}>
+      {trials.data
+        .filter(({ state }) => wasFlown(state))
+        .map(({ id, number, state, error, gains }) => (
+          <li key={id}>
+            <label>
+              <input
+                type="checkbox"
+                checked={chosen.includes(id)}
+                disabled={!chosen.includes(id) && chosen.length >= MOST_FLIGHTS}
+                onChange={() => onToggle(id)}
+              />
+              <span>
+                <strong>Flight {number}</strong>{" "}
+                {error === null ? trialStateLabel(state).word.toLowerCase() : withUnit(error, unit)}{" "}
+                <small className={classes["dim"]}>{gainsInBrackets(gains)}</small>
+              </span>
+            </label>
+          </li>
+        ))}
+    </ul>
+  );
+}

@@ -1,0 +1,52 @@
+import { Button, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { useEditVehicle } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { useVehicleStatus } from "../../live/store";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { withUnit } from "../../ui/format";
+import { LabelledValue } from "../../ui/LabelledValue";
+import { Panel } from "../../ui/Panel";
+import classes from "./Fleet.module.css";
+
+/** Which battery is in, and what it reads. Every flight keeps the label that stood here. */
+export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
+  const status = useVehicleStatus(vehicle.id);
+  const edit = useEditVehicle(vehicle.id);
+  const [typed, setTyped] = useState<string | null>(null);
+  const label = typed ?? vehicle.battery;
+  return (
+    <Panel title="Battery">
+      <div className={classes["stack"]}>
+        <dl className={`${classes["facts"]} numbers`}>
+          <LabelledValue
+            title="Voltage now"
+            value={withUnit(status?.status.batteryV, "V", 1)}
+            stale={!status?.isCurrent}
+          />
+          <LabelledValue title="Flies from" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
+        </dl>
+        <form
+          className={classes["row"]}
+          onSubmit={(event) => {
+            event.preventDefault();
+            edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) });
+          }}
+        >
+          <TextInput
+            label="The battery that is in"
+            placeholder="No. 3"
+            value={label}
+            maxLength={60}
+            disabled={!vehicle.actions.includes("edit")}
+            onChange={(event) => setTyped(event.currentTarget.value)}
+          />
+          <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
+            Keep
+          </Button>
+        </form>
+        <ErrorNotice error={edit.error} />
+      </div>
+    </Panel>
+  );
+}

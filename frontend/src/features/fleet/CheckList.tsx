@@ -1,0 +1,54 @@
+import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
+import type { Vehicle } from "../../api/types";
+import { Time } from "../../ui/Time";
+import classes from "./Fleet.module.css";
+
+/** What the last check found, every item of it. */
+export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicle }) {
+  if (checks === null) {
+    return <p className={classes["quiet"]}>Not checked yet. All of this is looked at again before every flight.</p>;
+  }
+  return (
+    <>
+      <div className={classes["scroll"]}>
+        <table className={classes["table"]}>
+          <thead>
+            <tr>
+              <th scope="col">Item</th>
+              <th scope="col">Result</th>
+              <th scope="col">Found</th>
+            </tr>
+          </thead>
+          <tbody>
+            {checks.map(({ name, title, passed, found, needed, hint }) => (
+              <tr key={name}>
+                <th scope="row">
+                  {title}
+                  {!passed && hint && <small>{hint}</small>}
+                </th>
+                <td>
+                  {passed ? (
+                    <span className={classes["good"]}>
+                      <IconCircleCheck size={18} aria-hidden /> passed
+                    </span>
+                  ) : (
+                    <span className={classes["bad"]}>
+                      <IconAlertTriangle size={18} aria-hidden /> failed
+                    </span>
+                  )}
+                </td>
+                <td>
+                  {found}
+                  <small>needed: {needed}</small>
+                </td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+      <p className={classes["quiet"]}>
+        Checked <Time at={checked_at} />.
+      </p>
+    </>
+  );
+}

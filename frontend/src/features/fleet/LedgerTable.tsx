@@ -1,0 +1,81 @@
+import { Anchor, Button, Skeleton } from "@mantine/core";
+import { Link } from "react-router";
+import { useLedger } from "../../api/fleet";
+import type { GivenGains } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { NOTHING } from "../../ui/format";
+import { gainsInBrackets, sameHeld } from "../../ui/gains";
+import { Panel } from "../../ui/Panel";
+import { addPage } from "../../ui/paging";
+import { Time } from "../../ui/Time";
+import classes from "./Fleet.module.css";
+import { PURPOSES } from "./fleet";
+
+/** Every gain set that the vehicle was given, and what it said it had then. */
+export function LedgerTable({ vehicleId }: { vehicleId: number }) {
+  const ledger = useLedger(vehicleId);
+  const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
+  return (
+    <Panel title="Gains it was given" className={classes["wide"]}>
+      <ErrorNotice error={ledger.error} />
+      {ledger.isPending && <Skeleton height={120} aria-busy="true" />}
+      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>None yet.</p>}
+      {lines.length > 0 && (
+        // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+        <section className={`${classes["scroll"]} sideways`} aria-label="Gains it was given" tabIndex={0}>
+          <table className={classes["table"]}>
+            <thead>
+              <tr>
+                <th scope="col">For</th>
+                <th scope="col">Asked {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
+                <th scope="col">Read back</th>
+                <th scope="col">Outcome</th>
+              </tr>
+            </thead>
+            <tbody>
+              {lines.map((line) => (
+                <Line key={`${line.purpose} ${line.flight_id ?? line.act_id}`} line={line} />
+              ))}
+            </tbody>
+          </table>
+        </section>
+      )}
+      {ledger.hasNextPage && (
+        <Button
+          variant="default"
+          className={classes["more"] ?? ""}
+          loading={ledger.isFetchingNextPage}
+          onClick={() => void addPage(ledger)}
+        >
+          Show more ({lines.length} of {ledger.data?.pages[0]?.total})
+        </Button>
+      )}
+    </Panel>
+  );
+}
+
+function Line({ line }: { line: GivenGains }) {
+  const { campaign_id, trial_id, read_back } = line;
+  const differs = read_back !== null && !sameHeld(read_back, line.asked);
+  return (
+    <tr>
+      <td>
+        {campaign_id !== null && trial_id !== null ? (
+          <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`}>
+            {PURPOSES[line.purpose]}
+          </Anchor>
+        ) : (
+          PURPOSES[line.purpose]
+        )}
+        <small>
+          <Time at={line.asked_at} />
+        </small>
+      </td>
+      <td className="numbers">{gainsInBrackets(line.asked)}</td>
+      <td className={`numbers ${differs ? classes["differs"] : ""}`}>
+        {read_back === null ? NOTHING : gainsInBrackets(read_back)}
+      </td>
+      <td>{line.outcome}</td>
+    </tr>
+  );
+}

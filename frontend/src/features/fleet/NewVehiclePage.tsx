@@ -1,0 +1,189 @@
+import { Accordion, Button, Checkbox, Skeleton, Switch, TextInput } from "@mantine/core";
+import { IconPlus } from "@tabler/icons-react";
+import { useState } from "react";
+import { useNavigate } from "react-router";
+import { useRegisterVehicle } from "../../api/fleet";
+import { problemOf, reasonsByField } from "../../api/problems";
+import { useCatalogue } from "../../api/queries";
+import type { Catalogue } from "../../api/types";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import classes from "../../ui/Form.module.css";
+import { NumberField } from "../../ui/NumberField";
+import { OptionField } from "../../ui/OptionField";
+import { SelectField } from "../../ui/SelectField";
+import { useTitle } from "../../ui/useTitle";
+import { VehicleBadge } from "../../ui/VehicleBadge";
+import {
+  AUTOPILOTS,
+  autopilotOf,
+  furtherOptions,
+  gainsFor,
+  isSimulated,
+  startingVehicle,
+  unreadGains,
+  type VehicleForm,
+  vehicleRequest,
+  withAutopilot,
+} from "./fleet";
+
+export function NewVehiclePage() {
+  useTitle("Register a vehicle");
+  const catalogue = useCatalogue();
+  return (
+    <div className={classes["page"]}>
+      <h1 className={classes["title"]}>Register a vehicle</h1>
+      {catalogue.data && <NewVehicleForm catalogue={catalogue.data} />}
+      {catalogue.error && <ErrorNotice error={catalogue.error} />}
+      {catalogue.isPending && <Skeleton height={420} radius="md" />}
+    </div>
+  );
+}
+
+function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
+  const [form, setForm] = useState<VehicleForm>(() => startingVehicle(catalogue));
+  const navigate = useNavigate();
+  const register = useRegisterVehicle();
+  const set = (change: Partial<VehicleForm>): void => setForm({ ...form, ...change });
+  const setOption = (name: string, value: boolean | number | string): void =>
+    set({ options: { ...form.options, [name]: value } });
+  const further = furtherOptions(catalogue);
+  const gains = gainsFor(catalogue, autopilotOf(form));
+  const folded = further.map(({ name }) => `options.${name}`);
+  const fields = [
+    "name",
+    "options.autopilot",
+    "options.address",
+    "options.simulated",
+    "safe_gains_confirmed",
+    "statement",
+    ...gains.map(({ name }) => `safe_gains.${name}`),
+    ...folded,
+  ];
+  const reasons = reasonsByField(problemOf(register.error), fields);
+  const refusedBelow = folded.some((field) => reasons[field] !== undefined);
+  const [opened, setOpened] = useState<string | null>(null);
+  const unread = unreadGains(form);
+  const simulated = isSimulated(form);
+  return (
+    <form
+      noValidate
+      className={classes["form"]}
+      onSubmit={(event) => {
+        event.preventDefault();
+        register.mutate(vehicleRequest(form), { onSuccess: ({ id }) => void navigate(`/vehicles/${id}`) });
+      }}
+    >
+      <TextInput
+        label="Name"
+        description="As it stands on every page, for instance the number on its hull"
+        value={form.name}
+        maxLength={120}
+        error={reasons["name"]}
+        onChange={(event) => set({ name: event.currentTarget.value })}
+      />
+      <div className={classes["pair"]}>
+        <SelectField
+          label="Autopilot"
+          data={AUTOPILOTS}
+          value={autopilotOf(form)}
+          error={reasons["options.autopilot"]}
+          onChange={(value) => setForm(withAutopilot(form, catalogue, value))}
+        />
+        <TextInput
+          label="Address"
+          description="udp:HOST:PORT@LOCALPORT, udpin:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD"
+          inputWrapperOrder={["label", "input", "description", "error"]}
+          value={String(form.options["address"] ?? "")}
+          error={reasons["options.address"]}
+          autoCapitalize="off"
+          spellCheck={false}
+          onChange={(event) => setOption("address", event.currentTarget.value)}
+        />
+      </div>
+      <div className={classes["kind"]} data-real={!simulated || undefined}>
+        <VehicleBadge isReal={!simulated} />
+        <p>
+          {simulated
+            ? "A simulation on this computer: flights start at one click and are judged by the program."
+            : "A real vehicle: it flies only while somebody in control holds the button, and every flight is judged by a person."}
+        </p>
+        <Switch
+          size="md"
+          label="It is a simulation on this computer"
+          checked={simulated}
+          error={reasons["options.simulated"]}
+          onChange={(event) => setOption("simulated", event.currentTarget.checked)}
+        />
+      </div>
+      <fieldset className={classes["gains"]}>
+        <legend>Safe gains: what every flight ends with</legend>
+        {gains.map((gain) => (
+          <NumberField
+            key={gain.name}
+            required
+            withAsterisk={false}
+            label={gain.name}
+            description={`${gain.lower} … ${gain.upper} ${gain.unit}`}
+            value={form.safeGains[gain.name] ?? ""}
+            error={reasons[`safe_gains.${gain.name}`]}
+            onChange={(value) => set({ safeGains: { ...form.safeGains, [gain.name]: value }, confirmed: false })}
+          />
+        ))}
+      </fieldset>
+      {!simulated && (
+        <div className={classes["confirm"]}>
+          <Checkbox
+            size="md"
+            label="These gains fly this vehicle well: somebody has looked."
+            checked={form.confirmed}
+            error={reasons["safe_gains_confirmed"]}
+            onChange={(event) => set({ confirmed: event.currentTarget.checked })}
+          />
+          <TextInput
+            label="Who has looked, and at what"
+            placeholder="A. Pilot: flown by hand this morning"
+            value={form.statement}
+            maxLength={500}
+            error={reasons["statement"]}
+            onChange={(event) => set({ statement: event.currentTarget.value })}
+          />
+        </div>
+      )}
+      <Accordion
+        variant="contained"
+        chevronPosition="left"
+        value={refusedBelow ? "further" : opened}
+        onChange={setOpened}
+      >
+        <Accordion.Item value="further">
+          <Accordion.Control mih={56}>Further settings: identity, limits, motion capture, signing</Accordion.Control>
+          <Accordion.Panel>
+            <div className={classes["pair"]}>
+              {further.map((option) => (
+                <OptionField
+                  key={option.name}
+                  option={option}
+                  value={form.options[option.name]}
+                  error={reasons[`options.${option.name}`]}
+                  onChange={(value) => setOption(option.name, value)}
+                />
+              ))}
+            </div>
+          </Accordion.Panel>
+        </Accordion.Item>
+      </Accordion>
+      <ErrorNotice error={register.error} shown={fields} />
+      {unread.length > 0 && <p role="status">Not a number yet: {unread.join(", ")}.</p>}
+      <Button
+        type="submit"
+        size="lg"
+        disabled={unread.length > 0}
+        loading={register.isPending}
+        leftSection={<IconPlus size={22} aria-hidden />}
+        className={classes["submit"]}
+      >
+        Register
+      </Button>
+    </form>
+  );
+}

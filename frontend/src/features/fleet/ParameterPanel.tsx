@@ -1,0 +1,71 @@
+import { Button, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { useActs } from "../../api/fleet";
+import { gainText } from "../../ui/format";
+import { Panel } from "../../ui/Panel";
+import { Time } from "../../ui/Time";
+import classes from "./Fleet.module.css";
+import { parametersOf } from "./fleet";
+
+interface Props {
+  vehicleId: number;
+  mayRead: boolean;
+  reading: boolean;
+  onRead: () => void;
+}
+
+/** Every parameter of the vehicle, as last read. */
+export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
+  const [wanted, setWanted] = useState("");
+  const acts = useActs(vehicleId).data?.pages.flatMap((page) => page.items) ?? [];
+  const latest = acts.find(({ kind }) => kind === "parameters");
+  const read = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
+  const underWay = latest?.state === "requested" || latest?.state === "running";
+  const parameters = parametersOf(read?.result ?? null);
+  const found = parameters.filter(([name]) => name.toLowerCase().includes(wanted.trim().toLowerCase()));
+  return (
+    <Panel
+      title="Parameters"
+      className={classes["wide"]}
+      tools={
+        <Button variant="default" disabled={!mayRead || underWay} loading={reading || underWay} onClick={onRead}>
+          Read all
+        </Button>
+      }
+    >
+      <div className={classes["stack"]}>
+        {parameters.length === 0 ? (
+          <p className={classes["quiet"]}>
+            {latest?.state === "failed" ? latest.problem : "Not read yet. Reading all of them takes some seconds."}
+          </p>
+        ) : (
+          <>
+            <TextInput
+              label={`Find one of ${parameters.length}`}
+              value={wanted}
+              onChange={(event) => setWanted(event.currentTarget.value)}
+            />
+            {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
+            <section className={classes["parameters"]} aria-label="Parameters" tabIndex={0}>
+              <table className={classes["table"]}>
+                <tbody>
+                  {found.map(([name, value]) => (
+                    <tr key={name}>
+                      <th scope="row">{name}</th>
+                      <td data-number title={String(value)}>
+                        {gainText(value)}
+                      </td>
+                    </tr>
+                  ))}
+                </tbody>
+              </table>
+            </section>
+            <p className={classes["quiet"]}>
+              Read <Time at={read?.finished_at} />.
+            </p>
+          </>
+        )}
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,60 @@
+import { Button, Skeleton } from "@mantine/core";
+import { useActs } from "../../api/fleet";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Panel } from "../../ui/Panel";
+import { addPage } from "../../ui/paging";
+import { Time } from "../../ui/Time";
+import classes from "./Fleet.module.css";
+import { ACTS } from "./fleet";
+
+/** What the vehicle was asked beside its flights, by whom, and what came of it. */
+export function RequestList({ vehicleId }: { vehicleId: number }) {
+  const acts = useActs(vehicleId);
+  const items = acts.data?.pages.flatMap((page) => page.items) ?? [];
+  return (
+    <Panel title="What it was asked" className={classes["wide"]}>
+      <ErrorNotice error={acts.error} />
+      {acts.isPending && <Skeleton height={120} aria-busy="true" />}
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
+      <section className={`${classes["scroll"]} sideways`} aria-label="What it was asked" tabIndex={0}>
+        <table className={classes["table"]}>
+          <thead>
+            <tr>
+              <th scope="col">What</th>
+              <th scope="col">When</th>
+              <th scope="col">Outcome</th>
+            </tr>
+          </thead>
+          <tbody>
+            {items.map((act) => (
+              <tr key={act.id}>
+                <td>
+                  {ACTS[act.kind]}
+                  {act.reason && <small>{act.reason}</small>}
+                </td>
+                <td>
+                  <Time at={act.requested_at} />
+                  {act.by && <small>by {act.by}</small>}
+                </td>
+                <td>
+                  {act.state}
+                  {act.problem && <small>{act.problem}</small>}
+                </td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+      {acts.hasNextPage && (
+        <Button
+          variant="default"
+          className={classes["more"] ?? ""}
+          loading={acts.isFetchingNextPage}
+          onClick={() => void addPage(acts)}
+        >
+          Show more ({items.length} of {acts.data?.pages[0]?.total})
+        </Button>
+      )}
+    </Panel>
+  );
+}

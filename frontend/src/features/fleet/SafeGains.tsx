@@ -1,0 +1,167 @@
+import { Button, TextInput } from "@mantine/core";
+import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
+import { useState } from "react";
+import { useEditVehicle } from "../../api/fleet";
+import { problemOf, reasonsByField } from "../../api/problems";
+import type { Vehicle } from "../../api/types";
+import { useVehicleStatus } from "../../live/store";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { gainText, NOTHING } from "../../ui/format";
+import { inOrder, sameHeld } from "../../ui/gains";
+import { HelpTip } from "../../ui/HelpTip";
+import { type NumberEntry, NumberField } from "../../ui/NumberField";
+import { Panel } from "../../ui/Panel";
+import { Time } from "../../ui/Time";
+import classes from "./Fleet.module.css";
+
+interface Props {
+  vehicle: Vehicle;
+  restoring: boolean;
+  onRestore: () => void;
+}
+
+/** What the vehicle holds beside what is safe. */
+export function SafeGains({ vehicle, restoring, onRestore }: Props) {
+  const [entered, setEntered] = useState<Record<string, number>>();
+  const status = useVehicleStatus(vehicle.id);
+  const { safe_gains: safe } = vehicle;
+  const live = status?.status.held ?? {};
+  const held = inOrder(Object.keys(live).length > 0 ? live : (vehicle.held ?? {}), Object.keys(safe));
+  const isCurrent = status?.isCurrent ?? false;
+  const isKnown = Object.keys(held).length > 0;
+  if (entered) return <SafeGainsForm vehicle={vehicle} entered={entered} onDone={() => setEntered(undefined)} />;
+  return (
+    <Panel title="Gains">
+      <div className={classes["stack"]}>
+        <table className={classes["table"]}>
+          <thead>
+            <tr>
+              <th scope="col">Gain</th>
+              <th scope="col" data-number>
+                Holds
+              </th>
+              <th scope="col" data-number>
+                Safe <HelpTip topic="safeGains" />
+              </th>
+            </tr>
+          </thead>
+          <tbody className="numbers">
+            {Object.entries(safe).map(([name, value]) => (
+              <tr key={name}>
+                <th scope="row">{name}</th>
+                <td data-number>{held[name] === undefined ? NOTHING : gainText(held[name])}</td>
+                <td data-number>{gainText(value)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+        {isKnown && sameHeld(held, safe) && (
+          <span className={classes["good"]}>
+            <IconCircleCheck size={18} aria-hidden />{" "}
+            {isCurrent ? "It holds its safe gains" : "When last read, it held its safe gains"}
+          </span>
+        )}
+        {isKnown && !sameHeld(held, safe) && (
+          <span className={classes["bad"]}>
+            <IconAlertTriangle size={18} aria-hidden />{" "}
+            {isCurrent
+              ? "It holds other gains than the safe ones"
+              : "When last read, it held other gains than the safe ones"}
+          </span>
+        )}
+        <p className={classes["quiet"]}>
+          {isKnown ? (
+            <>
+              Read back <Time at={vehicle.held_at} />.
+            </>
+          ) : (
+            "Nobody has read its gains yet."
+          )}{" "}
+          Every flight ends with the safe gains.
+        </p>
+        <div className={classes["buttons"]}>
+          <Button
+            variant="default"
+            disabled={!vehicle.actions.includes("restore")}
+            loading={restoring}
+            onClick={onRestore}
+          >
+            Restore safe gains
+          </Button>
+          {isKnown && !sameHeld(held, safe) && (
+            <Button variant="default" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(held)}>
+              Make what it holds its safe gains
+            </Button>
+          )}
+          <Button variant="subtle" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(safe)}>
+            Change the safe gains
+          </Button>
+        </div>
+      </div>
+    </Panel>
+  );
+}
+
+interface FormProps {
+  vehicle: Vehicle;
+  /** What the fields hold at first. */
+  entered: Record<string, number>;
+  onDone: () => void;
+}
+
+function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
+  const [gains, setGains] = useState<Record<string, NumberEntry>>({ ...vehicle.safe_gains, ...entered });
+  const [statement, setStatement] = useState("");
+  const edit = useEditVehicle(vehicle.id);
+  const fields = ["statement", ...Object.keys(gains).map((name) => `safe_gains.${name}`)];
+  const reasons = reasonsByField(problemOf(edit.error), fields);
+  const read = Object.entries(gains).filter((entry): entry is [string, number] => typeof entry[1] === "number");
+  return (
+    <Panel title="Change the safe gains">
+      <form
+        className={classes["stack"]}
+        onSubmit={(event) => {
+          event.preventDefault();
+          edit.mutate(
+            { version: vehicle.version, safe_gains: Object.fromEntries(read), statement: statement.trim() || null },
+            { onSuccess: onDone },
+          );
+        }}
+      >
+        <div className={classes["entries"]}>
+          {Object.keys(vehicle.safe_gains).map((name) => (
+            <NumberField
+              key={name}
+              required
+              withAsterisk={false}
+              label={name}
+              value={gains[name] ?? ""}
+              error={reasons[`safe_gains.${name}`]}
+              onChange={(value) => setGains({ ...gains, [name]: value })}
+            />
+          ))}
+        </div>
+        <TextInput
+          label="Who decided that, and from which flights"
+          value={statement}
+          maxLength={500}
+          error={reasons["statement"]}
+          onChange={(event) => setStatement(event.currentTarget.value)}
+        />
+        <ErrorNotice error={edit.error} shown={fields} />
+        <div className={classes["buttons"]}>
+          <Button
+            type="submit"
+            disabled={read.length < Object.keys(gains).length || statement.trim() === ""}
+            loading={edit.isPending}
+          >
+            These are the safe gains
+          </Button>
+          <Button variant="default" onClick={onDone}>
+            Leave them
+          </Button>
+        </div>
+      </form>
+    </Panel>
+  );
+}

@@ -1,0 +1,71 @@
+import { Anchor, Button } from "@mantine/core";
+import { IconPlugConnected } from "@tabler/icons-react";
+import { Link } from "react-router";
+import { useVehicleRequest } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { useVehicleStatus } from "../../live/store";
+import { linkText } from "../../live/vehicleStatus";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { withUnit } from "../../ui/format";
+import { gainsInBrackets } from "../../ui/gains";
+import { StateBadge } from "../../ui/StateBadge";
+import { VehicleBadge } from "../../ui/VehicleBadge";
+import { vehicleStateLabel } from "./fleet";
+import classes from "./VehicleCard.module.css";
+
+/** One vehicle in the list: how it is, what it holds, and the next thing to do with it. */
+export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
+  const status = useVehicleStatus(vehicle.registered ? vehicle.id : null);
+  const ask = useVehicleRequest(vehicle.id);
+  const held = Object.keys(vehicle.held ?? {}).length > 0 ? gainsInBrackets(vehicle.held ?? {}) : "";
+  const isLinked = vehicle.registered && vehicle.state !== "disconnected";
+  return (
+    <li className={classes["card"]} data-state={vehicle.state}>
+      <div className={classes["what"]}>
+        <h3 className={classes["name"]}>
+          <VehicleBadge isReal={vehicle.is_real} />
+          <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
+            {vehicle.name}
+          </Anchor>
+          <StateBadge words={vehicleStateLabel(vehicle)} />
+        </h3>
+        <dl className={`${classes["facts"]} numbers`}>
+          {isLinked && <Fact title="Link" value={linkText(status)} />}
+          {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
+          {held !== "" && <Fact title="Holds" value={held} />}
+          <Fact
+            title={`Safe ${Object.keys(vehicle.safe_gains).join(", ")}`}
+            value={gainsInBrackets(vehicle.safe_gains)}
+          />
+          {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "nobody"} />}
+        </dl>
+        {vehicle.state === "quarantined" && <p className={classes["concern"]}>{vehicle.concern}</p>}
+        <ErrorNotice error={ask.error} />
+      </div>
+      {vehicle.registered && vehicle.actions.includes("connect") && (
+        <Button
+          variant="default"
+          leftSection={<IconPlugConnected size={20} aria-hidden />}
+          loading={ask.isPending}
+          onClick={() => ask.mutate("connect")}
+        >
+          Connect
+        </Button>
+      )}
+      {vehicle.state === "quarantined" && (
+        <Button component={Link} to={`/vehicles/${vehicle.id}`} color="red" variant="outline">
+          Look at it
+        </Button>
+      )}
+    </li>
+  );
+}
+
+function Fact({ title, value }: { title: string; value: string }) {
+  return (
+    <div>
+      <dt>{title}</dt>
+      <dd>{value}</dd>
+    </div>
+  );
+}

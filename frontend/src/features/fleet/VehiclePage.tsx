@@ -1,0 +1,149 @@
+import { Anchor, Button, Skeleton } from "@mantine/core";
+import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
+import { Link, useParams } from "react-router";
+import { useReadOnlyReason } from "../../api/access";
+import { useVehicleRequest, type VehicleRequest } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { useVehicles } from "../../api/vehicles";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { NotFoundPage } from "../../ui/NotFoundPage";
+import { Panel } from "../../ui/Panel";
+import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
+import { StateBadge } from "../../ui/StateBadge";
+import { useTitle } from "../../ui/useTitle";
+import { VehicleBadge } from "../../ui/VehicleBadge";
+import { BatteryPanel } from "./BatteryPanel";
+import { CalibrationHistory } from "./CalibrationHistory";
+import { CheckList } from "./CheckList";
+import { vehicleStateLabel } from "./fleet";
+import { LedgerTable } from "./LedgerTable";
+import { LinkPanel } from "./LinkPanel";
+import { OperatorControl } from "./OperatorControl";
+import { ParameterPanel } from "./ParameterPanel";
+import { QuarantinePanel } from "./QuarantinePanel";
+import { RequestList } from "./RequestList";
+import { SafeGains } from "./SafeGains";
+import classes from "./VehiclePage.module.css";
+
+export function VehiclePage() {
+  const vehicleId = Number(useParams()["vehicleId"]);
+  const vehicles = useVehicles();
+  const vehicle = vehicles.data?.find(({ id }) => id === vehicleId);
+  useTitle(vehicle?.name ?? "Vehicle");
+  if (vehicle?.registered === false) return <SharedView vehicle={vehicle} />;
+  if (vehicle !== undefined) return <VehicleView key={vehicle.id} vehicle={vehicle} />;
+  if (vehicles.error) return <ErrorNotice error={vehicles.error} />;
+  return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;
+}
+
+/** A simulation that campaigns share: it has no link of its own, and what its flights tell of it all the same. */
+function SharedView({ vehicle }: { vehicle: Vehicle }) {
+  return (
+    <>
+      <div className={classes["head"]}>
+        <Anchor component={Link} to="/vehicles" className={classes["back"]}>
+          <IconChevronLeft size={20} aria-hidden />
+          Vehicles
+        </Anchor>
+        <h1 className={classes["title"]}>{vehicle.name}</h1>
+        <VehicleBadge isReal={vehicle.is_real} />
+        <StateBadge words={vehicleStateLabel(vehicle)} />
+      </div>
+      {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
+      <div className={classes["grid"]}>
+        <CalibrationHistory vehicleId={vehicle.id} />
+        <LedgerTable vehicleId={vehicle.id} />
+      </div>
+    </>
+  );
+}
+
+/** One registered vehicle: its link, what it holds, what it was given and asked, and who is in control. */
+function VehicleView({ vehicle }: { vehicle: Vehicle }) {
+  const ask = useVehicleRequest(vehicle.id);
+  const watching = useReadOnlyReason(vehicle);
+  const may = (act: VehicleRequest): boolean => watching === null && vehicle.actions.includes(act);
+  const asking = ask.isPending ? ask.variables : null;
+  return (
+    <>
+      <div className={classes["head"]}>
+        <Anchor component={Link} to="/vehicles" className={classes["back"]}>
+          <IconChevronLeft size={20} aria-hidden />
+          Vehicles
+        </Anchor>
+        <h1 className={classes["title"]}>{vehicle.name}</h1>
+        <VehicleBadge isReal={vehicle.is_real} />
+        <StateBadge words={vehicleStateLabel(vehicle)} />
+        <div className={classes["acts"]}>
+          <Button
+            component={Link}
+            to={`/new?vehicle=${vehicle.id}`}
+            variant="default"
+            leftSection={<IconPlus size={20} aria-hidden />}
+          >
+            New campaign
+          </Button>
+          {may("connect") && (
+            <Button
+              leftSection={<IconPlugConnected size={20} aria-hidden />}
+              loading={asking === "connect"}
+              onClick={() => ask.mutate("connect")}
+            >
+              Connect
+            </Button>
+          )}
+          {may("disconnect") && (
+            <Button
+              variant="default"
+              leftSection={<IconPlugConnectedX size={20} aria-hidden />}
+              loading={asking === "disconnect"}
+              onClick={() => ask.mutate("disconnect")}
+            >
+              {vehicle.state === "disconnected" ? "Stop looking for it" : "Disconnect"}
+            </Button>
+          )}
+        </div>
+      </div>
+      <ReadOnlyNotice why={watching} />
+      <ErrorNotice error={ask.error} />
+      {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
+      <div className={classes["grid"]}>
+        <LinkPanel vehicle={vehicle} />
+        <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
+        <Panel title="In control">
+          {watching === null ? (
+            <OperatorControl vehicle={vehicle} />
+          ) : (
+            <p>{vehicle.control?.operator ?? "Nobody"} is in control.</p>
+          )}
+        </Panel>
+        <BatteryPanel vehicle={vehicle} />
+        <Panel
+          title="Preflight check"
+          className={classes["wide"]}
+          tools={
+            <Button
+              variant="default"
+              disabled={!may("check")}
+              loading={asking === "check"}
+              onClick={() => ask.mutate("check")}
+            >
+              Check now
+            </Button>
+          }
+        >
+          <CheckList vehicle={vehicle} />
+        </Panel>
+        <CalibrationHistory vehicleId={vehicle.id} />
+        <LedgerTable vehicleId={vehicle.id} />
+        <RequestList vehicleId={vehicle.id} />
+        <ParameterPanel
+          vehicleId={vehicle.id}
+          mayRead={may("parameters")}
+          reading={asking === "parameters"}
+          onRead={() => ask.mutate("parameters")}
+        />
+      </div>
+    </>
+  );
+}

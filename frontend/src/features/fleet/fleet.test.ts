@@ -1,0 +1,86 @@
+import { expect, test } from "vitest";
+import type { Catalogue, Vehicle } from "../../api/types";
+import {
+  furtherOptions,
+  gainsFor,
+  parametersOf,
+  startingVehicle,
+  unreadGains,
+  vehicleRequest,
+  vehicleStateLabel,
+  withAutopilot,
+} from "./fleet";
+
+const catalogue = {
+  experiments: [
+    {
+      name: "takeoff",
+      gains: [
+        { name: "kp", default: 283 },
+        { name: "ki", default: 13 },
+        { name: "kd", default: 82 },
+      ],
+    },
+    { name: "takeoff-px4", gains: [{ name: "MPC_Z_P", default: 1 }] },
+  ],
+  vehicle_kinds: [
+    {
+      name: "mavlink",
+      options: [{ name: "autopilot" }, { name: "address" }, { name: "simulated" }, { name: "min_battery_v" }],
+    },
+  ],
+} as unknown as Catalogue;
+
+test("another autopilot brings its own gains and usual address, and nobody has looked at them yet", () => {
+  const form = withAutopilot({ ...startingVehicle(catalogue), confirmed: true }, catalogue, "px4");
+  expect(form.options).toEqual({ autopilot: "px4", address: "udpin:127.0.0.1:14550", simulated: false });
+  expect(form.safeGains).toEqual({ MPC_Z_P: 1 });
+  expect(form.confirmed).toBe(false);
+  expect(gainsFor(catalogue, "px4").map(({ name }) => name)).toEqual(["MPC_Z_P"]);
+});
+
+test("an address that somebody has typed stays with another autopilot", () => {
+  const start = startingVehicle(catalogue);
+  const typed = { ...start, options: { ...start.options, address: "serial:/dev/ttyUSB0:57600" } };
+  expect(withAutopilot(typed, catalogue, "px4").options["address"]).toBe("serial:/dev/ttyUSB0:57600");
+});
+
+test("the request has the numbers as they are, and names without the spaces around them", () => {
+  const start = startingVehicle(catalogue);
+  const form = { ...start, name: " Bee ", confirmed: true, statement: " Ada has looked " };
+  expect(vehicleRequest({ ...form, options: { ...form.options, min_battery_v: 11 } })).toEqual({
+    name: "Bee",
+    kind: "mavlink",
+    options: { autopilot: "paparazzi", address: "udp:192.168.1.1:4245@4244", simulated: false, min_battery_v: 11 },
+    safe_gains: { kp: 283, ki: 13, kd: 82 },
+    safe_gains_confirmed: true,
+    statement: "Ada has looked",
+  });
+});
+
+test("a gain that is no number yet is named, and not sent", () => {
+  const start = startingVehicle(catalogue);
+  const form = { ...start, safeGains: { ...start.safeGains, ki: "1e" } };
+  expect(unreadGains(form)).toEqual(["ki"]);
+  expect(vehicleRequest(form).safe_gains).toEqual({ kp: 283, kd: 82 });
+});
+
+test("only what has no place of its own is folded away", () => {
+  expect(furtherOptions(catalogue).map(({ name }) => name)).toEqual(["min_battery_v"]);
+});
+
+test("parameters are read out of an act's result by their names in order, and there are none before it has one", () => {
+  expect(parametersOf({ parameters: { WPNAV_SPEED: 5, ANGLE_MAX: 30, note: "text" } })).toEqual([
+    ["ANGLE_MAX", 30],
+    ["WPNAV_SPEED", 5],
+  ]);
+  expect(parametersOf(null)).toEqual([]);
+});
+
+test("a registered vehicle without a link is not connected; what is flown elsewhere never is", () => {
+  const words = (seen: Partial<Vehicle>): string => vehicleStateLabel(seen as Vehicle).word;
+  expect(words({ state: "disconnected", registered: true })).toBe("Not connected");
+  expect(words({ state: "disconnected", registered: false })).toBe("Flown elsewhere");
+  expect(words({ state: "ready", registered: false })).toBe("Ready");
+  expect(words({ state: "quarantined", registered: true })).toBe("Quarantined");
+});

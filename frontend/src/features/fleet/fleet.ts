@@ -1,0 +1,143 @@
+/** What is said of vehicles, of what they are asked, and of the gains that they were given. */
+
+import type { ActKind, Catalogue, GivenGains, NewVehicle, OptionInfo, Vehicle, VehicleState } from "../../api/types";
+import type { NumberEntry } from "../../ui/NumberField";
+import type { OptionValue } from "../../ui/OptionField";
+import type { StateLabel } from "../../ui/states";
+
+const STATES: Record<VehicleState, StateLabel> = {
+  disconnected: { word: "Not connected", tone: "quiet" },
+  ready: { word: "Ready", tone: "good" },
+  staged: { word: "Gains set", tone: "busy" },
+  flying: { word: "Flying", tone: "busy" },
+  quarantined: { word: "Quarantined", tone: "bad" },
+};
+
+/** A shared simulation is never connected: it is there when a flight begins. */
+export function vehicleStateLabel({ state, registered }: Vehicle): StateLabel {
+  return !registered && state === "disconnected" ? { word: "Flown elsewhere", tone: "quiet" } : STATES[state];
+}
+
+export const ACTS: Record<ActKind, string> = {
+  connect: "Connect",
+  disconnect: "Disconnect",
+  check: "Preflight check",
+  restore: "Restore safe gains",
+  parameters: "Read parameters",
+  release: "Release from quarantine",
+  land: "Land",
+  "motors off": "Motors off",
+  "safe gains": "Safe gains set",
+  control: "Control taken over",
+};
+
+export const PURPOSES: Record<GivenGains["purpose"], string> = {
+  flight: "Flight",
+  "restore after flight": "Safe gains after the flight",
+  connect: "Safe gains at the connection",
+  restore: "Safe gains restored",
+  release: "Safe gains at the release",
+};
+
+/** What each autopilot is reached at, usually. */
+export const ADDRESSES: Readonly<Record<string, string>> = {
+  paparazzi: "udp:192.168.1.1:4245@4244",
+  ardupilot: "udpin:127.0.0.1:14550",
+  px4: "udpin:127.0.0.1:14550",
+};
+
+export const AUTOPILOTS = [
+  { value: "paparazzi", label: "Paparazzi (AR.Drone 2)" },
+  { value: "ardupilot", label: "ArduCopter" },
+  { value: "px4", label: "PX4" },
+] as const;
+
+export function autopilotTitle({ options }: Pick<Vehicle, "options">): string {
+  return AUTOPILOTS.find(({ value }) => value === options["autopilot"])?.label ?? "";
+}
+
+const KIND = "mavlink";
+/** Options with a place of their own in the form. */
+const PLAIN: ReadonlySet<string> = new Set(["autopilot", "address", "simulated"]);
+
+export interface VehicleForm {
+  name: string;
+  options: Record<string, OptionValue>;
+  safeGains: Record<string, NumberEntry>;
+  confirmed: boolean;
+  statement: string;
+}
+
+export function autopilotOf(form: VehicleForm): string {
+  return String(form.options["autopilot"] ?? "paparazzi");
+}
+
+/** The gains of the takeoff as this autopilot flies it. */
+export function gainsFor(catalogue: Catalogue, autopilot: string) {
+  const name = autopilot === "paparazzi" ? "takeoff" : `takeoff-${autopilot}`;
+  return catalogue.experiments.find((experiment) => experiment.name === name)?.gains ?? [];
+}
+
+function defaultGains(catalogue: Catalogue, autopilot: string): Record<string, NumberEntry> {
+  return Object.fromEntries(gainsFor(catalogue, autopilot).map((gain) => [gain.name, gain.default]));
+}
+
+export function startingVehicle(catalogue: Catalogue): VehicleForm {
+  return {
+    name: "",
+    options: { autopilot: "paparazzi", address: ADDRESSES["paparazzi"] ?? "", simulated: false },
+    safeGains: defaultGains(catalogue, "paparazzi"),
+    confirmed: false,
+    statement: "",
+  };
+}
+
+/** Another autopilot has other gains; an address that nobody has changed follows it. */
+export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot: string): VehicleForm {
+  const isUsual = Object.values(ADDRESSES).includes(String(form.options["address"]));
+  const address = isUsual ? (ADDRESSES[autopilot] ?? "") : (form.options["address"] ?? "");
+  return {
+    ...form,
+    options: { ...form.options, autopilot, address },
+    safeGains: defaultGains(catalogue, autopilot),
+    confirmed: false,
+  };
+}
+
+/** The settings that are folded away. */
+export function furtherOptions(catalogue: Catalogue): OptionInfo[] {
+  const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
+  return options.filter(({ name }) => !PLAIN.has(name));
+}
+
+export function isSimulated(form: VehicleForm): boolean {
+  return form.options["simulated"] === true;
+}
+
+/** Safe gains that are not numbers yet, by their names. */
+export function unreadGains({ safeGains }: VehicleForm): string[] {
+  return Object.entries(safeGains).flatMap(([name, entry]) => (typeof entry === "number" ? [] : [name]));
+}
+
+export function vehicleRequest(form: VehicleForm): NewVehicle {
+  const gains = Object.entries(form.safeGains).flatMap(([name, entry]) =>
+    typeof entry === "number" ? [[name, entry]] : [],
+  );
+  return {
+    name: form.name.trim(),
+    kind: KIND,
+    options: form.options,
+    safe_gains: Object.fromEntries(gains) as Record<string, number>,
+    safe_gains_confirmed: form.confirmed,
+    statement: form.statement.trim(),
+  };
+}
+
+/** The parameters in an act's result, by their names. */
+export function parametersOf(result: Readonly<Record<string, unknown>> | null): [string, number][] {
+  const held = result?.["parameters"] ?? result;
+  if (typeof held !== "object" || held === null) return [];
+  return Object.entries(held)
+    .filter((entry): entry is [string, number] => typeof entry[1] === "number")
+    .sort(([one], [other]) => one.localeCompare(other));
+}

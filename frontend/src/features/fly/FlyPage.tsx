@@ -1,0 +1,142 @@
+import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { IconChevronLeft } from "@tabler/icons-react";
+import { useCallback, useMemo } from "react";
+import { Link, useOutletContext, useParams } from "react-router";
+import { useReadOnlyReason } from "../../api/access";
+import { useCampaign, useCampaignFigure, useTrial } from "../../api/queries";
+import type { Campaign, Trial, Vehicle } from "../../api/types";
+import { useVehicleCommands } from "../../api/vehicleCommands";
+import { useVehicle } from "../../api/vehicles";
+import { Chart } from "../../charts/Chart";
+import { type PlotlyFigure, withChosen } from "../../charts/traces";
+import type { AbortControl } from "../../live/flights";
+import { useLiveFlight, useVehicleStatus } from "../../live/store";
+import { NotFound } from "../../ui/NotFound";
+import { NotFoundPage } from "../../ui/NotFoundPage";
+import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
+import { useTitle } from "../../ui/useTitle";
+import { useGainTitles, useUnits } from "../../ui/useUnits";
+import { VehicleBadge } from "../../ui/VehicleBadge";
+import { MotorsOff } from "../fleet/MotorsOff";
+import classes from "./Fly.module.css";
+import { endOfTime, type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
+import { HeldGains } from "./HeldGains";
+import { Quarantine } from "./Quarantine";
+import { Readouts } from "./Readouts";
+import { LinkedSteps, PlainSteps } from "./Steps";
+
+export function FlyPage() {
+  const trialId = Number(useParams()["trialId"]);
+  return Number.isInteger(trialId) ? <FlyByTrial key={trialId} trialId={trialId} /> : <NotFoundPage />;
+}
+
+function FlyByTrial({ trialId }: { trialId: number }) {
+  const trial = useTrial(trialId);
+  useTitle(trial.data ? `Fly ${trial.data.number}` : "Fly");
+  if (trial.data) return <FlyOfCampaign trial={trial.data} />;
+  return trial.error ? <NotFound error={trial.error} /> : <Skeleton height={480} radius="md" />;
+}
+
+function FlyOfCampaign({ trial }: { trial: Trial }) {
+  const campaign = useCampaign(trial.campaign_id);
+  const vehicle = useVehicle(campaign.data?.vehicle.registered ? campaign.data.vehicle.id : null);
+  if (campaign.error) return <NotFound error={campaign.error} />;
+  if (campaign.data === undefined) return <Skeleton height={480} radius="md" />;
+  if (!campaign.data.vehicle.registered) return <Screen campaign={campaign.data} trial={trial} vehicle={null} />;
+  if (vehicle === null) return <Skeleton height={480} radius="md" />;
+  return <Screen campaign={campaign.data} trial={trial} vehicle={vehicle} />;
+}
+
+interface Props {
+  campaign: Campaign;
+  trial: Trial;
+  vehicle: Vehicle | null;
+}
+
+/** The steps at which a quarantine, or a browser that may only watch, leaves nothing else to do. */
+const BARRED: ReadonlySet<FlyStep> = new Set<FlyStep>(["plan", "staging", "staged", "unstaging"]);
+
+/** Everything that one looks at and touches while a flight is staged, flown and judged. */
+function Screen({ campaign, trial, vehicle }: Props) {
+  const abort = useOutletContext<AbortControl>();
+  const live = useLiveFlight(trial.id);
+  const status = useVehicleStatus(vehicle?.id ?? null);
+  const orders = useVehicleCommands(vehicle?.id ?? 0);
+  const experiment = campaign.definition.experiment ?? "takeoff";
+  const unit = useUnits(experiment).error;
+  const titles = useGainTitles(experiment);
+  const { figure, summary } = useTakeoffs(campaign, trial);
+  const step = flyStep(trial, live?.phase ?? null);
+  const concern = status?.status.concern || vehicle?.concern || "";
+  const quarantined = vehicle !== null && (vehicle.state === "quarantined" || (status?.status.concern ?? "") !== "");
+  const { word, tone } = flyStateLabel(trial, step, status, quarantined);
+  const isFlying = step === "flying";
+  const watching = useReadOnlyReason(vehicle);
+  const barred = BARRED.has(step) && (quarantined || watching !== null);
+  const steps = { campaign, trial, step, abort };
+  return (
+    <div className={classes["screen"]} data-step={step}>
+      <div className={classes["head"]}>
+        <Anchor component={Link} to={`/campaigns/${campaign.id}`} className={classes["back"]}>
+          <IconChevronLeft size={20} aria-hidden />
+          <span>
+            {campaign.name} · flight {trial.number}
+          </span>
+        </Anchor>
+        <h1 className={classes["word"]} data-tone={tone}>
+          {word}
+        </h1>
+        <p className="visually-hidden" role="status">
+          Flight {trial.number}: {word}
+        </p>
+        {vehicle === null && <VehicleBadge isReal={campaign.vehicle.is_real} title={campaign.vehicle.title} />}
+      </div>
+      <div className={classes["watch"]}>
+        <Readouts
+          trial={trial}
+          unit={unit}
+          live={live}
+          status={status}
+          hasLink={vehicle !== null}
+          isFlying={isFlying}
+          endS={endOfTime(figure?.layout)}
+        />
+        <div className={classes["chart"]}>
+          {figure !== null && (
+            <Chart
+              figure={figure}
+              label={`Live curve. ${summary}`}
+              height={null}
+              liveTrial={isFlying ? trial.id : null}
+            />
+          )}
+        </div>
+      </div>
+      <section className={classes["steps"]} aria-label="What to do now">
+        <ReadOnlyNotice why={vehicle === null ? null : watching} />
+        {quarantined && vehicle !== null && <Quarantine vehicle={vehicle} concern={concern} orders={orders} />}
+        {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}
+        <HeldGains
+          asked={trial.gains}
+          readBack={trial.read_back}
+          held={step === "over" || step === "judge" ? {} : (status?.status.held ?? {})}
+          titles={titles}
+          areSet={step !== "plan"}
+        />
+      </section>
+      {vehicle !== null && <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching !== null} />}
+    </div>
+  );
+}
+
+function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure | null; summary: string } {
+  const theme = useComputedColorScheme("light");
+  const card = useCampaignFigure(campaign.id, "takeoffs", theme).data;
+  const raw = card?.figure;
+  const dress = useCallback(
+    (drawn: PlotlyFigure): PlotlyFigure => ({ ...drawn, data: withChosen(drawn.data, trial.number) }),
+    [trial.number],
+  );
+  const figure = useMemo(() => (raw ? dress(raw as unknown as PlotlyFigure) : null), [raw, dress]);
+  return { figure, summary: card?.summary ?? "" };
+}

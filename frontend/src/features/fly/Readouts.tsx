@@ -1,0 +1,99 @@
+import type { Trial } from "../../api/types";
+import { useIsCurrent } from "../../live/store";
+import { type LiveFlight, readingOf } from "../../live/telemetry";
+import { type Aged, ageText, linkText } from "../../live/vehicleStatus";
+import type { Topic } from "../../ui/explanations";
+import { withUnit } from "../../ui/format";
+import { HelpTip } from "../../ui/HelpTip";
+import { percent } from "../../ui/uncertainty";
+import classes from "./Fly.module.css";
+import { isSaturated, secondsLeft } from "./flyScreen";
+
+interface Props {
+  trial: Trial;
+  unit: string;
+  live: LiveFlight | null;
+  /** null for a vehicle that keeps no link. */
+  status: Aged | null;
+  hasLink: boolean;
+  isFlying: boolean;
+  endS: number | null;
+}
+
+interface ReadingProps {
+  title: string;
+  value: string;
+  topic?: Topic;
+  size?: "huge" | "large" | "usual";
+  stale?: boolean;
+  bad?: boolean;
+}
+
+function Reading({ title, value, topic, size = "usual", stale = false, bad = false }: ReadingProps) {
+  return (
+    <div className={classes["reading"]} data-size={size} data-stale={stale || undefined} data-bad={bad || undefined}>
+      <dt>
+        {title} {topic && <HelpTip topic={topic} />}
+      </dt>
+      <dd>{value}</dd>
+    </div>
+  );
+}
+
+/** The link in a tile: how old the last word is, or what became of it. */
+function LinkReading({ status }: { status: Aged | null }) {
+  if (status === null || status.status.state !== "connected") {
+    return <Reading title="Link" value={linkText(status)} bad />;
+  }
+  const title = status.isCurrent ? "Link age" : "Silent for";
+  return <Reading title={title} topic="linkAge" value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
+}
+
+/** What can be read from arm's length: altitude and error so far, then the rest. Grey is what is no longer so. */
+export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }: Props) {
+  const reading = readingOf(live?.channel ?? "altitude_m");
+  const measured = isFlying ? live?.measured.at(-1) : undefined;
+  const linked = status?.status;
+  const isCurrent = useIsCurrent(live);
+  const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
+  const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
+  const error = isFlying ? live?.errorSoFar : trial.error;
+  const errorTitle = isFlying ? "Error so far" : "Error";
+  const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
+  return (
+    <div className={`${classes["readouts"]} numbers`}>
+      <dl className={classes["row"]}>
+        <Reading
+          title={stale ? `${reading.title}, as last heard` : reading.title}
+          value={withUnit(output, reading.unit, reading.digits)}
+          size="huge"
+          stale={stale}
+        />
+        <Reading
+          title={`${errorTitle}${predicted}`}
+          topic={isFlying ? "errorSoFar" : "error"}
+          value={withUnit(error, unit)}
+          size="large"
+          stale={isFlying && stale}
+        />
+      </dl>
+      <dl className={classes["row"]}>
+        {live !== null && live.thrust !== null && (
+          <Reading
+            title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"}
+            topic="thrust"
+            value={percent(live.thrust)}
+            stale={stale}
+          />
+        )}
+        <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
+        {hasLink && <LinkReading status={status} />}
+        {isFlying ? (
+          <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
+        ) : (
+          <Reading title="Record lasts" value={withUnit(endS, "s", 0)} />
+        )}
+      </dl>
+    </div>
+  );
+}

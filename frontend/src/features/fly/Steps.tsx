@@ -1,0 +1,213 @@
+import { Anchor, Button, Loader } from "@mantine/core";
+import { IconOctagonFilled, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { Link } from "react-router";
+import { useFlyTrial } from "../../api/mutations";
+import type { Campaign, Trial, Vehicle } from "../../api/types";
+import { useFlyActions } from "../../api/vehicleCommands";
+import type { AbortControl } from "../../live/flights";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { HoldButton } from "../../ui/HoldButton";
+import { speedOf, wantsRehearsal } from "../campaign/nextStep";
+import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
+import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
+import { FlightReviewCard } from "./FlightReviewCard";
+import classes from "./Fly.module.css";
+import type { FlyStep } from "./flyScreen";
+import { PreflightChecks } from "./PreflightChecks";
+
+interface Props {
+  campaign: Campaign;
+  trial: Trial;
+  step: FlyStep;
+  abort: AbortControl;
+}
+
+/** What is to be done now, for a vehicle that keeps a link: control, gains, take-off, a word on the flight. */
+export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & { vehicle: Vehicle }) {
+  switch (step) {
+    case "plan":
+      return <Plan campaign={campaign} trial={trial} vehicle={vehicle} />;
+    case "staging":
+      return (
+        <Waiting text="The gains are written one by one, and each is read back.">
+          <Button variant="default" onClick={() => abort.press([trial.id])}>
+            Stop setting them
+          </Button>
+        </Waiting>
+      );
+    case "staged":
+      return <TakeOff trial={trial} vehicle={vehicle} />;
+    case "unstaging":
+      return <Waiting text="The safe gains are written and read back. The flight is planned again then." />;
+    case "flying":
+      return <Abort trial={trial} abort={abort} />;
+    case "judge":
+    case "over":
+      return <FlightReviewCard campaign={campaign} trial={trial} />;
+  }
+}
+
+/** The same for a simulation that is opened for each flight: one click. */
+export function PlainSteps({ campaign, trial, step, abort }: Props) {
+  const [speed, setSpeed] = useSpeed();
+  const fly = useFlyTrial(campaign);
+  switch (step) {
+    case "plan":
+      return (
+        <div className={classes["stack"]}>
+          {campaign.vehicle.can_fly ? (
+            <>
+              <Button
+                size="xl"
+                leftSection={<IconPlaneDeparture size={24} aria-hidden />}
+                loading={fly.isPending}
+                disabled={!trial.actions.includes("fly")}
+                onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
+              >
+                Fly
+              </Button>
+              <SpeedSwitch value={speed} onChange={setSpeed} />
+            </>
+          ) : (
+            <p className={classes["say"]}>
+              This vehicle is flown elsewhere.{" "}
+              <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
+                Hand in the record of the flight
+              </Anchor>
+            </p>
+          )}
+          <Problem trial={trial} />
+          <ErrorNotice error={fly.error} />
+        </div>
+      );
+    case "judge":
+    case "over":
+      return <FlightReviewCard campaign={campaign} trial={trial} />;
+    default:
+      return <Abort trial={trial} abort={abort} />;
+  }
+}
+
+function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; vehicle: Vehicle }) {
+  const { stage } = useFlyActions(vehicle.id);
+  const isInControl = useIsInControl(vehicle);
+  const isOthers = vehicle.control !== null && !isInControl;
+  const wantsControl = isOthers || (vehicle.is_real && !isInControl);
+  if (wantsRehearsal(campaign)) {
+    return (
+      <p className={classes["say"]}>
+        {vehicle.name} is a real vehicle, and this campaign has not passed its rehearsal: {campaign.rehearsal.reason}.{" "}
+        <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
+          Rehearse it first
+        </Anchor>
+      </p>
+    );
+  }
+  const isReady = vehicle.actions.includes("stage") && trial.actions.includes("stage");
+  return (
+    <div className={classes["stack"]}>
+      {(vehicle.is_real || isOthers || isInControl) && <OperatorControl vehicle={vehicle} />}
+      {vehicle.state === "disconnected" && (
+        <p className={classes["say"]}>
+          {vehicle.name} is not connected.{" "}
+          <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
+            Connect it
+          </Anchor>
+        </p>
+      )}
+      <Problem trial={trial} />
+      <PreflightChecks checks={vehicle.checks ?? []} />
+      <Button
+        size="xl"
+        leftSection={<IconUpload size={24} aria-hidden />}
+        disabled={!isReady || wantsControl}
+        loading={stage.isPending}
+        onClick={() => stage.mutate(trial)}
+      >
+        Stage
+      </Button>
+      <p className={classes["quiet"]}>
+        {wantsControl
+          ? "Take control first."
+          : "Sets these gains on the vehicle, landed and disarmed, and reads each one back. Nothing moves."}
+      </p>
+      <ErrorNotice error={stage.error} />
+    </div>
+  );
+}
+
+function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
+  const { takeOff, unstage } = useFlyActions(vehicle.id);
+  const isInControl = useIsInControl(vehicle);
+  const isOthers = vehicle.control !== null && !isInControl;
+  const may = trial.actions.includes("take-off") && !isOthers && (isInControl || !vehicle.is_real);
+  return (
+    <div className={classes["stack"]}>
+      {(vehicle.is_real || isOthers) && !isInControl && <OperatorControl vehicle={vehicle} />}
+      {vehicle.is_real ? (
+        <HoldButton
+          label={`Hold to fly ${vehicle.name}`}
+          disabled={!may || takeOff.isPending}
+          onHeld={() => takeOff.mutate(trial)}
+        />
+      ) : (
+        <Button
+          size="xl"
+          leftSection={<IconPlaneDeparture size={24} aria-hidden />}
+          disabled={!may}
+          loading={takeOff.isPending}
+          onClick={() => takeOff.mutate(trial)}
+        >
+          Take off
+        </Button>
+      )}
+      <Button
+        variant="default"
+        disabled={!trial.actions.includes("unstage")}
+        loading={unstage.isPending}
+        onClick={() => unstage.mutate(trial)}
+      >
+        Unstage: safe gains back
+      </Button>
+      <ErrorNotice error={takeOff.error ?? unstage.error} />
+    </div>
+  );
+}
+
+/** One tap, no question. */
+function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
+  const asked = abort.asked.has(trial.id);
+  return (
+    <div className={classes["stack"]}>
+      <button type="button" className={classes["abort"]} onClick={() => abort.press([trial.id])}>
+        <IconOctagonFilled size={40} aria-hidden />
+        {asked ? "ABORTING" : "ABORT"}
+        {!asked && <kbd>Space</kbd>}
+      </button>
+      <p className={classes["quiet"]}>
+        {asked
+          ? "Safe gains and Land are sent until the vehicle agrees."
+          : "Ends the flight at once: safe gains back, land, again and again until the vehicle agrees."}
+      </p>
+    </div>
+  );
+}
+
+function Waiting({ text, children }: { text: string; children?: ReactNode }) {
+  return (
+    <div className={classes["stack"]}>
+      <p className={classes["waiting"]}>
+        <Loader size="sm" aria-hidden />
+        {text}
+      </p>
+      {children}
+    </div>
+  );
+}
+
+/** Why the last attempt did not fly. */
+function Problem({ trial }: { trial: Trial }) {
+  const problem = trial.flight?.problem ?? "";
+  return problem === "" ? null : <ErrorNotice error={new Error(problem)} />;
+}

@@ -1,0 +1,65 @@
+import { expect, test } from "vitest";
+import type { Trial } from "../../api/types";
+import { aged, statusFrom } from "../../live/vehicleStatus";
+import { endOfTime, flyStateLabel, flyStep, gainTicks, isSaturated, secondsLeft } from "./flyScreen";
+
+type Flight = NonNullable<Trial["flight"]>;
+
+const flight: Flight = {
+  id: 1,
+  state: "running",
+  mode: "stage",
+  take_off_at: null,
+  standing_down: "",
+  problem: "",
+  battery: "",
+  battery_v_before: null,
+  battery_v_after: null,
+};
+
+function statusAt(step: string, ageS: number) {
+  const status = statusFrom(JSON.stringify({ vehicle_id: 1, state: "connected", step, packet_age_s: ageS }));
+  if (status === null) throw new Error("that is a status");
+  const now = { wallMs: 0, steadyMs: 0 };
+  return aged({ status, heardAt: now }, now);
+}
+
+test("a trial is planned, staged, flown and judged; the stream may run ahead of the record", () => {
+  expect(flyStep({ state: "planned", flight: null }, null)).toBe("plan");
+  expect(flyStep({ state: "planned", flight: { ...flight, state: "failed" } }, null)).toBe("plan");
+  expect(flyStep({ state: "planned", flight }, "staging")).toBe("staging");
+  expect(flyStep({ state: "planned", flight }, "flying")).toBe("flying");
+  expect(flyStep({ state: "staged", flight }, "staged")).toBe("staged");
+  expect(flyStep({ state: "staged", flight: { ...flight, standing_down: "unstaged" } }, "staged")).toBe("unstaging");
+  expect(flyStep({ state: "staged", flight: { ...flight, take_off_at: "2026-05-04T10:00:00Z" } }, null)).toBe("flying");
+  expect(flyStep({ state: "captured", flight }, "ended")).toBe("judge");
+  expect(flyStep({ state: "valid", flight }, "ended")).toBe("over");
+});
+
+test("the word in flight is the vehicle's own step, and a silent vehicle is never recording", () => {
+  const trial = { state: "flying", flight } as const;
+  expect(flyStateLabel(trial, "flying", statusAt("record", 0.1), false)).toEqual({ word: "Recording", tone: "busy" });
+  expect(flyStateLabel(trial, "flying", statusAt("abort-land", 0.1), false).tone).toBe("bad");
+  expect(flyStateLabel(trial, "flying", statusAt("record", 4), false).word).toBe("Link lost");
+  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), false).word).toBe("Starting");
+  expect(flyStateLabel(trial, "flying", null, false).word).toBe("Flying");
+  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), true).word).toBe("Quarantined");
+  expect(flyStateLabel({ state: "lost", flight }, "judge", null, false).word).toBe("Lost");
+});
+
+test("a gain is ticked only when the vehicle holds exactly what it was asked to", () => {
+  const [kp, ki, kd] = gainTicks({ kp: 283, ki: 13, kd: 82 }, null, { kp: 283, ki: 20 });
+  expect([kp?.confirmed, ki?.confirmed, kd?.confirmed]).toEqual([true, false, false]);
+  expect([ki?.held, kd?.held]).toEqual([20, null]);
+  expect(gainTicks({ kp: 283 }, { kp: 283 }, { kp: 1 })[0]?.confirmed).toBe(true);
+});
+
+test("the countdown ends with the figure's time axis", () => {
+  const end = endOfTime({ xaxis: { range: [-0.3, 30] } });
+  expect([end, secondsLeft(12.5, end), secondsLeft(31, end), secondsLeft(undefined, end)]).toEqual([30, 17.5, 0, null]);
+  expect([endOfTime(undefined), endOfTime({ xaxis: {} }), secondsLeft(1, null)]).toEqual([null, null, null]);
+});
+
+test("all the thrust there is, is saturated", () => {
+  expect([isSaturated(0.62), isSaturated(1)]).toEqual([false, true]);
+});

@@ -1,0 +1,47 @@
+import { useState } from "react";
+import { type Job, type JobLogLine, useJobLog } from "../../api/jobs";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { utcTime } from "../../ui/format";
+import classes from "./JobLog.module.css";
+
+/** What the worker wrote down about a job, read when it is opened. */
+export function JobLog({ job }: { job: Job }) {
+  const [open, setOpen] = useState(false);
+  const { data: log, error } = useJobLog(job.id, open);
+  return (
+    <details className={classes["log"]} onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary className={classes["summary"]}>Log of job {job.id}</summary>
+      <ErrorNotice error={error} />
+      {log?.lines.length === 0 && (
+        <p className={classes["none"]}>
+          {job.started_at === null ? "The worker has not begun it yet." : "Its lines are no longer kept."}
+        </p>
+      )}
+      {log !== undefined && log.total > log.lines.length && (
+        <p className={classes["none"]}>
+          The last {log.lines.length} of {log.total} lines:
+        </p>
+      )}
+      <ol className={classes["lines"]}>
+        {log?.lines.map((line) => (
+          <Line key={`${line.at} ${line.message}`} line={line} />
+        ))}
+      </ol>
+    </details>
+  );
+}
+
+function Line({ line: { at, level, message, details, exception } }: { line: JobLogLine }) {
+  const more = Object.entries(details).map(([name, value]) => `${name} ${value}`);
+  return (
+    <li data-level={level}>
+      <time dateTime={at} title={utcTime(at)} className="numbers">
+        {new Date(at).toLocaleTimeString()}
+      </time>{" "}
+      {level !== "info" && <strong>{level}: </strong>}
+      {message}
+      {more.length > 0 && <span className={classes["details"]}> ({more.join(", ")})</span>}
+      {exception !== "" && <pre className={classes["exception"]}>{exception}</pre>}
+    </li>
+  );
+}

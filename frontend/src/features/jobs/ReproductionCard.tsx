@@ -1,0 +1,141 @@
+import { Button, useComputedColorScheme } from "@mantine/core";
+import { IconPlayerPlay, IconX } from "@tabler/icons-react";
+import {
+  type ReproductionSummary,
+  useCancelJob,
+  useReproductionFigure,
+  useReproductionResult,
+  useRunReproduction,
+} from "../../api/jobs";
+import { FigurePanel } from "../../charts/FigurePanel";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Panel } from "../../ui/Panel";
+import { Time } from "../../ui/Time";
+import { JobProgress } from "./JobProgress";
+import { duration, isUnderWay, ratioSpan } from "./jobs";
+import classes from "./ReproductionCard.module.css";
+import { ReproductionRows } from "./ReproductionRows";
+
+const FIGURE_HEIGHT_PX = 360;
+
+/** One experiment of the paper: what it shows there, what it comes to here, and its figures. */
+export function ReproductionCard({ reproduction }: { reproduction: ReproductionSummary }) {
+  const { name, title, line, paper, figures, latest } = reproduction;
+  const result = useReproductionResult(name, latest?.job_id ?? null);
+  const span = result.data ? ratioSpan(result.data.rows) : null;
+  return (
+    <article id={name} className={classes["card"]} aria-label={title}>
+      <Panel title={title} tools={<Actions reproduction={reproduction} />}>
+        <p className={classes["paper"]}>
+          <strong>In the paper:</strong> {paper}
+        </p>
+        <p className={classes["line"]}>
+          <strong>Here:</strong> {line}
+          {span !== null && <> Ours come to {span}.</>}
+        </p>
+        <Standing reproduction={reproduction} />
+        <ErrorNotice error={result.error} />
+        {result.data && result.data.rows.length > 0 && (
+          <>
+            <ReproductionRows rows={result.data.rows} title={title} />
+            <ul className={classes["notes"]}>
+              {result.data.notes.map((note) => (
+                <li key={note}>{note}</li>
+              ))}
+            </ul>
+          </>
+        )}
+      </Panel>
+      {latest !== null && (
+        <div className={classes["figures"]}>
+          {figures.map((figure) => (
+            <Figure key={figure.name} name={name} figure={figure.name} title={figure.title} jobId={latest.job_id} />
+          ))}
+        </div>
+      )}
+    </article>
+  );
+}
+
+function Actions({ reproduction: { name, title, job, latest, long_form } }: { reproduction: ReproductionSummary }) {
+  const run = useRunReproduction();
+  const cancel = useCancelJob();
+  if (job !== null && isUnderWay(job)) {
+    return (
+      <Button
+        variant="default"
+        leftSection={<IconX size={18} aria-hidden />}
+        aria-label={`Cancel: ${title}`}
+        loading={cancel.isPending}
+        onClick={() => cancel.mutate(job.id)}
+      >
+        Cancel
+      </Button>
+    );
+  }
+  return (
+    <>
+      {long_form !== "" && (
+        <Button
+          variant="default"
+          title={long_form}
+          aria-label={`Run in full: ${title}`}
+          onClick={() => run.mutate({ name, full: true })}
+        >
+          In full
+        </Button>
+      )}
+      <Button
+        variant={latest === null ? "filled" : "default"}
+        leftSection={<IconPlayerPlay size={18} aria-hidden />}
+        aria-label={`Run: ${title}`}
+        loading={run.isPending}
+        onClick={() => run.mutate({ name })}
+      >
+        {latest === null ? "Run" : "Run again"}
+      </Button>
+    </>
+  );
+}
+
+/** The run under way, or why the last one came to nothing; and when the result below was made. */
+function Standing({ reproduction: { title, job, latest } }: { reproduction: ReproductionSummary }) {
+  return (
+    <>
+      {job !== null && isUnderWay(job) && <JobProgress job={job} title={`Progress: ${title}`} />}
+      {job?.state === "cancelled" && <p className={classes["line"]}>The last run was cancelled.</p>}
+      {job?.problem && (
+        <div className={classes["trouble"]} role="alert">
+          <strong>The last run failed: {job.problem.title}</strong>
+          {job.problem.detail && <p>{job.problem.detail}</p>}
+          <p>{job.problem.hint}</p>
+        </div>
+      )}
+      <p className={classes["when"]}>
+        {latest === null ? (
+          "Not run yet."
+        ) : (
+          <>
+            Run <Time at={latest.finished_at} />
+            {latest.full && " in full"}, took {duration(latest.seconds)}.
+          </>
+        )}
+      </p>
+    </>
+  );
+}
+
+interface FigureProps {
+  name: string;
+  figure: string;
+  title: string;
+  jobId: number;
+}
+
+function Figure({ name, figure, title, jobId }: FigureProps) {
+  const theme = useComputedColorScheme("light");
+  const card = useReproductionFigure(name, figure, theme, jobId);
+  return (
+    <FigurePanel title={card.data?.title ?? title} card={card.data} error={card.error} height={FIGURE_HEIGHT_PX} />
+  );
+}

@@ -1,0 +1,56 @@
+import { Button, Skeleton } from "@mantine/core";
+import { IconPlayerPlay } from "@tabler/icons-react";
+import { useEffect } from "react";
+import { useLocation } from "react-router";
+import { useReproductions, useRunReproduction } from "../../api/jobs";
+import { ErrorNotice } from "../../ui/ErrorNotice";
+import classes from "../../ui/Page.module.css";
+import { useTitle } from "../../ui/useTitle";
+import { isUnderWay } from "./jobs";
+import { ReproductionCard } from "./ReproductionCard";
+
+/** Every experiment, table and figure of the paper: run here, beside what was published. */
+export function ReproductionsPage() {
+  useTitle("Reproductions");
+  const list = useReproductions();
+  const run = useRunReproduction();
+  const found = list.data?.items ?? [];
+  const idle = found.filter(({ job }) => job === null || !isUnderWay(job));
+  useScrollToHash(found.length > 0);
+  return (
+    <>
+      <div className={classes["head"]}>
+        <h1 className={classes["title"]}>Reproductions</h1>
+        <Button
+          variant="default"
+          leftSection={<IconPlayerPlay size={18} aria-hidden />}
+          disabled={idle.length === 0}
+          onClick={() => {
+            for (const { name } of idle) run.mutate({ name });
+          }}
+        >
+          Run all
+        </Button>
+      </div>
+      <p className={classes["intro"]}>
+        Every experiment, table and figure of the paper, run on this machine: our numbers beside the published ones.
+        Flights and proposals go first; a run can be cancelled and begun again at any time.
+      </p>
+      <ErrorNotice error={list.error ?? run.error} />
+      {list.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
+      <div className={classes["stack"]}>
+        {found.map((reproduction) => (
+          <ReproductionCard key={reproduction.name} reproduction={reproduction} />
+        ))}
+      </div>
+    </>
+  );
+}
+
+/** A link to one of them leads there once they are listed. */
+function useScrollToHash(ready: boolean): void {
+  const { hash } = useLocation();
+  useEffect(() => {
+    if (ready && hash !== "") document.getElementById(hash.slice(1))?.scrollIntoView();
+  }, [ready, hash]);
+}

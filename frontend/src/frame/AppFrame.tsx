@@ -1,0 +1,125 @@
+import { useQueryClient } from "@tanstack/react-query";
+import { Suspense, useEffect, useRef } from "react";
+import { Link, Outlet, useLocation, useMatch } from "react-router";
+import { useReadOnlyReason } from "../api/access";
+import { useRenewedControl } from "../api/control";
+import { useCampaign } from "../api/queries";
+import { useVehicle } from "../api/vehicles";
+import { followEvents } from "../live/events";
+import { useAbort, useFlying } from "../live/flights";
+import { liveFlightsNow, useConnection } from "../live/store";
+import { ReadOnlyNotice } from "../ui/ReadOnlyNotice";
+import { VehicleBadge } from "../ui/VehicleBadge";
+import { abortTargets, type Flying } from "./abortTargets";
+import { ConnectionNotice, ConnectionState } from "./ConnectionState";
+import { FlyingBar } from "./FlyingBar";
+import classes from "./Frame.module.css";
+import { KeyboardHelp } from "./KeyboardHelp";
+import { MainNav } from "./MainNav";
+import { PageGuard } from "./PageGuard";
+import { SpokenAnnouncements } from "./SpokenAnnouncements";
+import { ThemeSwitch } from "./ThemeSwitch";
+import { VehicleStrip } from "./VehicleStrip";
+
+/**
+ * Space ends the flight, whatever has the focus, a text too: losing a blank is cheaper.
+ * What flies is known from the stream before it is known from the list, so both count.
+ */
+function useSpaceAborts(
+  listed: readonly Flying[],
+  campaignId: number | null,
+  press: (trialIds: readonly number[]) => void,
+): void {
+  const latest = useRef({ listed, campaignId, press });
+  latest.current = { listed, campaignId, press };
+  useEffect(() => {
+    function onKey(event: KeyboardEvent): void {
+      const { listed, campaignId, press } = latest.current;
+      const targets = abortTargets([...listed, ...liveFlightsNow()], campaignId);
+      if (event.code !== "Space" || targets.length === 0) return;
+      event.preventDefault();
+      event.stopPropagation();
+      if (!event.repeat && event.type === "keydown") press([...new Set(targets.map(({ trialId }) => trialId))]);
+    }
+    // A button acts on the release of Space, so that must not get through either.
+    document.addEventListener("keydown", onKey, { capture: true });
+    document.addEventListener("keyup", onKey, { capture: true });
+    return () => {
+      document.removeEventListener("keydown", onKey, { capture: true });
+      document.removeEventListener("keyup", onKey, { capture: true });
+    };
+  }, []);
+}
+
+function useEventStream(flying: boolean): void {
+  const queries = useQueryClient();
+  const flies = useRef(flying);
+  flies.current = flying;
+  useEffect(() => followEvents(queries, () => flies.current), [queries]);
+}
+
+function CampaignVehicle({ campaignId }: { campaignId: number }) {
+  const vehicle = useCampaign(campaignId).data?.vehicle;
+  const state = useVehicle(vehicle?.id ?? null)?.state;
+  // A connected one stands in its own line below.
+  if (vehicle === undefined || (vehicle.registered && state !== "disconnected")) return null;
+  return <VehicleBadge isReal={vehicle.is_real} title={vehicle.registered ? vehicle.name : vehicle.title} />;
+}
+
+export function AppFrame() {
+  const onPage = useMatch("/campaigns/:campaignId/*");
+  const campaignId = onPage ? Number(onPage.params.campaignId) : null;
+  const flying = useFlying();
+  const abort = useAbort(flying);
+  const { pathname } = useLocation();
+  const onFlyScreen = useMatch("/fly/:trialId") !== null;
+  useEventStream(flying.length > 0);
+  useRenewedControl();
+  const { state } = useConnection();
+  const watching = useReadOnlyReason(null);
+  useSpaceAborts(flying, campaignId, abort.press);
+  return (
+    <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
+      <a href="#main" className={classes["skip"]}>
+        Skip to the content
+      </a>
+      <header className={classes["header"]}>
+        <div className={classes["bar"]} data-flying={flying.length > 0 || undefined}>
+          <Link to="/" className={classes["home"]} aria-label="Gainline, all campaigns">
+            <img src="/icon.svg" alt="" width={32} height={32} />
+            <span className={classes["homeName"]}>Gainline</span>
+          </Link>
+          <MainNav />
+          <div className={classes["vehicle"]}>
+            {campaignId !== null && Number.isInteger(campaignId) && <CampaignVehicle campaignId={campaignId} />}
+          </div>
+          <div className={classes["spacer"]} />
+          <div className={classes["flights"]}>
+            {flying.map((one) => (
+              <FlyingBar key={one.trialId} flying={one} abort={abort} />
+            ))}
+          </div>
+          <ConnectionState />
+          <ThemeSwitch />
+          <KeyboardHelp />
+        </div>
+        {abort.trouble !== null && (
+          <p className={classes["trouble"]} role="alert">
+            <strong>The abort has not reached the worker yet; it is sent again.</strong> {abort.trouble}
+          </p>
+        )}
+        <VehicleStrip />
+        <ConnectionNotice />
+      </header>
+      <SpokenAnnouncements />
+      <main id="main" className={classes["main"]} tabIndex={-1} data-stale={state === "away" || undefined}>
+        <ReadOnlyNotice why={watching} />
+        <PageGuard path={pathname}>
+          <Suspense fallback={<div aria-busy="true" />}>
+            <Outlet context={abort} />
+          </Suspense>
+        </PageGuard>
+      </main>
+    </div>
+  );
+}

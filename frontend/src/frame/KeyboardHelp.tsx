@@ -1,0 +1,68 @@
+import { ActionIcon } from "@mantine/core";
+import { IconKeyboard } from "@tabler/icons-react";
+import { useEffect, useRef } from "react";
+import { useLocation } from "react-router";
+import classes from "./KeyboardHelp.module.css";
+import { commandOf, keysOf } from "./keys";
+
+function isTyping(target: EventTarget | null): boolean {
+  return target instanceof HTMLElement && target.matches("input, textarea, select, [contenteditable]");
+}
+
+/** The keys of this page, by a button or by `?`. It covers nothing that ends a flight, and blocks nothing. */
+export function KeyboardHelp() {
+  const { pathname } = useLocation();
+  const dialog = useRef<HTMLDialogElement>(null);
+  useEffect(() => {
+    function onKey(event: KeyboardEvent): void {
+      const command = commandOf(event, isTyping(event.target));
+      if (command === "help") dialog.current?.togglePopover();
+      const search = document.querySelector<HTMLInputElement>("main search input");
+      if (command !== "search" || search === null) return;
+      event.preventDefault();
+      search.focus();
+    }
+    document.addEventListener("keydown", onKey);
+    return () => document.removeEventListener("keydown", onKey);
+  }, []);
+  return (
+    <>
+      <ActionIcon
+        color="gray"
+        className={classes["ask"] ?? ""}
+        aria-label="Keyboard help"
+        title="Keyboard help (?)"
+        aria-haspopup="dialog"
+        popoverTarget="keys"
+      >
+        <IconKeyboard size={22} color="var(--ink)" />
+      </ActionIcon>
+      <dialog
+        ref={dialog}
+        id="keys"
+        popover="auto"
+        aria-labelledby="keys-title"
+        tabIndex={-1}
+        className={classes["dialog"]}
+        onToggle={({ newState, currentTarget }) => newState === "open" && currentTarget.focus()}
+      >
+        <h2 id="keys-title" className={classes["title"]}>
+          Keys on this page
+        </h2>
+        <dl className={classes["keys"]}>
+          {keysOf(pathname).map(({ keys, does }) => (
+            <div key={does}>
+              <dt>
+                {keys.map((key) => (
+                  <kbd key={key}>{key}</kbd>
+                ))}
+              </dt>
+              <dd>{does}</dd>
+            </div>
+          ))}
+        </dl>
+        <p className={classes["note"]}>No key flies a real vehicle: that takes a finger or a pointer, held for 2 s.</p>
+      </dialog>
+    </>
+  );
+}

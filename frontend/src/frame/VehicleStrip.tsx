@@ -1,0 +1,94 @@
+import { IconAlertTriangle, IconAntennaBars5, IconAntennaBarsOff, IconBattery3, IconUser } from "@tabler/icons-react";
+import { Link } from "react-router";
+import { useOwnLease } from "../api/leases";
+import type { Vehicle } from "../api/types";
+import { useVehicles } from "../api/vehicles";
+import { useVehicleStatus } from "../live/store";
+import { linkText } from "../live/vehicleStatus";
+import { withUnit } from "../ui/format";
+import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
+import { VehicleBadge } from "../ui/VehicleBadge";
+import classes from "./VehicleStrip.module.css";
+
+/** On every page: each connected vehicle with its link, battery, gains, and who is in control of it. */
+export function VehicleStrip() {
+  const connected = (useVehicles().data ?? []).filter(
+    ({ registered, state }) => registered && state !== "disconnected",
+  );
+  return connected.map((vehicle) => <VehicleLine key={vehicle.id} vehicle={vehicle} />);
+}
+
+function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
+  const aged = useVehicleStatus(vehicle.id);
+  const stale = aged === null || !aged.isCurrent;
+  const LinkIcon = stale ? IconAntennaBarsOff : IconAntennaBars5;
+  return (
+    <section className={`${classes["line"]} numbers`} aria-label={`Vehicle ${vehicle.name}`}>
+      <Link to={`/vehicles/${vehicle.id}`} className={classes["name"]}>
+        <VehicleBadge isReal={vehicle.is_real} title={vehicle.name} />
+      </Link>
+      {vehicle.state === "quarantined" && (
+        <span className={classes["quarantined"]} title={vehicle.concern}>
+          <IconAlertTriangle size={16} aria-hidden />
+          Quarantined
+        </span>
+      )}
+      <span className={classes["fact"]} data-bad={stale || undefined} title="How long ago the vehicle was last heard">
+        <LinkIcon size={17} aria-hidden />
+        <span className="visually-hidden">Link</span>
+        {linkText(aged)}
+      </span>
+      <span className={classes["fact"]} data-stale={stale || undefined} title={`Battery ${vehicle.battery}`}>
+        <IconBattery3 size={18} aria-hidden />
+        <span className="visually-hidden">Battery</span>
+        {withUnit(aged?.status.batteryV, "V", 1)}
+      </span>
+      <HeldGains vehicle={vehicle} held={aged?.status.held ?? {}} stale={stale} />
+      <InControl vehicle={vehicle} />
+    </section>
+  );
+}
+
+interface HeldProps {
+  vehicle: Vehicle;
+  held: Readonly<Record<string, number>>;
+  stale: boolean;
+}
+
+/** What is on the vehicle beside what is safe: as the link tells, else as it was last read back. */
+function HeldGains({ vehicle, held, stale }: HeldProps) {
+  const { safe_gains: safe } = vehicle;
+  const known = inOrder(Object.keys(held).length > 0 ? held : (vehicle.held ?? {}), Object.keys(safe));
+  const names = Object.keys(safe).join(", ");
+  if (Object.keys(known).length === 0) {
+    return (
+      <span className={classes["fact"]} data-stale>
+        <span>gains not read · safe {gainsInBrackets(safe)}</span>
+      </span>
+    );
+  }
+  const isSafe = sameHeld(known, safe);
+  return (
+    <span className={classes["fact"]} data-stale={stale || undefined} title={`${names}, as read back`}>
+      <span className={classes["word"]}>holds</span>
+      {gainsInBrackets(known)}
+      <span className={isSafe ? classes["safe"] : classes["other"]}>
+        {isSafe ? "safe" : `safe ${gainsInBrackets(safe)}`}
+      </span>
+    </span>
+  );
+}
+
+function InControl({ vehicle }: { vehicle: Vehicle }) {
+  const own = useOwnLease(vehicle.id);
+  const { control } = vehicle;
+  const isOwn = own !== null && (control === null || control.operator === own.operator);
+  const who = isOwn ? `${own.operator} (you)` : (control?.operator ?? "nobody in control");
+  return (
+    <span className={classes["fact"]} data-stale={(control === null && !isOwn) || undefined} title="Who is in control">
+      <IconUser size={17} aria-hidden />
+      <span className="visually-hidden">In control:</span>
+      <span className={classes["who"]}>{who}</span>
+    </span>
+  );
+}

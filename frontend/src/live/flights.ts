@@ -1,0 +1,85 @@
+/** What is in the air, and how to end it. */
+
+import { useQuery } from "@tanstack/react-query";
+import { useCallback, useEffect, useRef, useState } from "react";
+import { answer } from "../api/client";
+import { abortTrial, getCampaign, listCampaigns } from "../api/generated";
+import { problemOf } from "../api/problems";
+import { liveFlightsNow } from "./store";
+
+export interface FlyingCampaign {
+  campaignId: number;
+  trialId: number;
+  trialNumber: number;
+  name: string;
+  isReal: boolean;
+}
+
+async function readFlying(): Promise<FlyingCampaign[]> {
+  const page = await answer(listCampaigns({ query: { state: ["flying"], limit: 20 } }));
+  const campaigns = await Promise.all(page.items.map(({ id }) => answer(getCampaign({ path: { campaign_id: id } }))));
+  return campaigns.flatMap(({ id, name, vehicle, flying }) =>
+    flying === null
+      ? []
+      : [
+          {
+            campaignId: id,
+            trialId: flying.trial_id,
+            trialNumber: flying.trial_number,
+            name,
+            isReal: vehicle.is_real,
+          },
+        ],
+  );
+}
+
+export function useFlying(): FlyingCampaign[] {
+  return useQuery({ queryKey: ["flying"], queryFn: readFlying }).data ?? [];
+}
+
+const AGAIN_MS = 400;
+
+/** Why the worker has not taken the abort, or null when it has. */
+async function askToAbort(trialId: number): Promise<string | null> {
+  try {
+    const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
+    return accepted ? null : sentence;
+  } catch (error) {
+    const problem = problemOf(error);
+    return [problem?.detail, problem?.hint].join(" ");
+  }
+}
+
+/**
+ * Abort by trial id. A press counts until the flight is over: while the worker cannot be told, it is told again.
+ * `trouble` says that it has not been told yet.
+ */
+export function useAbort(flying: readonly FlyingCampaign[]) {
+  const [asked, setAsked] = useState<ReadonlySet<number>>(new Set());
+  const [trouble, setTrouble] = useState<string | null>(null);
+  const inTheAir = useRef<ReadonlySet<number>>(new Set());
+  inTheAir.current = new Set(flying.map(({ trialId }) => trialId));
+
+  const tell = useCallback(async (trialId: number): Promise<void> => {
+    const refusal = await askToAbort(trialId);
+    const over = !inTheAir.current.has(trialId) && !liveFlightsNow().some((flight) => flight.trialId === trialId);
+    setTrouble(over ? null : refusal);
+    if (refusal !== null && !over) setTimeout(() => void tell(trialId), AGAIN_MS);
+  }, []);
+
+  const press = useCallback(
+    (trialIds: readonly number[]): void => {
+      setAsked((before) => new Set([...before, ...trialIds]));
+      for (const trialId of trialIds) void tell(trialId);
+    },
+    [tell],
+  );
+
+  useEffect(() => {
+    if (flying.length === 0) setTrouble(null);
+  }, [flying.length]);
+
+  return { asked, trouble, press };
+}
+
+export type AbortControl = ReturnType<typeof useAbort>;

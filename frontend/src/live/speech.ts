@@ -1,0 +1,108 @@
+/** What is worth saying aloud: news of the stream in, sentences out. */
+
+import type { LiveFlight } from "./telemetry";
+import type { LastHeard, VehicleStatus } from "./vehicleStatus";
+
+/** What the stream has said so far. */
+export interface News {
+  state: "connecting" | "live" | "away";
+  flights: ReadonlyMap<number, Pick<LiveFlight, "phase" | "timeS">>;
+  vehicles: ReadonlyMap<number, Pick<LastHeard, "status">>;
+}
+
+/** Of a vehicle, what the stream does not say. */
+export interface Known {
+  name: string;
+  minBatteryV: number | null;
+}
+
+export interface Sentence {
+  text: string;
+  /** Said at once, in place of what is being said. */
+  urgent: boolean;
+}
+
+const say = (text: string): Sentence => ({ text, urgent: false });
+const shout = (text: string): Sentence => ({ text, urgent: true });
+
+const PHASES: Readonly<Record<string, Sentence>> = {
+  staging: say("Setting the gains."),
+  staged: say("Gains set, ready to fly."),
+  flying: say("Taking off."),
+};
+
+const STEPS: Readonly<Record<string, Sentence>> = {
+  "take-off": say("Taking off."),
+  land: say("Landing."),
+  "abort-land": shout("Aborted, landing."),
+  "link lost": shout("Link lost."),
+  quarantined: shout("Quarantined. Look at the vehicle."),
+};
+
+const UNITS: Readonly<Record<string, { word: string; digits: number }>> = {
+  m: { word: "metres", digits: 2 },
+  V: { word: "volts", digits: 1 },
+  rad·s: { word: "radian seconds", digits: 3 },
+};
+
+function aloud(value: number, unit: string): string {
+  const { word, digits } = UNITS[unit] ?? { word: unit, digits: 3 };
+  return `${value.toFixed(digits)} ${word}`;
+}
+
+/** What has changed and is worth a word. Nothing is said of what was so already when the page was opened. */
+export function newsSentences(before: News, now: News, known: (vehicleId: number) => Known): Sentence[] {
+  const said: Sentence[] = [];
+  if (before.state === "live" && now.state === "away") said.push(shout("The server does not answer."));
+  for (const [trialId, { phase, timeS }] of now.flights) {
+    const earlier = before.flights.get(trialId)?.phase;
+    const isNew = phase !== earlier && (earlier !== undefined || timeS.length === 0);
+    if (isNew && PHASES[phase] !== undefined) said.push(PHASES[phase]);
+  }
+  for (const [vehicleId, { status }] of now.vehicles) {
+    const earlier = before.vehicles.get(vehicleId)?.status;
+    if (earlier !== undefined && earlier !== status) said.push(...statusSentences(earlier, status, known(vehicleId)));
+  }
+  return said;
+}
+
+function statusSentences(before: VehicleStatus, now: VehicleStatus, { name, minBatteryV }: Known): Sentence[] {
+  const said: Sentence[] = [];
+  if (before.state === "connected" && now.state === "gone") said.push(shout(`Link to ${name} lost.`));
+  if (before.state === "gone" && now.state === "connected") said.push(say(`Link to ${name} is back.`));
+  if (before.armed === false && now.armed === true) said.push(say("Armed."));
+  const step = STEPS[now.step];
+  if (before.step !== now.step && step !== undefined) said.push(step);
+  const wasLow = isLow(before.batteryV, minBatteryV);
+  if (!wasLow && isLow(now.batteryV, minBatteryV)) said.push(shout(`Battery low, ${aloud(now.batteryV ?? 0, "V")}.`));
+  return said;
+}
+
+function isLow(batteryV: number | null, minBatteryV: number | null): boolean {
+  return batteryV !== null && minBatteryV !== null && batteryV < minBatteryV;
+}
+
+const DOWN: ReadonlySet<string> = new Set(["landed", "ended"]);
+
+/** The trials whose flights have just ended. */
+export function justDown(before: News, now: News): number[] {
+  return [...now.flights].flatMap(([trialId, { phase }]) =>
+    DOWN.has(phase) && before.flights.get(trialId)?.phase === "flying" ? [trialId] : [],
+  );
+}
+
+const OUTCOMES: Readonly<Record<string, Sentence>> = {
+  captured: say("Landed, captured"),
+  valid: say("Landed, valid"),
+  invalid: say("Landed, invalid"),
+  aborted: shout("Aborted, landed"),
+  lost: shout("The flight is lost. Look at the vehicle"),
+};
+
+/** `Landed, captured, 0.24 metres.`; null while the flight is not in the record yet. */
+export function outcomeSentence(state: string, error: number | null, unit: string): Sentence | null {
+  const outcome = OUTCOMES[state];
+  if (outcome === undefined) return null;
+  const tells = error !== null && (state === "captured" || state === "valid");
+  return { ...outcome, text: `${outcome.text}${tells ? `, ${aloud(error, unit)}` : ""}.` };
+}

@@ -1,0 +1,38 @@
+/** Which cached answers a change on the server makes doubtful. */
+
+export interface Change {
+  topic: string;
+  entity_id: number;
+  campaign_id: number | null;
+}
+
+export type QueryKey = readonly (string | number)[];
+
+/** What tells of wear. Most of it does not name its vehicle, so that what is known of any vehicle is doubtful. */
+const TELLING = new Set(["campaign", "trial", "flight", "proposal", "vehicle"]);
+
+export function staleQueries(change: Change): QueryKey[] {
+  if (change.topic === "check") return [["checks"]];
+  const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
+  if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
+  if (change.topic === "trial") keys.push(["trial", change.entity_id]);
+  if (change.topic === "vehicle") keys.push(["vehicles"], ["vehicle", change.entity_id]);
+  if (TELLING.has(change.topic)) keys.push(["wear"]);
+  if (change.topic === "job" && change.campaign_id === null) keys.push(["reproductions"]);
+  if (change.campaign_id !== null) keys.push(["campaign", change.campaign_id]);
+  return keys;
+}
+
+/** Each key once, however many changes came together. */
+export function staleQueriesOnce(changes: readonly Change[]): QueryKey[] {
+  const keys = new Map(changes.flatMap(staleQueries).map((key) => [JSON.stringify(key), key]));
+  return [...keys.values()];
+}
+
+export function changeFrom(json: string): Change | null {
+  const parsed: unknown = JSON.parse(json);
+  if (typeof parsed !== "object" || parsed === null) return null;
+  const { topic, entity_id, campaign_id } = parsed as Record<string, unknown>;
+  if (typeof topic !== "string" || typeof entity_id !== "number") return null;
+  return { topic, entity_id, campaign_id: typeof campaign_id === "number" ? campaign_id : null };
+}

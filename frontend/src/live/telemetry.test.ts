@@ -1,0 +1,62 @@
+import { expect, test } from "vitest";
+import { begun, extended, type LiveFlight, readingOf, telemetryFrom, underWay, withFlight } from "./telemetry";
+
+const line = JSON.stringify({
+  type: "telemetry",
+  campaign_id: 1,
+  trial_id: 5,
+  time_s: 0.04,
+  columns: ["time_s", "altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "battery_v"],
+  samples: [
+    [0.02, 0.1, 0.5, 3, 0.1, 0.8, 11.9],
+    [0.04, 0.2, 0.6, 3, 0.1, 0.9, 11.8],
+  ],
+  error_so_far: 2.9,
+});
+
+test("telemetry grows the curve and updates the readings", () => {
+  const news = telemetryFrom(line);
+  if (news === null) throw new Error("the line above is telemetry");
+  const flight = extended(begun(1, 5), news);
+  expect(flight.timeS).toEqual([0.02, 0.04]);
+  expect(flight.measured).toEqual([0.1, 0.2]);
+  expect([flight.thrust, flight.batteryV, flight.errorSoFar]).toEqual([0.9, 11.8, 2.9]);
+});
+
+test("another experiment sends other columns, the scored one second", () => {
+  const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
+  const columns = ["time_s", "pitch_error_rad", "elevator_rad"];
+  const flight = extended(begun(1, 5), { ...news, columns, samples: [[1, -0.02, 0.1]] });
+  expect([flight.channel, flight.measured, flight.thrust, flight.batteryV]).toEqual([
+    "pitch_error_rad",
+    [-0.02],
+    null,
+    null,
+  ]);
+  expect(readingOf(flight.channel)).toEqual({ title: "Pitch error", unit: "rad", digits: 3 });
+});
+
+test("samples that come twice after a reconnect are drawn once", () => {
+  const news = telemetryFrom(line);
+  if (news === null) throw new Error("the line above is telemetry");
+  expect(extended(extended(begun(1, 5), news), news).timeS).toEqual([0.02, 0.04]);
+});
+
+test("flights of long ago are forgotten, those under way are not", () => {
+  let flights: ReadonlyMap<number, LiveFlight> = new Map();
+  for (let trial = 1; trial <= 20; trial += 1) {
+    flights = withFlight(withFlight(flights, begun(1, trial)), begun(1, 99));
+  }
+  expect([...flights.keys()]).toEqual([14, 15, 16, 17, 18, 19, 20, 99]);
+});
+
+test("what waits on the ground, has landed or ended is not under way: Space is a blank again there", () => {
+  const phases = ["staging", "staged", "flying", "landed", "ended"];
+  const flights = new Map(phases.map((phase, trialId) => [trialId, { ...begun(1, trialId), phase }]));
+  expect(underWay(flights).map(({ phase }) => phase)).toEqual(["staging", "flying"]);
+});
+
+test("a line that is no telemetry is left alone", () => {
+  expect(telemetryFrom('{"type":"telemetry"}')).toBeNull();
+  expect(telemetryFrom("null")).toBeNull();
+});

@@ -1,0 +1,80 @@
+import { expect, test } from "vitest";
+import { aged, ageText, before, type LastHeard, linkText, secondsBetween, statusFrom, stepWord } from "./vehicleStatus";
+
+const line = JSON.stringify({
+  type: "vehicle",
+  vehicle_id: 3,
+  state: "connected",
+  at: "2026-05-04T10:00:00Z",
+  step: "record",
+  packet_age_s: 0.1,
+  heartbeat_age_s: 0.4,
+  armed: true,
+  mode: "NAV",
+  altitude_m: 2.9,
+  climb_rate_m_s: 0.2,
+  battery_v: 11.4,
+  position_hz: 51.2,
+  lost_share: 0,
+  held: { kp: 283, ki: 13, kd: 82 },
+  said: "",
+  trouble: "",
+  concern: "",
+});
+
+function heard(change: Record<string, unknown> = {}): LastHeard {
+  const status = statusFrom(JSON.stringify({ ...(JSON.parse(line) as object), ...change }));
+  if (status === null) throw new Error("the line above is a status");
+  return { status, heardAt: { wallMs: 50_000, steadyMs: 1_000 } };
+}
+
+const after = (seconds: number) => ({ wallMs: 50_000 + 1000 * seconds, steadyMs: 1_000 + 1000 * seconds });
+
+test("a status is read with its gains and its units", () => {
+  const { status } = heard();
+  expect([status.vehicleId, status.step, status.altitudeM, status.batteryV]).toEqual([3, "record", 2.9, 11.4]);
+  expect(status.held).toEqual({ kp: 283, ki: 13, kd: 82 });
+  expect(stepWord(status.step)).toBe("Recording");
+});
+
+test("the age counts on while nothing comes, and after two seconds nothing is current", () => {
+  const soon = aged(heard(), after(1));
+  expect([soon.linkAgeS, soon.isCurrent, linkText(soon)]).toEqual([1.1, true, "1.1 s"]);
+  const late = aged(heard(), after(2));
+  expect([late.isCurrent, linkText(late)]).toEqual([false, "silent for 2.1 s"]);
+  expect(linkText(aged(heard(), after(200)))).toBe("silent for 3 min");
+});
+
+test("a status that is told once more is as old as it was said, not as it was told", () => {
+  const { status } = heard({ age_s: 1.95 });
+  const now = after(0);
+  const replayed = aged({ status, heardAt: before(now, status.ageS) }, now);
+  expect([replayed.linkAgeS, replayed.isCurrent]).toEqual([2.05, false]);
+});
+
+test("news that come while the vehicle itself is silent do not make it current", () => {
+  const silent = aged(heard({ packet_age_s: 7 }), after(0));
+  expect([silent.isCurrent, linkText(silent)]).toEqual([false, "silent for 7.0 s"]);
+});
+
+test("a vehicle that is gone or being sought is not current, however new the news", () => {
+  expect(aged(heard({ state: "gone" }), after(0)).isCurrent).toBe(false);
+  expect(linkText(aged(heard({ state: "gone" }), after(0)))).toBe("link gone");
+  expect(linkText(aged(heard({ state: "connecting", packet_age_s: null }), after(0)))).toBe("connecting");
+  expect(linkText(null)).toBe("no news of it");
+  expect(ageText(null)).toBe("never heard");
+});
+
+test("a clock that was set back, or that slept, does not make old news new", () => {
+  const from = { wallMs: 50_000, steadyMs: 1_000 };
+  expect(secondsBetween(from, { wallMs: 10_000, steadyMs: 9_000 })).toBe(8);
+  expect(secondsBetween(from, { wallMs: 60_000, steadyMs: 1_200 })).toBe(10);
+  expect(secondsBetween(from, { wallMs: 49_000, steadyMs: 900 })).toBe(0);
+});
+
+test("what is not known stays unknown, and a line that is no status is left alone", () => {
+  const { status } = heard({ altitude_m: null, armed: null, held: {}, battery_v: "full" });
+  expect([status.altitudeM, status.armed, status.batteryV, status.held]).toEqual([null, null, null, {}]);
+  expect(statusFrom('{"type":"vehicle","vehicle_id":3,"state":"asleep"}')).toBeNull();
+  expect(statusFrom("null")).toBeNull();
+});

@@ -1,0 +1,13 @@
+/** Every page that is not looked at first, in one piece: it comes while the first page is idle. */
+
+export { FlightPage } from "./features/campaign/FlightPage";
+export { NewCampaignPage } from "./features/campaigns/NewCampaignPage";
+export { ControllerPage } from "./features/checks/ControllerPage";
+export { ComparePage } from "./features/compare/ComparePage";
+export { NewVehiclePage } from "./features/fleet/NewVehiclePage";
+export { VehiclePage } from "./features/fleet/VehiclePage";
+export { VehiclesPage } from "./features/fleet/VehiclesPage";
+export { FlyPage } from "./features/fly/FlyPage";
+export { JobsPage } from "./features/jobs/JobsPage";
+export { ReproductionsPage } from "./features/jobs/ReproductionsPage";
+export { SettingsPage } from "./features/settings/SettingsPage";

@@ -1,0 +1,99 @@
+import { IconPlaneDeparture } from "@tabler/icons-react";
+import { type PointerEvent, useCallback, useEffect, useId, useRef, useState } from "react";
+import classes from "./HoldButton.module.css";
+import { type Hold, holdProgress } from "./hold";
+
+interface Props {
+  label: string;
+  disabled?: boolean;
+  onHeld: () => void;
+}
+
+const AROUND = 2 * Math.PI * 20;
+
+/** Does its act after two seconds under a finger or a pointer; letting go earlier cancels. Keys do nothing here. */
+export function HoldButton({ label, disabled = false, onHeld }: Props) {
+  const [share, setShare] = useState<number | null>(null);
+  const pointer = useRef<number | null>(null);
+  const frame = useRef(0);
+  const note = useId();
+  const act = useRef(onHeld);
+  act.current = onHeld;
+
+  const letGo = useCallback((): void => {
+    cancelAnimationFrame(frame.current);
+    pointer.current = null;
+    setShare(null);
+  }, []);
+
+  const watch = useCallback(
+    (hold: Hold): void => {
+      frame.current = requestAnimationFrame(() => {
+        if (pointer.current === null) return;
+        const now = holdProgress(hold, performance.now());
+        if (now.kind === "holding") {
+          setShare(now.share);
+          watch(now.hold);
+          return;
+        }
+        letGo();
+        if (now.kind === "done") act.current();
+      });
+    },
+    [letGo],
+  );
+
+  function press(event: PointerEvent<HTMLButtonElement>): void {
+    if (disabled || event.button !== 0 || pointer.current !== null) return;
+    // A finger that slides off the button has let go, too.
+    event.currentTarget.releasePointerCapture(event.pointerId);
+    pointer.current = event.pointerId;
+    const now = performance.now();
+    setShare(0);
+    watch({ sinceMs: now, seenMs: now });
+  }
+
+  useEffect(() => {
+    window.addEventListener("blur", letGo);
+    document.addEventListener("visibilitychange", letGo);
+    return () => {
+      window.removeEventListener("blur", letGo);
+      document.removeEventListener("visibilitychange", letGo);
+      cancelAnimationFrame(frame.current);
+    };
+  }, [letGo]);
+
+  useEffect(() => {
+    if (disabled) letGo();
+  }, [disabled, letGo]);
+
+  const release = (event: PointerEvent<HTMLButtonElement>): void => {
+    if (event.pointerId === pointer.current) letGo();
+  };
+  return (
+    <div>
+      <button
+        type="button"
+        className={classes["hold"]}
+        data-holding={share !== null || undefined}
+        disabled={disabled}
+        aria-describedby={note}
+        onPointerDown={press}
+        onPointerUp={release}
+        onPointerCancel={release}
+        onPointerLeave={release}
+        onContextMenu={(event) => event.preventDefault()}
+      >
+        <svg viewBox="0 0 48 48" width={56} height={56} className={classes["ring"]} aria-hidden>
+          <circle cx={24} cy={24} r={20} />
+          <circle cx={24} cy={24} r={20} strokeDasharray={AROUND} strokeDashoffset={AROUND * (1 - (share ?? 0))} />
+          <IconPlaneDeparture x={13} y={13} size={22} />
+        </svg>
+        <span>{share === null ? label : `Hold on: ${(2 * (1 - share)).toFixed(1)} s`}</span>
+      </button>
+      <p id={note} className={classes["note"]}>
+        Two seconds, by finger or pointer. Letting go earlier cancels; no key does it.
+      </p>
+    </div>
+  );
+}

@@ -1,0 +1,22 @@
+import type { Topic } from "./explanations";
+import { HelpTip } from "./HelpTip";
+
+interface Props {
+  title: string;
+  value: string;
+  topic?: Topic;
+  bad?: boolean;
+  stale?: boolean;
+}
+
+/** One reading with its name; grey is what is no longer so. */
+export function LabelledValue({ title, value, topic, bad = false, stale = false }: Props) {
+  return (
+    <div data-bad={bad || undefined} data-stale={stale || undefined}>
+      <dt>
+        {title} {topic && <HelpTip topic={topic} />}
+      </dt>
+      <dd>{value}</dd>
+    </div>
+  );
+}

@@ -1,0 +1,39 @@
+import { TextInput, type TextInputProps } from "@mantine/core";
+import { useState } from "react";
+import { readNumber, typed } from "./numbers";
+
+/** A number, or the text that is not one yet. */
+export type NumberEntry = number | string;
+
+interface Props extends Omit<TextInputProps, "value" | "onChange"> {
+  value: NumberEntry;
+  onChange: (value: NumberEntry) => void;
+  suffix?: string;
+  /** What an empty field stands for; a field without it has to be filled or says so by `required`. */
+  empty?: number;
+}
+
+/** A number to type. What reads as one is passed on as a number, anything else as the text it is, with the reason. */
+export function NumberField({ value, onChange, suffix, empty, error, required = false, ...props }: Props) {
+  const written = typeof value === "number" ? typed(value) : value;
+  const [text, setText] = useState(written);
+  const meant = (typing: string): NumberEntry =>
+    typing.trim() === "" ? (empty ?? "") : (readNumber(typing).value ?? typing);
+  const shown = meant(text) === value ? text : written;
+  const wrong = shown.trim() === "" && !required ? undefined : readNumber(shown).reason;
+  return (
+    <TextInput
+      inputMode="decimal"
+      autoComplete="off"
+      placeholder={empty === undefined ? undefined : typed(empty)}
+      value={shown}
+      error={wrong ?? error}
+      rightSection={suffix?.trim()}
+      onChange={(event) => {
+        setText(event.currentTarget.value);
+        onChange(meant(event.currentTarget.value));
+      }}
+      {...props}
+    />
+  );
+}

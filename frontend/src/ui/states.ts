@@ -1,0 +1,67 @@
+/** What the states are called on a page, and how much they ask for attention. */
+
+import type { Campaign, CampaignState, TrialState } from "../api/types";
+
+export type Tone = "quiet" | "good" | "busy" | "bad";
+
+export interface StateLabel {
+  word: string;
+  tone: Tone;
+}
+
+const CAMPAIGN: Record<CampaignState, StateLabel> = {
+  draft: { word: "Preparing", tone: "busy" },
+  ready: { word: "Ready to fly", tone: "quiet" },
+  flying: { word: "Flying", tone: "busy" },
+  deciding: { word: "Between flights", tone: "quiet" },
+  finished: { word: "Finished", tone: "good" },
+  archived: { word: "Archived", tone: "quiet" },
+};
+
+const OUTCOME: Record<string, StateLabel> = {
+  converged: { word: "Converged", tone: "good" },
+  budget: { word: "Flight budget used", tone: "good" },
+  stopped: { word: "Stopped by the operator", tone: "quiet" },
+};
+
+type RehearsalState = Campaign["rehearsal"]["state"];
+
+/** What a campaign on a real vehicle waits for, where anything else would say that it may fly. */
+const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
+  missing: { word: "To be rehearsed first", tone: "quiet" },
+  "under way": { word: "Being rehearsed", tone: "busy" },
+  failed: { word: "Rehearsal failed", tone: "bad" },
+};
+
+export function campaignStateLabel(
+  state: CampaignState,
+  outcome: string | null,
+  rehearsal: RehearsalState = "not needed",
+): StateLabel {
+  if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
+  const mayFly = state === "ready" || state === "deciding";
+  return (mayFly && REHEARSAL[rehearsal]) || CAMPAIGN[state];
+}
+
+const TRIAL: Record<TrialState, StateLabel> = {
+  planned: { word: "Planned", tone: "quiet" },
+  staged: { word: "Gains set", tone: "busy" },
+  flying: { word: "Flying", tone: "busy" },
+  captured: { word: "To be judged", tone: "busy" },
+  valid: { word: "Valid", tone: "good" },
+  aborted: { word: "Aborted", tone: "bad" },
+  invalid: { word: "Invalid", tone: "bad" },
+  cancelled: { word: "Cancelled", tone: "quiet" },
+  lost: { word: "Lost", tone: "bad" },
+};
+
+export function trialStateLabel(state: TrialState): StateLabel {
+  return TRIAL[state];
+}
+
+/** Trials with a flight behind them; the others are plans. */
+const FLOWN: ReadonlySet<TrialState> = new Set<TrialState>(["captured", "valid", "aborted", "invalid", "lost"]);
+
+export function wasFlown(state: TrialState): boolean {
+  return FLOWN.has(state);
+}

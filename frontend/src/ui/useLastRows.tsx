@@ -1,0 +1,19 @@
+import { Button } from "@mantine/core";
+import { useState } from "react";
+import { lastRows, MORE_ROWS, ROWS } from "./rows";
+
+/** The end of a long table, and a row at its head that brings more of it. */
+export function useLastRows<T>(rows: readonly T[], columns: number, what: string, kept: (row: T) => boolean) {
+  const [count, setCount] = useState(ROWS);
+  const hidden = Math.max(0, rows.length - count);
+  const more = hidden > 0 && (
+    <tr>
+      <td colSpan={columns} style={{ textAlign: "left" }}>
+        <Button variant="default" onClick={() => setCount(count + MORE_ROWS)}>
+          Show {Math.min(MORE_ROWS, hidden)} earlier {what} ({hidden} are not listed)
+        </Button>
+      </td>
+    </tr>
+  );
+  return { more, listed: lastRows(rows, count, kept) };
+}
