@@ -225,9 +225,9 @@ def record_connected(
     held: Mapping[str, float] | None = None,
 ) -> None:
     """The link is open. The vehicle is ready, or quarantined when there is a `concern`, be it one from before; its
-    identity is pinned the first time without a concern, its version the first time that it tells one: a vehicle that
-    is not pinned is given nothing, for nobody has decided yet about the gains that it was found with. `held`: its
-    gains, where it said them."""
+    identity is pinned the first time without a concern, its version and hardware id the first time that it tells them:
+    a vehicle that is not pinned is given nothing, for nobody has decided yet about the gains that it was found with.
+    `held`: its gains, where it said them."""
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
     if not concern:
@@ -238,7 +238,7 @@ def record_connected(
 
 
 def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
-    """Who answers, where that is not known yet; some tell their version only after a while."""
+    """Who answers, where that is not known yet; some tell all of it only after a while."""
     _pin(repository.get_one(session, vehicle_id), identity)
 
 
@@ -261,7 +261,7 @@ def record_released(session: Session, vehicle_id: int, *, identity: Identity | N
     row = repository.get_one(session, vehicle_id)
     row.concern = ""
     if identity is not None:
-        row.identity = asdict(identity)
+        row.identity = asdict(identity.completed_by(_pinned(row)))
     _move_to(row, VehicleState.READY)
 
 
@@ -297,7 +297,7 @@ def _linked(row: VehicleRow) -> LinkedVehicle:
         is_real=row.is_real,
         options=settings_of(row),
         safe_gains=dict(row.safe_gains),
-        identity=None if row.identity is None else Identity(**row.identity),
+        identity=_pinned(row),
     )
 
 
@@ -306,9 +306,14 @@ def _was_given(row: VehicleRow, read_back: Gains | None) -> bool:
     return row.identity is not None and read_back is not None
 
 
+def _pinned(row: VehicleRow) -> Identity | None:
+    return None if row.identity is None else Identity(**row.identity)
+
+
 def _pin(row: VehicleRow, identity: Identity) -> None:
-    if row.identity is None or not row.identity["version"]:
-        row.identity = asdict(identity)
+    """What is pinned stays so; what was not told until now is added."""
+    pinned = _pinned(row)
+    row.identity = asdict(identity if pinned is None else pinned.completed_by(identity))
 
 
 def _move_to(row: VehicleRow, state: VehicleState) -> None:

@@ -66,6 +66,7 @@ class Identity(BaseModel):
     system_id: int
     autopilot: str
     version: Annotated[str, Field(description="empty where the autopilot does not tell")]
+    uid: Annotated[str, Field(description="hardware id in hexadecimal digits; empty where it is not told")] = ""
 
 
 class VehicleCheck(BaseModel):

@@ -42,7 +42,8 @@ def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Ident
     ]
     if identity is not None:
         known = f"{identity.autopilot} {identity.version}".strip()
-        facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}"))
+        hardware = f", hardware id {identity.uid}" if identity.uid else ""
+        facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}"))
     facts += _options(vehicle.options, () if kind is None else kind.options)
     facts.append(Fact("Experiment", experiment.title))
     facts += _options(campaign.definition.experiment_options, experiment.options)

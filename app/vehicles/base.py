@@ -1,7 +1,7 @@
 """The seam between the program and anything that flies."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal, Protocol
 
@@ -116,12 +116,19 @@ class Vehicle(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """Who a vehicle is: its MAVLink system id, the make of its autopilot, and what that tells of its version (empty
-    where it does not tell)."""
+    """Who a vehicle is: its MAVLink system id, the make of its autopilot, what that tells of its version, and `uid`,
+    its hardware's own id in hexadecimal digits. Both are empty where it does not tell them."""
 
     system_id: int
     autopilot: str
     version: str
+    uid: str = ""
+
+    def completed_by(self, other: "Identity | None") -> "Identity":
+        """With the other's version and hardware id where this one has none."""
+        if other is None:
+            return self
+        return replace(self, version=self.version or other.version, uid=self.uid or other.uid)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from datetime import timedelta
 import pytest
 from fastapi.testclient import TestClient
 
-from app.db.models import VehicleActRow
+from app.db.models import VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
@@ -429,6 +429,41 @@ def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
         return str(seen(client, vehicle)["identity"]["version"])
 
     assert [connected_as(version) for version in ("", "5.18", "", "5.20")] == ["", "5.18", "5.18", "5.18"]
+
+
+def test_the_hardware_id_is_pinned_when_it_is_told_and_changed_by_a_release_alone(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = register(client)
+
+    def connected_as(uid: str) -> str:
+        with database.write() as session:
+            identity = Identity(system_id=1, autopilot="px4", version="1.16.0", uid=uid)
+            acts.record_connected(session, vehicle["id"], identity)
+            acts.record_disconnected(session, vehicle["id"])
+        return str(seen(client, vehicle)["identity"]["uid"])
+
+    assert [connected_as(uid) for uid in ("", "0a", "", "0b")] == ["", "0a", "0a", "0a"]
+    with database.write() as session:
+        accepted = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0b")
+        acts.record_released(session, vehicle["id"], identity=accepted)
+    assert seen(client, vehicle)["identity"]["uid"] == "0b"
+
+
+def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    with database.write() as session:
+        row = session.get(VehicleRow, vehicle["id"])
+        assert row is not None
+        row.identity = {"system_id": 1, "autopilot": "paparazzi", "version": "5.18"}
+    assert seen(client, vehicle)["identity"]["uid"] == ""
+    with database.write() as session:
+        assert acts.linked_vehicle(session, vehicle["id"]).identity == IDENTITY
+        acts.pin_identity(session, vehicle["id"], Identity(system_id=1, autopilot="paparazzi", version="", uid="0a"))
+    pinned = {"system_id": 1, "autopilot": "paparazzi", "version": "5.18", "uid": "0a"}
+    assert seen(client, vehicle)["identity"] == pinned
 
 
 def test_an_order_past_the_database_is_written_down_afterwards(client: TestClient, database: Database) -> None:

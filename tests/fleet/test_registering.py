@@ -161,7 +161,7 @@ def test_the_link_changes_only_while_it_is_closed_and_pins_the_identity_anew(
     client: TestClient, database: Database
 ) -> None:
     vehicle = create_connected(client, database)
-    assert vehicle["identity"] == {"system_id": 1, "autopilot": "paparazzi", "version": "5.18"}
+    assert vehicle["identity"] == {"system_id": 1, "autopilot": "paparazzi", "version": "5.18", "uid": ""}
     path = f"/api/vehicles/{vehicle['id']}"
     change = {"version": 1, "options": {"system_id": 5}}
     assert "connected" in client.patch(path, json=change).json()["detail"]

@@ -111,9 +111,10 @@ class BlockEntered:
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """What the autopilot's firmware calls itself."""
+    """What the autopilot's firmware calls itself, and its hardware's own id; either empty where it is not told."""
 
     version: str
+    uid: str = ""
 
 
 Measurement = (

@@ -11,7 +11,7 @@ from typing import Final
 from app.vehicles.base import CheckItem, Identity
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.measurements import DISARMING, CommandReply, Heartbeat, Position
+from app.vehicles.mavlink.measurements import DISARMING, CommandReply, Heartbeat, Position, Version
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
@@ -23,7 +23,6 @@ WATCHED_S: Final = 2.0
 POSITIONS_HZ: Final = 40.0
 SIGHTINGS_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight from here was interrupted."
-_HEARTBEATS_MISSED: Final = 3.5
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
@@ -104,12 +103,18 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     except VehicleError as error:
         problem = str(error)
     radio.send(*radio.profile.conclude(radio.aim))
-    asking = radio.profile.ask_version(radio.aim)
-    if asking is not None:
-        radio.request(asking, lambda _: bool(radio.seen.version), attempts=_VERSION_ATTEMPTS)
+    identify(radio)
     has = tuple(name for name in radio.profile.stop_settings if _has(radio, name))
     radio.aim = replace(radio.aim, stop_settings=has)
     return problem
+
+
+def identify(radio: AutopilotLink) -> None:
+    """Ask a vehicle that has not told its version and its hardware's id, or not since it was last away. Some never
+    answer, and Paparazzi tells unasked."""
+    asking = radio.profile.ask_version(radio.aim)
+    if asking is not None and not radio.seen.version and not radio.seen.uid:
+        radio.request(asking, lambda heard: isinstance(heard, Version), attempts=_VERSION_ATTEMPTS)
 
 
 def _has(radio: AutopilotLink, parameter: str) -> bool:
@@ -130,10 +135,23 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
 
 def identity_change(radio: AutopilotLink, pinned: Identity | None) -> str:
     """How the vehicle differs from the one that was pinned, where both tell; nothing when it does not."""
-    version = radio.seen.version
-    if pinned is None or not version or not pinned.version or version == pinned.version:
+    version, uid = radio.seen.version, radio.seen.uid
+    if pinned is None:
+        return ""
+    if is_another(radio, pinned):
+        return (
+            f"Another vehicle answers, and nothing is written to it: its hardware id is {uid}, that of the pinned one "
+            f"is {pinned.uid}. Register it as a vehicle of its own, or release it to take it as this one from now on."
+        )
+    if not version or not pinned.version or version == pinned.version:
         return ""
     return f"Its firmware is now version {version}; it was {pinned.version}."
+
+
+def is_another(radio: AutopilotLink, pinned: Identity | None) -> bool:
+    """By its hardware's id, where it and the pinned one have told theirs."""
+    uid = radio.seen.uid
+    return pinned is not None and bool(uid and pinned.uid) and uid != pinned.uid
 
 
 def is_armed(radio: AutopilotLink) -> bool:
@@ -241,7 +259,7 @@ def _heartbeat(radio: AutopilotLink) -> CheckItem:
     heartbeat = radio.seen.heartbeat
     make = heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot
     version = f" {radio.seen.version}" if radio.seen.version else ""
-    oldest_s = _HEARTBEATS_MISSED * radio.profile.heartbeat_s * radio.timeout_factor
+    oldest_s = radio.silence_s
     return CheckItem(
         name="heartbeat",
         title="Heartbeat",

@@ -25,6 +25,7 @@ from app.vehicles.mavlink.signals import Action, ActionDone, ActionRefused, Pack
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
+HEARTBEATS_MISSED: Final = 3.5
 _POSITIONS: Final = 1000
 _SPOKEN: Final = 5
 
@@ -39,6 +40,7 @@ class VehicleMemory:
     disarmed_since_s: float | None = None
     """Since when every heartbeat has said so."""
     version: str = ""
+    uid: str = ""
     block: int | None = None
     block_s: float = float("-inf")
     battery_v: float | None = None
@@ -54,8 +56,8 @@ class VehicleMemory:
                 self.heartbeat, self.heartbeat_s = measurement, now_s
                 since_s = now_s if self.disarmed_since_s is None else self.disarmed_since_s
                 self.disarmed_since_s = None if armed else since_s
-            case Version(version=version):
-                self.version = version
+            case Version(version=version, uid=uid):
+                self.version, self.uid = version or self.version, uid or self.uid
             case BlockEntered(number=number):
                 self.block, self.block_s = number, now_s
             case Battery(voltage_v=volts, may_arm=may_arm):
@@ -106,6 +108,11 @@ class AutopilotLink:
         return self.patience_s / REPLY_TIMEOUT_S
 
     @property
+    def silence_s(self) -> float:
+        """A vehicle that has sent no heartbeat for so long is not there."""
+        return HEARTBEATS_MISSED * self.profile.heartbeat_s * self.timeout_factor
+
+    @property
     def is_disarmed(self) -> bool:
         """By two heartbeats at least, and none between them that says otherwise."""
         seen = self.seen
@@ -139,6 +146,8 @@ class AutopilotLink:
             if self._is_autopilots(received.message)
         ]
         for each in heard:
+            if isinstance(each.measurement, Heartbeat) and each.now_s - self.seen.heartbeat_s > self.silence_s:
+                self.seen.version = self.seen.uid = ""  # another may have come in its place
             self.seen.note(each.measurement, each.now_s)
         return heard
 

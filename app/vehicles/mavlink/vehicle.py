@@ -34,6 +34,7 @@ STANDSTILL_S: Final = 1.0
 _LISTEN_S: Final = 0.1
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
+_ANOTHER: Final = "See which vehicle it is, then ask again."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
@@ -105,7 +106,7 @@ class MavlinkVehicle:
         """Write every gain and return what was read back. Raises GainsError for gains that may not be written (nothing
         is changed then), VehicleError when the vehicle does not confirm, SafeGainsError in quarantine."""
         self._require_not_quarantined()
-        self._listen(0.0)
+        self._identify()
         self._require_not_quarantined()
         if self._state is State.IDLE:
             self._enter(State.SET_GAINS)
@@ -162,9 +163,10 @@ class MavlinkVehicle:
 
     @property
     def identity(self) -> Identity:
-        """Its version comes when the vehicle tells it, with some only after a while."""
-        seen = self._radio.seen
-        return Identity(system_id=self._radio.aim.system, autopilot=self._radio.profile.name, version=seen.version)
+        """As it tells it, with some only after a while; what it has not told is as it was pinned."""
+        radio, seen = self._radio, self._radio.seen
+        told = Identity(system_id=radio.aim.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid)
+        return told.completed_by(self._pinned)
 
     @property
     def concern(self) -> str:
@@ -210,9 +212,11 @@ class MavlinkVehicle:
 
     def restore(self) -> dict[str, float]:
         """Write the safe gains and return what was read back, which is them; a vehicle in doubt stays so. Raises
-        SafeGainsError when it is armed or does not take them."""
-        self._listen(0.0)
+        SafeGainsError when it is armed, is another one, or does not take them."""
+        self._identify()
         preflight.require_disarmed(self._radio)
+        if preflight.is_another(self._radio, self._pinned):
+            raise SafeGainsError(self.concern, hint=_ANOTHER)
         if problem := self._put_back():
             raise SafeGainsError(f"The vehicle does not take what it had: {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
@@ -238,14 +242,21 @@ class MavlinkVehicle:
 
     def release(self) -> None:
         """A person has looked at it, also at who it is now: out of observation, once it is disarmed and holds its safe
-        gains, read back. Raises VehicleError when it is not heard, is armed, or does not hold them; it stays as it was
-        then."""
+        gains, read back. Raises VehicleError when it is not heard, is armed, does not hold them, or differs from the
+        pinned one in what that person has not seen; it stays as it was then."""
+        seen = self._why
         self._await_heartbeat()
-        self._decided = True
-        self._set_up()
+        self._identify()
+        if (change := preflight.identity_change(self._radio, self._pinned)) not in seen:
+            raise SafeGainsError(change, hint=_ANOTHER)
+        pinned, self._pinned, self._decided = self._pinned, self.identity, True
+        try:
+            self._set_up()
+        except BaseException:
+            self._pinned = pinned
+            raise
         if self._state in QUARANTINE_STATES:
             self._enter(State.IDLE)
-        self._pinned = self.identity
         self._why = self._asked = ""
         self._order = None
 
@@ -264,6 +275,7 @@ class MavlinkVehicle:
             self._observe(str(error) if not self._decided else f"Its safe gains could not be verified: {error}")
             return
         self._decided = True
+        self._pinned = self.identity
         self._enter(State.SET_GAINS)
         self._enter(State.IDLE)
 
@@ -298,15 +310,22 @@ class MavlinkVehicle:
                 raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
             self._listen(_LISTEN_S)
 
+    def _identify(self) -> None:
+        """Before anything is written: one that has been away may be another by now."""
+        preflight.identify(self._radio)
+        self._listen(0.0)
+
     def _listen(self, timeout_s: float) -> list[PacketReceived]:
-        """Between flights: a vehicle that somebody else arms, or that tells another version than the pinned one, is
-        only observed from then on."""
+        """Between flights: a vehicle that somebody else arms, or that tells another version or hardware id than the
+        pinned one, is only observed from then on."""
         heard = self._radio.listen(timeout_s)
-        why = (
-            preflight.ARMED if preflight.is_armed(self._radio) else preflight.identity_change(self._radio, self._pinned)
-        )
-        if why and self._state not in QUARANTINE_STATES:
-            self._observe(why)
+        armed = preflight.ARMED if preflight.is_armed(self._radio) else ""
+        change = preflight.identity_change(self._radio, self._pinned)
+        if self._state not in QUARANTINE_STATES:
+            if why := f"{armed} {change}".strip():
+                self._observe(why)
+        elif change not in self._why:
+            self._why = f"{self._why} {change}"
         return heard
 
     # ---- flying
@@ -326,6 +345,7 @@ class MavlinkVehicle:
         return watched.ground
 
     def _check(self, watched_s: float) -> tuple[preflight.GroundObservation, tuple[CheckItem, ...]]:
+        self._identify()
         if not preflight.is_armed(self._radio) and self._state not in QUARANTINE_STATES:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)

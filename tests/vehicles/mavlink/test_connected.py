@@ -108,6 +108,94 @@ def test_a_new_version_that_is_told_only_later_is_a_concern_until_a_person_has_l
         assert (vehicle.concern, vehicle.stage(TUNED)) == ("", TUNED)
 
 
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_another_vehicle_of_the_same_make_and_version_is_only_observed_until_a_person_takes_it_as_this_one(
+    autopilot: str,
+) -> None:
+    with LockstepRig(autopilot) as rig:
+        with connected(rig) as vehicle:
+            known = vehicle.identity
+            assert int(known.uid, 16) != 0
+        with connected(rig, replace(known, uid="00112233")) as vehicle:
+            assert f"its hardware id is {known.uid}, that of the pinned one is 00112233" in vehicle.concern
+            assert "Register it as a vehicle of its own, or release it to take it as this one" in vehicle.concern
+            written = list(rig.writes)
+            with pytest.raises(SafeGainsError, match="hardware id"):
+                vehicle.stage(OWN_SAFE[autopilot])
+            with pytest.raises(SafeGainsError, match="hardware id"):
+                vehicle.restore()
+            vehicle.attend(1.0)
+            assert rig.writes == written
+            vehicle.release()
+            assert (vehicle.concern, vehicle.identity) == ("", known)
+            assert vehicle.stage(OWN_SAFE[autopilot]) == OWN_SAFE[autopilot]
+
+
+@pytest.mark.parametrize(("pinned", "told"), [("", 7), ("0000000000000007", 0)])
+def test_a_hardware_id_that_is_not_known_yet_or_not_told_this_time_is_no_other_one(pinned: str, told: int) -> None:
+    """Pinned by a release that did not look at it; a firmware that tells it late, or not at all."""
+    with LockstepRig("px4") as rig:
+        rig.drone.autopilot.uid = told  # type: ignore[attr-defined]
+        pin = Identity(system_id=1, autopilot="px4", version="1.16.0", uid=pinned)
+        with connected(rig, pin) as vehicle:
+            assert (vehicle.concern, vehicle.identity.uid) == ("", "0000000000000007")
+            rig.drone.autopilot.uid = 9  # type: ignore[attr-defined]
+            vehicle._radio.send(vehicle._radio.profile.ask_version(vehicle._radio.aim))  # type: ignore[arg-type]
+            vehicle.attend(0.5)
+            assert "hardware id is 0000000000000009" in vehicle.concern
+
+
+def swap(rig: LockstepRig, vehicle: MavlinkVehicle, uid: int) -> None:
+    """Another drone of the same type is switched on in the place of this one."""
+    rig.muted = True
+    vehicle.attend(8.0)
+    rig.drone.autopilot.uid = uid  # type: ignore[attr-defined]
+    rig.muted = False
+
+
+def test_a_vehicle_that_is_swapped_while_the_link_stays_open_is_asked_who_it_is_before_anything_is_written() -> None:
+    with LockstepRig("px4") as rig, connected(rig) as vehicle:
+        known = vehicle.identity
+        swap(rig, vehicle, 9)
+        vehicle.attend(3.0)
+        written = list(rig.writes)
+        with pytest.raises(SafeGainsError, match="hardware id is 0000000000000009"):
+            vehicle.stage(OWN_SAFE["px4"])
+        assert rig.writes == written
+        swap(rig, vehicle, int(known.uid, 16))
+        vehicle.attend(3.0)
+        vehicle.release()
+        assert (vehicle.concern, vehicle.identity) == ("", known)
+
+
+def test_a_vehicle_that_is_swapped_after_it_was_staged_is_not_flown() -> None:
+    with LockstepRig("px4") as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            vehicle.attend(2.0)
+            vehicle.stage(OWN_SAFE["px4"])
+            swap(rig, vehicle, 9)
+            vehicle.attend(3.0)
+            written = list(rig.writes)
+            with pytest.raises(VehicleError, match="hardware id is 0000000000000009") as refusal:
+                vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+            assert refusal.value.not_flown
+            assert rig.writes == written
+
+
+def test_a_vehicle_that_is_swapped_while_it_is_quarantined_is_not_taken_for_the_one_that_a_person_released() -> None:
+    with LockstepRig("px4") as rig, connected(rig) as vehicle:
+        vehicle._observe("Somebody else armed it.")
+        swap(rig, vehicle, 9)
+        written = list(rig.writes)
+        with pytest.raises(VehicleError, match="hardware id is 0000000000000009"):
+            vehicle.release()
+        assert rig.writes == written
+        assert "Somebody else armed it. Another vehicle answers" in vehicle.concern
+        vehicle.release()
+        assert (vehicle.concern, vehicle.identity.uid) == ("", "0000000000000009")
+
+
 def test_a_release_verifies_the_gains_also_of_a_vehicle_that_seems_to_be_in_order() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)

@@ -400,6 +400,25 @@ def test_a_version_is_read_as_each_autopilot_writes_it() -> None:
     assert heard(PX4, "AUTOPILOT_VERSION", flight_sw_version=0, **nothing) is None
 
 
+@pytest.mark.parametrize(
+    ("uid", "uid2", "told"),
+    [
+        (0x0102030405060708, [0] * 18, "0102030405060708"),
+        (0x0102030405060708, [0xAB, *range(17)], "ab000102030405060708090a0b0c0d0e0f10"),
+        (0, [0] * 18, ""),
+    ],
+)
+def test_the_hardware_id_is_the_longer_one_where_it_is_told(uid: int, uid2: list[int], told: str) -> None:
+    nothing: dict[str, FieldValue] = {
+        **dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8),
+        **dict.fromkeys(("capabilities", "middleware_sw_version", "os_sw_version", "board_version"), 0),
+        **dict.fromkeys(("vendor_id", "product_id"), 0),
+    }
+    for profile in (ARDUPILOT, PX4):
+        heard_of = heard(profile, "AUTOPILOT_VERSION", flight_sw_version=0x01100000, uid=uid, uid2=uid2, **nothing)
+        assert heard_of == Version("1.16.0", told)
+
+
 def test_paparazzi_tells_every_change_of_block() -> None:
     entered = measured(FLOWN[0], "SCRIPT_CURRENT")
     names = {number: name for name, number in aim().blocks.items()}

@@ -389,9 +389,18 @@ def landed_state(message: Message) -> LandedState | None:
 
 
 def version(message: Message) -> Version | None:
-    """AUTOPILOT_VERSION: a byte each for major, minor and patch; None where they are not told."""
+    """AUTOPILOT_VERSION: a byte each for major, minor and patch, and the hardware's id, of which the longer `uid2` is
+    the newer; None where neither is told."""
     packed = int(number(message, "flight_sw_version"))
-    return Version(f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}") if packed else None
+    told = f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}" if packed else ""
+    uid = _hardware_id(message)
+    return Version(told, uid) if told or uid else None
+
+
+def _hardware_id(message: Message) -> str:
+    """In hexadecimal digits; empty where it is not told. Raises AttributeError as `number` does."""
+    short, long = getattr(message, "uid"), bytes(getattr(message, "uid2"))  # noqa: B009 - the library has no types
+    return long.hex() if any(long) else f"{short:016x}" if short else ""
 
 
 def bytewise_integer(value: float) -> int:

@@ -175,7 +175,7 @@ def _entered(message: Message) -> Measurement:
 
 
 def _version(message: Message) -> Version | None:
-    """In decimal digits: 51000 is 5.10.0."""
+    """In decimal digits: 51000 is 5.10.0. Its `uid` is not its hardware's: its simulation tells one, too."""
     packed = int(number(message, "flight_sw_version"))
     return Version(f"{packed // 10000}.{packed // 100 % 100}.{packed % 100}") if packed else None
 

@@ -1764,6 +1764,12 @@ export type Identity = {
      * empty where the autopilot does not tell
      */
     version: string;
+    /**
+     * Uid
+     *
+     * hardware id in hexadecimal digits; empty where it is not told
+     */
+    uid?: string;
 };
 
 /**

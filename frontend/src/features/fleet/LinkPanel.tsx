@@ -49,6 +49,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         <p className={classes["quiet"]}>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
           {identity !== null && `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
+          {identity?.uid && `, hardware id ${identity.uid}`}
         </p>
       </div>
     </Panel>

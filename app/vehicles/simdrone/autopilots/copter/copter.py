@@ -20,6 +20,8 @@ FORCE: Final = 21196
 ESTIMATE_AFTER_S: Final = 3.0
 """Since the start, until the position is known well enough to arm and to be told."""
 _ESTIMATED: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
+_SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
+"""The hardware id of a simulated drone, but for its last byte."""
 _GROUND_STATION: Final = 6
 _LIST_EVERY_TICKS: Final = 2
 _TELL_TICKS: Final = whole_ticks(30.0)
@@ -49,6 +51,7 @@ class Copter(ABC):
     def __init__(self, body: Body, cascade: Cascade, *, system: int) -> None:
         self.dialect = self.firmware.dialect
         self.system, self.component = system, COMPONENT
+        self.uid = _SIMULATED | system
         self.refuses_arming = False
         self.ignores_parameters = False
         self.took_off = False
@@ -138,8 +141,8 @@ class Copter(ABC):
         return out
 
     def restore_persistent(self, before: Self) -> None:
-        """A reboot: parameters are stored."""
-        self.parameters = before.parameters
+        """A reboot: parameters are stored, and the hardware is the same."""
+        self.parameters, self.uid = before.parameters, before.uid
         self.tune()
 
     # ------------------------------------------------------------ flying
@@ -262,6 +265,7 @@ class Copter(ABC):
             status=_ACTIVE if self.flyer.flies else _STANDBY,
             landed_state=_LANDED_STATES[self.flyer.phase],
             version=manners.version,
+            uid=self.uid,
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
             ready=self.prearm_failure() is None,

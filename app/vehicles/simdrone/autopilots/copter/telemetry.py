@@ -40,6 +40,7 @@ class Snapshot:
     status: int
     landed_state: int
     version: int
+    uid: int
     breach_type: int
     breaches: int
     ready: bool
@@ -169,7 +170,7 @@ def autopilot_version(now: Snapshot) -> Fields:
     """Capable of MAVLink 2 and of parameters as floats; no more is claimed than is answered."""
     custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
     numbers = dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0)
-    return {"capabilities": 2 | (1 << 13), "flight_sw_version": now.version, **numbers, "uid": 1, **custom}
+    return {"capabilities": 2 | (1 << 13), "flight_sw_version": now.version, **numbers, "uid": now.uid, **custom}
 
 
 _ATTITUDE: Final = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
