@@ -159,6 +159,7 @@ def run(
     ] = None,
     overrule: Overrule = "",
     json_out: JsonOut = None,
+    data_dir: DataDir = None,
 ) -> None:
     """Fly a whole campaign on a simulation, without the dashboard, and print its table."""
     from app.commands.campaign import run_campaign
@@ -173,6 +174,7 @@ def run(
         gains=gains or [],
         settings=settings or [],
         json_out=json_out,
+        data_dir=_settings(data_dir=data_dir).data_dir,
         overrule=overrule,
     )
 

@@ -30,6 +30,11 @@ def prepare_data_dir(folder: Path) -> None:
         ) from error
 
 
+def trial_parameters_folder(data_dir: Path) -> Path:
+    """Where it is kept what trials have set on vehicles beside their gains, until it is put back."""
+    return data_dir / "trial-parameters"
+
+
 def make_private(folder: Path) -> str:
     """Take the data folder from all other users of this computer: it holds the secret by which a browser commands real
     vehicles, and the worker's socket. Gives a sentence where that changed something, else nothing.

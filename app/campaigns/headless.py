@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 from app.core.definition import Definition, Flight, flight_seed
@@ -72,12 +73,13 @@ def fly_campaign(
     *,
     gains: Sequence[Gains] = (),
     overrule: str = "",
+    trial_parameters: Path | None = None,
 ) -> HeadlessCampaign:
     """Fly proposals as fast as possible until the campaign's own rule ends it; in their place `gains`, complete sets of
     one's own, until all are flown.
 
     `overrule` is the reason why gains that the gate refuses shall fly all the same, on a simulated vehicle. There is
-    nobody here to look at glitches: a flight with any does not count.
+    nobody here to look at glitches: a flight with any does not count. `trial_parameters` is as in `open_vehicle`.
 
     The definition must have been checked. Raises InputError for a warm start, whose donor only a database has,
     GainsError when the strategy proposes what the gate refuses, and VehicleError when the vehicle cannot fly.
@@ -103,7 +105,7 @@ def fly_campaign(
         if overruled:
             get_kind(vehicle).check_gains(options, proposal.gains)
         watcher.proposed(number, proposal)
-        record = _fly(vehicle, options, experiment, definition, number, proposal, watcher)
+        record = _fly(vehicle, options, experiment, definition, number, proposal, watcher, trial_parameters)
         battery_v = landing_battery_v(record.trajectory.as_stored())
         trial = _assess(experiment, number, proposal, record, overruled)
         trials.append(trial)
@@ -185,11 +187,12 @@ def _fly(
     number: int,
     proposal: Proposal,
     watcher: CampaignListener,
+    trial_parameters: Path | None,
 ) -> FlightRecord:
     safe_gains = envelope_of(definition, experiment).safe_gains
     opened = False
     try:
-        with open_vehicle(vehicle, options, safe_gains=safe_gains) as controlled:
+        with open_vehicle(vehicle, options, safe_gains=safe_gains, trial_parameters=trial_parameters) as controlled:
             opened = True
             watcher.holding(None)
             return _flown(controlled, definition, number, proposal, watcher)

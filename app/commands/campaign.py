@@ -18,6 +18,7 @@ from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.strategies.base import Proposal
 from app.core.trajectory import CHANNEL_UNITS
+from app.data_dir import prepare_data_dir, trial_parameters_folder
 from app.errors import InputError, Problem
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue, Sample
@@ -35,10 +36,12 @@ def run_campaign(
     gains: Sequence[str],
     settings: Sequence[str],
     json_out: Path | None,
+    data_dir: Path,
     overrule: str = "",
 ) -> None:
     """Fly the campaign of a preset or file and print its table; of one that an error ends, what was flown until then,
-    and which gains the vehicle holds. Raises InputError for what cannot be flown."""
+    and which gains the vehicle holds. In `data_dir` it keeps what a trial changes on a vehicle with a link. Raises
+    InputError for what cannot be flown, StorageError for a folder that cannot be used."""
     file = override(
         _read(source),
         vehicle=vehicle,
@@ -53,12 +56,22 @@ def run_campaign(
     _require_flyable(file.vehicle, options)
     experiment = experiment_of(definition)
     given = gains_by_hand(file, definition, within_bounds=not overrule)
+    folder: Path | None = None
+    if get_kind(file.vehicle.kind).connect is not None:
+        prepare_data_dir(data_dir)
+        folder = trial_parameters_folder(data_dir)
     out = console(json_out)
     display = _Display(definition, experiment)
     try:
         with display:
             campaign = fly_campaign(
-                definition, file.vehicle.kind, options, display.watcher, gains=given, overrule=overrule
+                definition,
+                file.vehicle.kind,
+                options,
+                display.watcher,
+                gains=given,
+                overrule=overrule,
+                trial_parameters=folder,
             )
     except BaseException as error:
         campaign = display.broken_off(error)

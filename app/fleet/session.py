@@ -42,7 +42,7 @@ SHUTDOWN_TIMEOUT_S: Final = 5.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionRequest:
     """Whom a session is for. `lock` is held as long as it has the vehicle; `identity` is the pinned one, None before
-    the first time; `trial_parameters` is the file of what a trial changes beside the gains. `patient`: look for a
+    the first time; `trial_parameters` is the folder of what a trial changes beside the gains. `patient`: look for a
     vehicle that does not answer until it does."""
 
     vehicle_id: int

@@ -20,6 +20,7 @@ from sqlalchemy.orm import Session as Transaction
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
+from app.data_dir import trial_parameters_folder
 from app.db.session import Database
 from app.errors import ConflictError, StorageError
 from app.fleet import acts
@@ -264,7 +265,7 @@ class VehicleConnectionManager:
             safe_gains=vehicle.safe_gains,
             identity=vehicle.identity,
             lock=self._data_dir / f"vehicle-{vehicle_id}.lock",
-            trial_parameters=self._data_dir / f"vehicle-{vehicle_id}.trial-parameters.json",
+            trial_parameters=trial_parameters_folder(self._data_dir),
             keep_retrying=patient,
             clock=self._clock,
         )

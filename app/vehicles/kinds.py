@@ -33,12 +33,12 @@ class VehicleKind:
     """A registered kind of vehicle.
 
     `experiments` names those that it can fly; where that depends on its settings, `suits(options)` those that it can
-    fly with these. `open(options, safe_gains)` gets complete, checked options and returns a vehicle that holds its safe
-    gains. `connect(options, safe_gains, identity, trial_parameters)` opens a link that stays open between flights;
-    None: the kind has none, and is opened for each flight. It raises VehicleError when nobody answers, or another than
-    `identity` (None: whoever answers); an armed vehicle is returned, with nothing written to it and its `concern` set.
-    In the file `trial_parameters` it keeps what a trial changes beside the gains, which is put back even if this
-    process dies.
+    fly with these. `open(options, safe_gains, trial_parameters)` gets complete, checked options and returns a vehicle
+    that holds its safe gains. `connect(options, safe_gains, identity, trial_parameters)` opens a link that stays open
+    between flights; None: the kind has none, and is opened for each flight. It raises VehicleError when nobody answers,
+    or another than `identity` (None: whoever answers); an armed vehicle is returned, with nothing written to it and its
+    `concern` set. In the folder `trial_parameters` either keeps what a trial changes beside the gains, which is put
+    back even if this process dies.
     `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
     says whether a vehicle of a real kind is a simulation all the same. `check_gains(options, gains)` raises GainsError
     for gains that such a vehicle is never given, whatever anybody overrules.
@@ -51,7 +51,7 @@ class VehicleKind:
     can_fly: bool
     experiments: tuple[str, ...]
     options: tuple[VehicleOption, ...]
-    open: Callable[[Options, Gains], Vehicle]
+    open: Callable[[Options, Gains, Path | None], Vehicle]
     connect: Callable[[Options, Gains, Identity | None, Path], ConnectedVehicle] | None = None
     find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
     is_simulation: Callable[[Options, Hosts], bool] = _never

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -179,7 +180,7 @@ def _refusal(value: float) -> str | None:
     return None
 
 
-def _open(options: Options, safe_gains: Gains) -> Vehicle:
+def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
     return LinearAircraft(safe_gains, options)
 
 

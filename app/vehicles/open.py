@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -41,13 +42,16 @@ def check_options(kind: str, options: Mapping[str, object], *, field: str = "veh
 
 
 @contextmanager
-def open_vehicle(kind: str, options: Mapping[str, object], *, safe_gains: Gains) -> Iterator[Vehicle]:
-    """Control of one vehicle; on any exit, an exception included, it is left holding `safe_gains`, read back.
+def open_vehicle(
+    kind: str, options: Mapping[str, object], *, safe_gains: Gains, trial_parameters: Path | None = None
+) -> Iterator[Vehicle]:
+    """Control of one vehicle; on any exit, an exception included, it is left holding `safe_gains`, read back. What a
+    trial changes on it beside the gains is kept in the folder `trial_parameters` until it is put back.
 
     Raises InputError for options it cannot have, VehicleError when it cannot be opened, and SafeGainsError when the
     safe gains could not be verified at the end.
     """
-    vehicle = get_kind(kind).open(check_options(kind, options), safe_gains)
+    vehicle = get_kind(kind).open(check_options(kind, options), safe_gains, trial_parameters)
     try:
         yield vehicle
     finally:

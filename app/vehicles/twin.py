@@ -5,6 +5,7 @@ Table 2 within 8 %; with the scatter below, repeated takeoffs differ as in its F
 grows with the square of the command, ground effect, delayed measurement, a battery that sags) is off by default.
 """
 
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -106,7 +107,7 @@ def _hover_share(options: Options) -> float:
     return (1.0 - quadratic) * hover + quadratic * hover * hover
 
 
-def _open(options: Options, safe_gains: Gains) -> Vehicle:
+def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
     numbers = {name: float(value) for name, value in options.items()}
     return SimulatedVehicle("twin", safe_gains, options, lambda order: TwinFlight(numbers, order.seed))
 

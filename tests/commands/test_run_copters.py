@@ -6,8 +6,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import IO, Final
 
@@ -17,11 +17,13 @@ from typer.testing import CliRunner
 from app.campaigns.files import read_preset
 from app.cli import app
 from app.core.clock import ScaledClock
+from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import number, text
+from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
-from tests.vehicles.mavlink.rigs import LockstepRig
+from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
 
 GAINLINE = Path(sys.executable).parent / "gainline"
@@ -76,6 +78,12 @@ def held_by(address: str, profile: str, names: Mapping[str, float]) -> dict[str,
     return found
 
 
+@pytest.fixture(autouse=True)
+def data_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("GAINLINE_DATA_DIR", str(tmp_path / "data"))
+    return tmp_path / "data"
+
+
 @pytest.mark.complete
 def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -> None:
     out = tmp_path / "campaign.json"
@@ -88,6 +96,51 @@ def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -
         held = held_by(address, "ardupilot", HELD["ardupilot"])
     assert held == pytest.approx(HELD["ardupilot"])
     see_sets_flown("ardupilot", 1, out, result.stdout)
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize("by", ["gainline run", "the fleet"])
+def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: Path, by: str) -> None:
+    folder = data_dir / "trial-parameters"
+    with UdpRig("px4") as rig:
+        autopilot = rig.drone.autopilot
+        for name, value in {"NAV_DLL_ACT": 3, "GF_ACTION": 3, "GF_MAX_VER_DIST": 10}.items():
+            autopilot.parameters[name] = value  # type: ignore[attr-defined]
+        with flying_run(rig) as process:
+            until(lambda: rig.drone.body.altitude_m > 1.0)
+            process.kill()
+        assert (autopilot.held("MIS_TAKEOFF_ALT"), len(list(folder.iterdir()))) == (3.0, 1)
+        until(lambda: not autopilot.armed)  # by its own failsafe
+        if by == "the fleet":
+            assert MAVLINK.connect is not None
+            pinned = Identity(system_id=1, autopilot="px4", version="1.16.0")
+            options = rig.options(clock_speed=rig.speed)
+            with closing(MAVLINK.connect(options, SAFE["px4"], pinned, folder)) as vehicle:
+                assert vehicle.concern == ""
+        else:
+            with flying_run(rig, "--set", "min_battery_v=50") as process:
+                assert process.wait() == 1, "its battery is too low for another flight"
+        assert (autopilot.held("MIS_TAKEOFF_ALT"), list(folder.iterdir())) == (2.5, [])
+
+
+@contextmanager
+def flying_run(rig: UdpRig, *more: str) -> Iterator[subprocess.Popen[bytes]]:
+    address = rig.options()["address"]
+    named = ("--vehicle", f"mavlink:{address}", "--set", f"clock_speed={rig.speed}", "--max-flights", "1", *more)
+    with subprocess.Popen(
+        [GAINLINE, "run", "px4-takeoff", *named], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def until(seen: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 120.0
+    while not seen():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,11 @@ VEHICLE = "mavlink:udp:127.0.0.1:4245"
 RUN = ("run", "ardrone-takeoff", "--strategy", "gradient", "--max-flights", "3")
 
 
+@pytest.fixture(autouse=True)
+def _data_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GAINLINE_DATA_DIR", str(tmp_path / "data"))
+
+
 def gainline(*arguments: str) -> Result:
     return CliRunner().invoke(app, list(arguments))
 

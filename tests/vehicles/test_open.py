@@ -1,5 +1,6 @@
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -26,7 +27,7 @@ class StubbornVehicle(SimulatedVehicle):
         self.closed = True
 
 
-def opened_stubborn(_options: Options, safe_gains: Gains) -> Vehicle:
+def opened_stubborn(_options: Options, safe_gains: Gains, _folder: Path | None) -> Vehicle:
     def launch(_order: object) -> Simulation:
         raise VehicleError("It does not fly.", hint="It is a test.")
 
@@ -118,7 +119,7 @@ class DeafVehicle(SimulatedVehicle):
         raise VehicleError("The link cannot be closed.", hint="It is gone.")
 
 
-def opened_deaf(_options: Options, safe_gains: Gains) -> Vehicle:
+def opened_deaf(_options: Options, safe_gains: Gains, _folder: Path | None) -> Vehicle:
     def launch(_order: object) -> Simulation:
         raise VehicleError("It does not fly.", hint="It is a test.")
 

@@ -1,5 +1,6 @@
 """The simulated AR.Drone 2 of the paper's Table 1, with its settings."""
 
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from app.vehicles.simulated import SimulatedVehicle
 _HIGHEST_HOVER: Final = 0.95
 
 
-def _open(options: Options, safe_gains: Gains) -> Vehicle:
+def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
     numbers = {name: float(value) for name, value in options.items()}
     return SimulatedVehicle("jsbsim", safe_gains, options, lambda order: JsbsimFlight(numbers, order.seed))
 

@@ -30,8 +30,8 @@ def _may_simulate(address: addresses.Address, simulation_hosts: Hosts) -> bool:
     )
 
 
-def _open(options: Options, safe_gains: Gains) -> Vehicle:
-    return _vehicle(options, safe_gains, None, observes=False, decided=False)
+def _open(options: Options, safe_gains: Gains, trial_parameters: Path | None) -> Vehicle:
+    return _vehicle(options, safe_gains, None, observes=False, decided=False, trial_parameters=trial_parameters)
 
 
 def _connect(

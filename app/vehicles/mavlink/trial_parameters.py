@@ -2,10 +2,15 @@
 
 import json
 import os
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
+from app.vehicles.base import Identity
 from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.parameters import read_parameter, write_parameter
 from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.signals import Setting
@@ -19,13 +24,20 @@ class ChangedParameter:
     during: float
 
 
+def file_for(folder: Path, address: Address, vehicle: Identity) -> Path:
+    """Where it is kept for this vehicle, whoever flies it: those of one type may have one address by turns."""
+    described = f"{address} {vehicle.autopilot} {vehicle.system_id} {vehicle.uid}"
+    return folder / f"{'-'.join(re.findall(r'[A-Za-z0-9.]+', described))}.json"
+
+
 class TrialParameters:
-    """What was changed is remembered until it is put back, as read back; in `file`, where there is one, also beyond
-    this process. A value is put back only if it is still the one that the trial set: any other, somebody has set since.
+    """What was changed is remembered until it is put back, as read back; in the file that `file` names once the vehicle
+    is known, where there is one, also beyond this process. A value is put back only if it is still the one that the
+    trial set: any other, somebody has set since.
     """
 
-    def __init__(self, radio: AutopilotLink, file: Path | None = None) -> None:
-        self._radio, self._file = radio, file
+    def __init__(self, radio: AutopilotLink, file: Callable[[], Path] | None = None) -> None:
+        self._radio, self._named = radio, file
         self._changed: dict[str, ChangedParameter] | None = None
 
     def set(self) -> None:
@@ -58,6 +70,10 @@ class TrialParameters:
         return read_parameter(self._radio, setting.parameter) == setting.value
 
     # ---- beyond this process
+
+    @cached_property
+    def _file(self) -> Path | None:
+        return None if self._named is None else self._named()
 
     def _remembered(self) -> dict[str, ChangedParameter]:
         """What this process has changed, or one before it on a vehicle of this make and system id. Raises VehicleError
@@ -93,6 +109,7 @@ class TrialParameters:
             file.unlink(missing_ok=True)
             return
         parameters = {name: [one.before, one.during] for name, one in changed.items()}
+        file.parent.mkdir(mode=0o700, exist_ok=True)
         fresh = file.with_suffix(".new")
         with fresh.open("w", encoding="utf-8") as writing:
             json.dump({"vehicle": self._vehicle(), "parameters": parameters}, writing)

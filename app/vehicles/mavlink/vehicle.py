@@ -11,7 +11,7 @@ from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Condition, FlightOptions, FlightRecord, Identity, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import parameters, preflight, records
+from app.vehicles.mavlink import addresses, parameters, preflight, records
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.gains import GainStore, written
@@ -25,7 +25,7 @@ from app.vehicles.mavlink.sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.states import QUARANTINE_STATES, TRANSITIONS, State
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
-from app.vehicles.mavlink.trial_parameters import TrialParameters
+from app.vehicles.mavlink.trial_parameters import TrialParameters, file_for
 from app.vehicles.mocap.recording import AlignedRecord, Scored, add_secondary_altitude
 
 STANDSTILL_S: Final = 1.0
@@ -66,7 +66,7 @@ class MavlinkVehicle:
         with what it holds, which may be its owner's; where that differs, nothing is written.
 
         `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
-        closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it. The file
+        closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it. The folder
         `trial_parameters` keeps what a trial changes beside the gains, for whoever connects next if this process dies.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
@@ -88,7 +88,8 @@ class MavlinkVehicle:
         try:
             self._gains = GainStore(self._radio, safe_gains)
             self._decided = decided
-            self._parameters = TrialParameters(self._radio, trial_parameters)
+            self._kept_in = trial_parameters
+            self._parameters = self._trial_parameters()
             self._connect()
             if not observes:
                 self._require_ready()
@@ -249,6 +250,8 @@ class MavlinkVehicle:
         self._identify()
         if (change := preflight.identity_change(self._radio, self._pinned)) not in seen:
             raise SafeGainsError(change, hint=_ANOTHER)
+        if preflight.is_another(self._radio, self._pinned):
+            self._parameters = self._trial_parameters()
         pinned, self._pinned, self._decided = self._pinned, self.identity, True
         try:
             self._set_up()
@@ -292,6 +295,15 @@ class MavlinkVehicle:
                 "written.",
                 hint="If what it holds is safe, name that as its safe gains. Else release it, which writes the others.",
             )
+        elif problem := self._parameters.restore():
+            raise SafeGainsError(problem, hint=_SET_BY_HAND)
+
+    def _trial_parameters(self) -> TrialParameters:
+        """Those of whoever answers by the time when they are first needed."""
+        if self._kept_in is None:
+            return TrialParameters(self._radio)
+        folder, address = self._kept_in, addresses.parse(str(self._options["address"]))
+        return TrialParameters(self._radio, lambda: file_for(folder, address, self.identity))
 
     def _require_ready(self) -> None:
         """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""

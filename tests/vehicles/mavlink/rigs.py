@@ -122,7 +122,7 @@ class LockstepRig(Lockstep, _Heard):
 
     def take_the_place_of_every_vehicle(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Whoever opens a vehicle over MAVLink is given this one, with the options asked for."""
-        kind = replace(MAVLINK, open=lambda options, safe_gains: self.vehicle(safe_gains, **options))
+        kind = replace(MAVLINK, open=lambda options, safe_gains, _: self.vehicle(safe_gains, **options))
         monkeypatch.setattr(open_module, "VEHICLE_KINDS", {**open_module.VEHICLE_KINDS, kind.name: kind})
 
     def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -132,12 +133,14 @@ def test_what_a_trial_sets_beside_the_gains_is_put_back() -> None:
         assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
 
 
+KEPT_IN = "udp-127.0.0.1-4245-4244-px4-1-4741494e4c494e01.json"
+"""The address and the identity of the rig's drone."""
 KEPT = '{"vehicle": "px4 1", "parameters": {"MIS_TAKEOFF_ALT": [2.5, 3.0]}}'
 
 
 def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) -> None:
-    file, kept = tmp_path / "parameters.json", set[str]()
-    with ready("px4") as rig, connected(rig, trial_parameters=file) as vehicle:
+    file, kept = tmp_path / KEPT_IN, set[str]()
+    with ready("px4") as rig, connected(rig, trial_parameters=tmp_path) as vehicle:
 
         def look() -> StopRequest | None:
             if rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0:
@@ -157,22 +160,22 @@ def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) 
 def test_what_a_killed_process_had_set_is_put_back_by_the_next_one(
     tmp_path: Path, held: float, afterwards: float
 ) -> None:
-    file = tmp_path / "parameters.json"
+    file = tmp_path / KEPT_IN
     file.write_text(KEPT)
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = held  # type: ignore[attr-defined]
-        with connected(rig, trial_parameters=file) as vehicle:
+        with connected(rig, trial_parameters=tmp_path) as vehicle:
             assert vehicle.concern == ""
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == afterwards
             assert not file.exists()
 
 
 def test_what_the_vehicle_does_not_tell_is_kept_until_it_does(tmp_path: Path) -> None:
-    file = tmp_path / "parameters.json"
+    file = tmp_path / KEPT_IN
     file.write_text(KEPT)
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = math.nan  # type: ignore[attr-defined]  # it tells none
-        with connected(rig, trial_parameters=file) as vehicle:
+        with connected(rig, trial_parameters=tmp_path) as vehicle:
             assert "MIS_TAKEOFF_ALT was 2.5, and could not be put back" in vehicle.concern
             assert file.read_text() == KEPT
             rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
@@ -182,33 +185,59 @@ def test_what_the_vehicle_does_not_tell_is_kept_until_it_does(tmp_path: Path) ->
 
 
 def test_what_was_set_on_another_vehicle_is_not_put_back_on_this_one(tmp_path: Path) -> None:
-    file = tmp_path / "parameters.json"
+    file = tmp_path / KEPT_IN
     file.write_text(KEPT.replace("px4 1", "px4 2"))
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
-        with connected(rig, trial_parameters=file):
+        with connected(rig, trial_parameters=tmp_path):
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 3.0
+
+
+def test_vehicles_of_one_type_that_have_one_address_by_turns_are_kept_apart(tmp_path: Path) -> None:
+    file = tmp_path / KEPT_IN
+    file.write_text(KEPT)
+    with ready("px4") as rig:
+        autopilot = rig.drone.autopilot
+        autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        own, autopilot.uid = autopilot.uid, 7  # type: ignore[attr-defined]
+        with connected(rig, trial_parameters=tmp_path):
+            assert (autopilot.held("MIS_TAKEOFF_ALT"), file.read_text()) == (3.0, KEPT)
+        autopilot.uid = own  # type: ignore[attr-defined]
+        with connected(rig, trial_parameters=tmp_path):
+            assert (autopilot.held("MIS_TAKEOFF_ALT"), file.exists()) == (2.5, False)
+
+
+def test_what_a_killed_process_had_set_is_put_back_before_anybody_has_decided_about_the_gains(tmp_path: Path) -> None:
+    """As `gainline run` and a first connection meet it: gains are compared, and these are the safe ones."""
+    file = tmp_path / KEPT_IN
+    file.write_text(KEPT)
+    with ready("px4") as rig:
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        first = partial(MavlinkVehicle, rig.options(), SAFE["px4"], is_real=False, observes=True, decided=False)
+        with closing(first(clock=rig, transport=rig, trial_parameters=tmp_path)) as vehicle:
+            assert (vehicle.concern, rig.drone.autopilot.held("MIS_TAKEOFF_ALT")) == ("", 2.5)
+            assert not file.exists()
 
 
 @pytest.mark.parametrize("damaged", ["[2.5", "[2.5]", "{}", '{"vehicle": "px4 1", "parameters": {"A": 1}}'])
 def test_a_vehicle_whose_kept_parameters_cannot_be_read_is_only_observed(tmp_path: Path, damaged: str) -> None:
-    file = tmp_path / "parameters.json"
+    file = tmp_path / KEPT_IN
     file.write_text(damaged)
-    with ready("px4") as rig, connected(rig, trial_parameters=file) as vehicle:
-        assert "parameters.json, which cannot be used" in vehicle.concern
+    with ready("px4") as rig, connected(rig, trial_parameters=tmp_path) as vehicle:
+        assert f"{KEPT_IN}, which cannot be used" in vehicle.concern
         assert "MIS_TAKEOFF_ALT" not in rig.writes
         assert file.read_text() == damaged
 
 
 def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_path: Path) -> None:
-    file = tmp_path / "parameters.json"
-    file.write_text("[2.5")
+    folder = tmp_path / "parameters"
+    folder.write_text("no folder")
     assert MAVLINK.connect is not None
     with UdpRig("px4") as rig:
         options = rig.options(clock_speed=rig.speed)
-        vehicle = MAVLINK.connect(options, SAFE["px4"], Identity(system_id=1, autopilot="px4", version=""), file)
+        vehicle = MAVLINK.connect(options, SAFE["px4"], Identity(system_id=1, autopilot="px4", version=""), folder)
         with closing(vehicle):
-            assert "parameters.json, which cannot be used" in vehicle.concern
+            assert f"is kept in {folder}/udp-127.0.0.1-" in vehicle.concern
 
 
 def test_what_a_refused_run_had_set_is_put_back_too() -> None:

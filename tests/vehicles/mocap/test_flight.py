@@ -103,5 +103,5 @@ def test_the_source_is_let_go_when_the_vehicle_cannot_be_opened() -> None:
     with UdpRig(mocap=mocap) as rig:
         options = {**rig.options(second_source=mocap), "system_id": 99.0}
         with pytest.raises(VehicleError, match="No heartbeat was heard"):
-            MAVLINK.open(options, SAFE)
+            MAVLINK.open(options, SAFE, None)
         assert not any(thread.name.startswith("natnet:") for thread in threading.enumerate())
