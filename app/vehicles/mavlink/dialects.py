@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType, ModuleType
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from app.core.errors import InputError, Problem
 from app.vehicles.mavlink import signing
@@ -198,9 +198,62 @@ DIALECTS: Final[Mapping[str, Dialect]] = MappingProxyType(
 )
 
 
+_EVENT: Final = 410
+_EVENT_FIELDS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "id": "uint32_t",
+        "event_time_boot_ms": "uint32_t",
+        "sequence": "uint16_t",
+        "destination_component": "uint8_t",
+        "destination_system": "uint8_t",
+        "log_levels": "uint8_t",
+        "arguments": "uint8_t",
+    }
+)
+"""In the order of the wire. CRC_EXTRA, 160, follows from these names and types."""
+_EVENT_ARGUMENTS: Final = 40
+
+
 @cache
 def _load(module: str) -> ModuleType:
-    return importlib.import_module(module)
+    library = importlib.import_module(module)
+    if module == COMMON.module:
+        library.mavlink_map.setdefault(_EVENT, _event_of(library))
+    return library
+
+
+def _event_of(library: ModuleType) -> type:
+    """EVENT (https://mavlink.io/en/messages/common.html#EVENT), which the library leaves out."""
+    names = list(_EVENT_FIELDS)
+
+    def __init__(self: Any, *values: object, **named: object) -> None:  # noqa: N807 - of the class that is made here
+        library.MAVLink_message.__init__(self, _EVENT, "EVENT")
+        self._fieldnames = names
+        for name, value in {**dict(zip(names, values, strict=False)), **named}.items():
+            setattr(self, name, value)
+
+    def pack(self: Any, mav: object, force_mavlink1: bool = False) -> bytes:
+        *scalars, arguments = (getattr(self, name) for name in names)
+        payload = self.unpacker.pack(*scalars, *arguments)
+        packed: bytes = self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+        return packed
+
+    lengths = [1] * (len(names) - 1)
+    described = {
+        "id": _EVENT,
+        "msgname": "EVENT",
+        "fieldnames": names,
+        "ordered_fieldnames": names,
+        "fieldtypes": list(_EVENT_FIELDS.values()),
+        "orders": list(range(len(names))),
+        "lengths": [*lengths, _EVENT_ARGUMENTS],
+        "array_lengths": [*(0 for _ in lengths), _EVENT_ARGUMENTS],
+        "crc_extra": 160,
+        "unpacker": struct.Struct(f"<IIHBBB{_EVENT_ARGUMENTS}B"),
+        "__init__": __init__,
+        "pack": pack,
+    }
+    return type("MAVLink_event_message", (library.MAVLink_message,), described)
 
 
 @cache

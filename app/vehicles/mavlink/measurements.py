@@ -117,6 +117,15 @@ class Version:
     uid: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class VehicleEvent:
+    """One event of MAVLink's events interface; what its `arguments` mean depends on its `number`."""
+
+    number: int
+    sequence: int
+    arguments: bytes
+
+
 Measurement = (
     Position
     | Heartbeat
@@ -130,6 +139,7 @@ Measurement = (
     | Block
     | BlockEntered
     | Version
+    | VehicleEvent
 )
 
 

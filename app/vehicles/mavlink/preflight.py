@@ -10,8 +10,9 @@ from typing import Final
 
 from app.vehicles.base import CheckItem, Identity
 from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.measurements import DISARMING, CommandReply, Heartbeat, Position, Version
+from app.vehicles.mavlink.measurements import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
@@ -29,6 +30,7 @@ _BATTERY_S: Final = 10.0
 _DISARMED: Final = "disarmed"
 _VERSION_ATTEMPTS: Final = 2
 _NAME_ATTEMPTS: Final = 2
+_CHECKS_ATTEMPTS: Final = 2
 _NO_POSITION: Final = "Wait until it knows where it is (GPS, cameras or its own sensors), then check again."
 _LAND_FIRST: Final = "Land it, see that its motors have stopped, then verify its gains and release it."
 
@@ -299,15 +301,50 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
 
 def _own_checks(radio: AutopilotLink) -> CheckItem:
     ready = bool(radio.seen.may_arm)
-    said = " / ".join(radio.seen.spoken)
+    if not ready and not is_armed(radio):
+        _ask_checks(radio)
     return CheckItem(
         name="own_checks",
         title="Its own checks before arming",
         passed=ready,
-        found="they pass" if ready else f"they do not pass; it said: {said or 'nothing'}",
+        found="they pass" if ready else f"they do not pass; {_reasons(radio)}",
         needed="that it would arm",
-        hint="" if ready else "See to what it says; a vehicle that has just started may still be settling.",
+        hint="" if ready else _checks_hint(radio),
     )
+
+
+def _ask_checks(radio: AutopilotLink) -> None:
+    """Have their results told by events, where the vehicle knows events: those from before connecting were missed."""
+    asking = radio.profile.ask_checks(radio.aim)
+    if asking is not None:
+        radio.request(
+            asking,
+            lambda heard: isinstance(heard, VehicleEvent) and heard.number == HEALTH_SUMMARY,
+            attempts=_CHECKS_ATTEMPTS,
+        )
+
+
+def _reasons(radio: AutopilotLink) -> str:
+    """What the vehicle names and what it says."""
+    failing = radio.seen.arming_checks.failing(_mode(radio))
+    said = " / ".join(radio.seen.spoken)
+    named = f"it names: {', '.join(failing)}" if failing else ""
+    spoken = f"it said: {said or 'nothing'}" if said or not failing else ""
+    return "; ".join(part for part in (named, spoken) if part)
+
+
+def _checks_hint(radio: AutopilotLink) -> str:
+    profile, arming_modes = radio.profile, radio.seen.arming_checks.arming_modes
+    hints = ["See to what it says; a vehicle that has just started may still be settling."]
+    if _mode(radio) not in arming_modes and (others := sorted(profile.flying_modes & arming_modes)):
+        hints.append(f"It would arm in the mode {' or '.join(profile.mode_names[mode] for mode in others)}.")
+    if profile.ask_checks(radio.aim) is not None:
+        hints.append("QGroundControl shows its reasons in words.")
+    return " ".join(hints)
+
+
+def _mode(radio: AutopilotLink) -> str:
+    return "" if radio.seen.heartbeat is None else radio.seen.heartbeat.mode
 
 
 def _disarmed(radio: AutopilotLink) -> CheckItem:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from app.core.clock import Clock
+from app.vehicles.mavlink.arming_checks import ArmingChecks
 from app.vehicles.mavlink.dialects import Message, source_component
 from app.vehicles.mavlink.limits import MAX_WITNESS_GAP
 from app.vehicles.mavlink.link import Link, Received
@@ -18,6 +19,7 @@ from app.vehicles.mavlink.measurements import (
     Parameter,
     Position,
     StatusText,
+    VehicleEvent,
     Version,
 )
 from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Step, Target
@@ -45,10 +47,16 @@ class VehicleMemory:
     block_s: float = float("-inf")
     battery_v: float | None = None
     may_arm: bool | None = None
+    arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
     spoken: deque[str] = field(default_factory=lambda: deque(maxlen=_SPOKEN))
     _piece_of: int = 0
     _pieces: str = ""
+
+    def forget_vehicle(self) -> None:
+        """Who it is, and what its own checks found."""
+        self.version = self.uid = ""
+        self.arming_checks = ArmingChecks()
 
     def note(self, measurement: Measurement | None, now_s: float) -> None:
         match measurement:
@@ -63,6 +71,8 @@ class VehicleMemory:
             case Battery(voltage_v=volts, may_arm=may_arm):
                 self.battery_v = volts if volts is not None else self.battery_v
                 self.may_arm = may_arm
+            case VehicleEvent():
+                self.arming_checks.take(measurement)
             case Position():
                 self.positions.append((now_s, measurement))
             case StatusText():
@@ -147,7 +157,7 @@ class AutopilotLink:
         ]
         for each in heard:
             if isinstance(each.measurement, Heartbeat) and each.now_s - self.seen.heartbeat_s > self.silence_s:
-                self.seen.version = self.seen.uid = ""  # another may have come in its place
+                self.seen.forget_vehicle()  # another may have come in its place
             self.seen.note(each.measurement, each.now_s)
         return heard
 

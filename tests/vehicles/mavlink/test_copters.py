@@ -1,6 +1,7 @@
 """What the real ArduCopter and PX4 were seen to do, done by the simulated ones, and what the program makes of it."""
 
 import math
+import struct
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -11,8 +12,10 @@ import pytest
 
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest
 from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY
 from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink.measurements import VehicleEvent
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone import faults
 from app.vehicles.simdrone.autopilots.base import OutgoingMessage
@@ -290,6 +293,35 @@ def test_a_vehicle_whose_own_checks_do_not_pass_is_not_flown_and_the_whole_reaso
             }
             assert not own.passed
             assert reason[autopilot] in own.found
+
+
+@pytest.mark.parametrize("tells_events", [True, False])
+def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events: bool) -> None:
+    """It told at its start, when nobody listened yet, and tells again when something changes or somebody asks."""
+    with LockstepRig("px4", faults=["arm-refused@connect"]) as rig:
+        if not tells_events:
+            rig.drone.autopilot._tell_events = lambda: None  # type: ignore[attr-defined]  # as before release 1.14
+        with connected(rig) as vehicle:
+            vehicle.attend(4.0)
+            vehicle._radio.seen.forget_vehicle()
+            [own] = [item for item in vehicle.check() if item.name == "own_checks"]
+            said = "it said: Preflight Fail: Arming denied: resolve system health failures first"
+            named = "it names: Local position estimate; " if tells_events else ""
+            assert own.found.startswith(f"they do not pass; {named}{said}")
+            assert own.hint.endswith("QGroundControl shows its reasons in words.")
+
+
+def test_a_px4_says_in_which_mode_it_would_arm() -> None:
+    with LockstepRig("px4") as rig, connected(rig) as vehicle:
+        vehicle.attend(4.0)
+        mode = next(each for each in rig.drone.autopilot.firmware.modes if each.name == "POSCTL")  # type: ignore[attr-defined]
+        rig.drone.autopilot.mode = replace(mode, may_arm=False)  # type: ignore[attr-defined]
+        vehicle._radio.seen.arming_checks.take(
+            VehicleEvent(ARMING_CHECK_SUMMARY, 900, struct.pack("<BIIII", 1, 0, 0, 1 << 4, 0))
+        )
+        vehicle.attend(1.0)
+        [own] = [item for item in vehicle.check() if item.name == "own_checks"]
+        assert "It would arm in the mode Hold." in own.hint
 
 
 def test_parameters_of_a_copter_outlive_its_reboot_and_paparazzis_do_not() -> None:

@@ -95,6 +95,9 @@ class ArduPilot:
     def ask_version(self, aim: Target) -> Outgoing:
         return request_version(aim)
 
+    def ask_checks(self, aim: Target) -> None:
+        """It tells in words what does not pass."""
+
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:

@@ -258,6 +258,10 @@ class Profile(Protocol):
         """None where it tells unasked, or never."""
         ...
 
+    def ask_checks(self, aim: Target) -> Outgoing | None:
+        """Have it run its own checks before arming and tell the results by events; None where it knows none."""
+        ...
+
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         """Raises KeyError when it takes a block of the flight plan that `aim` does not have."""
         ...

@@ -92,6 +92,9 @@ class Paparazzi:
     def ask_version(self, aim: Target) -> None:
         """It tells every few seconds."""
 
+    def ask_checks(self, aim: Target) -> None:
+        """It tells in words what does not pass."""
+
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import COMMON, Message, number
-from app.vehicles.mavlink.measurements import DISARMING, Measurement, Parameter
+from app.vehicles.mavlink.measurements import DISARMING, Measurement, Parameter, VehicleEvent
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.ardupilot import request_telemetry, request_version
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
@@ -15,6 +15,7 @@ from app.vehicles.mavlink.signals import Action, Setting
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
 _SET_MODE: Final = 176
+_RUN_PREARM_CHECKS: Final = 401
 _CUSTOM_MODE: Final = 1.0
 _AUTO: Final = 4
 _TAKE_OFF: Final = 2
@@ -88,6 +89,9 @@ class Px4:
     def ask_version(self, aim: Target) -> Outgoing:
         return request_version(aim)
 
+    def ask_checks(self, aim: Target) -> Outgoing:
+        return base.command(aim, _RUN_PREARM_CHECKS)
+
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
@@ -121,4 +125,14 @@ def _heartbeat(message: Message) -> Measurement | None:
     return base.heartbeat(message, f"{mode >> 16 & 0xFF}.{mode >> 24 & 0xFF}")
 
 
-_READERS: Final[base.Readers] = {**base.READERS, "HEARTBEAT": _heartbeat, "PARAM_VALUE": _parameter}
+def _event(message: Message) -> VehicleEvent:
+    arguments = bytes(getattr(message, "arguments"))  # noqa: B009 - the library has no types
+    return VehicleEvent(int(number(message, "id")), int(number(message, "sequence")), arguments)
+
+
+_READERS: Final[base.Readers] = {
+    **base.READERS,
+    "HEARTBEAT": _heartbeat,
+    "PARAM_VALUE": _parameter,
+    "EVENT": _event,
+}

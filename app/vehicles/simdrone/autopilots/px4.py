@@ -4,9 +4,11 @@ Its altitude controller is a simplified cascade with PX4's gains, not a replica;
 """
 
 import math
+import struct
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
 from app.vehicles.mavlink.dialects import COMMON
 from app.vehicles.simdrone.autopilots.base import ACCEPTED, TEMPORARILY_REJECTED, OutgoingMessage
 from app.vehicles.simdrone.autopilots.copter.cascade import TwoStage
@@ -20,6 +22,18 @@ from app.vehicles.simdrone.body import Body
 _MANUAL: Final = 1 | 16 | 64
 _AUTO: Final = 1 | 4 | 8 | 16
 _TAKEOFF: Final = "AUTO.TAKEOFF"
+_NO_POSITION: Final = 1 << 24 | 13835193
+"""The event check_modes_local_pos, of the autopilot."""
+_LOCAL_POSITION: Final = 17
+"""Among the components of its checks."""
+_ALL_MODES: Final = 0xFFFFFFFF
+_ARMING_MODES: Final = _ALL_MODES & ~(1 << 18)
+"""All but landing."""
+_PROTOCOL: Final = 0x88
+_ERROR: Final = 0x33
+"""Log levels of an event, inside and outside."""
+_ARGUMENTS: Final = 40
+_SEQUENCE_NUMBERS: Final = 1 << 16
 _LINK_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.HOLD}
 _FENCE_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.WARN, 2: Reaction.HOLD}
 
@@ -94,12 +108,16 @@ class Px4(Copter):
     def __init__(self, body: Body, *, system: int) -> None:
         self._cascade = TwoStage()
         super().__init__(body, self._cascade, system=system)
+        self._events = 0
+        self._told_failing: bool | None = None
 
     def tick(self) -> list[OutgoingMessage]:
         """Once at its height of takeoff it waits there. Once it has landed and stopped its motors it is ready to hold;
         told to land once more then, it stays in that mode, and does not arm."""
         was_armed = self.armed
         letters = super().tick()
+        if self._is_failing != self._told_failing:
+            self._tell_events()
         if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
             self.mode = self.find_mode(self.firmware.hold)
         if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING:
@@ -109,6 +127,47 @@ class Px4(Copter):
     def prearm_failure(self) -> str | None:
         """Its mode counts, too."""
         return self.arming_refusal()
+
+    def tell_checks(self) -> None:
+        super().tell_checks()
+        self._tell_events()
+
+    @property
+    def _is_failing(self) -> bool:
+        """In every mode: it does not know where it is."""
+        return Copter.prearm_failure(self) is not None
+
+    def _tell_events(self) -> None:
+        """The results of its checks, as the events interface orders them."""
+        failing = self._told_failing = self._is_failing
+        self._send_event(
+            ARMING_CHECK_SUMMARY,
+            *(0, 1 << _LOCAL_POSITION if failing else 0, 0),
+            *((0, 0) if failing else (_ARMING_MODES, _ARMING_MODES)),
+            layout="<BIIII",
+        )
+        if failing:
+            self._send_event(_NO_POSITION, _ALL_MODES, _LOCAL_POSITION, layout="<IB", levels=_ERROR)
+        self._send_event(HEALTH_SUMMARY, 0, 0, 0, 0, layout="<BIII")
+
+    def _send_event(self, number: int, *arguments: int, layout: str, levels: int = _PROTOCOL) -> None:
+        """To everybody."""
+        packed = struct.pack(layout, *arguments)
+        self._out.append(
+            OutgoingMessage(
+                "EVENT",
+                {
+                    "id": number,
+                    "event_time_boot_ms": int(self.boot_s * 1000.0),
+                    "sequence": self._events % _SEQUENCE_NUMBERS,
+                    "destination_component": 0,
+                    "destination_system": 0,
+                    "log_levels": levels,
+                    "arguments": packed.ljust(_ARGUMENTS, b"\0"),
+                },
+            )
+        )
+        self._events += 1
 
     def tune(self) -> None:
         cascade = self._cascade

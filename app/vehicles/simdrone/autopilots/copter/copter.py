@@ -5,7 +5,15 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, Self
 
 from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
-from app.vehicles.simdrone.autopilots.base import ACCEPTED, FAILED, UNSUPPORTED, OutgoingMessage, Timetable, whole_ticks
+from app.vehicles.simdrone.autopilots.base import (
+    ACCEPTED,
+    FAILED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    OutgoingMessage,
+    Timetable,
+    whole_ticks,
+)
 from app.vehicles.simdrone.autopilots.copter import telemetry
 from app.vehicles.simdrone.autopilots.copter.cascade import Cascade
 from app.vehicles.simdrone.autopilots.copter.flyer import AltitudeGuidance, Phase
@@ -37,6 +45,7 @@ LAND: Final = 21
 TAKE_OFF: Final = 22
 SET_MODE: Final = 176
 ARM_DISARM: Final = 400
+RUN_PREARM_CHECKS: Final = 401
 GET_HOME: Final = 410
 SET_INTERVAL: Final = 511
 REQUEST_MESSAGE: Final = 512
@@ -213,8 +222,12 @@ class Copter(ABC):
             self._react(reaction, self.firmware.fence_breached)
 
     def _tell_readiness(self) -> None:
-        reason = None if self.armed or self._ticks % _TELL_TICKS else self.prearm_failure()
-        if reason is not None:
+        if not self.armed and self._ticks % _TELL_TICKS == 0:
+            self.tell_checks()
+
+    def tell_checks(self) -> None:
+        """What its own checks before arming found, where they do not pass."""
+        if (reason := self.prearm_failure()) is not None:
             self.say(self.firmware.unready + reason)
 
     def _react(self, reaction: Reaction, reason: str) -> None:
@@ -378,6 +391,12 @@ class Copter(ABC):
         self.send(kind)
         return ACCEPTED
 
+    def _obey_checks(self, _message: Message) -> int:
+        if self.armed:
+            return TEMPORARILY_REJECTED
+        self.tell_checks()
+        return ACCEPTED
+
     def _obey_capabilities(self, _message: Message) -> int:
         self.send("AUTOPILOT_VERSION")
         return ACCEPTED
@@ -414,6 +433,7 @@ _COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
     TAKE_OFF: Copter._obey_take_off,
     SET_MODE: Copter._obey_mode,
     ARM_DISARM: Copter._handle_arm,
+    RUN_PREARM_CHECKS: Copter._obey_checks,
     GET_HOME: Copter._obey_home,
     SET_INTERVAL: Copter._obey_interval,
     REQUEST_MESSAGE: Copter._obey_request,
