@@ -133,7 +133,18 @@ class TrialRunner:
         self._advance(Tick(self._radio.clock.now_s()))
 
     def _wanted(self) -> StopRequest | None:
-        return self._should_stop() if self._error is None else StopRequest(_describe_error(self._error))
+        """A failure of the program lands the vehicle; motors off counts more, also afterwards."""
+        stop = self._asked_stop()
+        if self._error is None or (stop is not None and stop.motors_off):
+            return stop
+        return StopRequest(_describe_error(self._error))
+
+    def _asked_stop(self) -> StopRequest | None:
+        try:
+            return self._should_stop()
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; it is asked again
+            self._error = self._error or error
+            return None
 
     def _advance(self, event: Event) -> None:
         before = self._trial.state

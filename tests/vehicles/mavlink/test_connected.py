@@ -376,6 +376,37 @@ def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() ->
             assert "PSC_POSZ_P" in {text(message, "param_id") for message in rig.told("PARAM_SET")}
 
 
+@pytest.mark.parametrize("raises_once", [False, True])
+def test_motors_off_is_heard_also_after_the_program_failed_while_the_vehicle_lands(raises_once: bool) -> None:
+    """Whoever watches the flight raises, perhaps whoever is asked whether to stop too; then a person acts."""
+    asked: list[float] = []
+
+    def fail(sample: Sample) -> None:
+        if sample.time_s > 3.0:
+            raise RuntimeError("the disk is full")
+
+    def slide() -> StopRequest | None:
+        if rig.drone.body.altitude_m > 2.0 and vehicle.condition().step == "abort-land":
+            asked.append(rig.now_s())
+            if raises_once and len(asked) == 1:
+                raise OSError("the pipe is broken")
+            return StopRequest("people below", motors_off=True)
+        return None
+
+    with LockstepRig("ardupilot") as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            vehicle.attend(2.0)
+            vehicle.stage(OWN_SAFE["ardupilot"])
+            with pytest.raises(RuntimeError, match="the disk is full"):
+                vehicle.fly(ORDER, on_sample=fail, should_stop=slide)
+            forced = [
+                at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
+            ]
+            assert forced[0] - asked[0] < 0.3
+            assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
+
+
 def test_a_flight_plan_that_lands_by_its_own_exception_is_landed_with() -> None:
     left: list[int] = []
 
