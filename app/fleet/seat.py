@@ -185,7 +185,7 @@ class VehicleProcess:
         return None
 
     def _forward_command(self, ordered: VehicleCommand) -> None:
-        problem = _EXPIRED if self._has_expired(ordered) else ""
+        problem = _EXPIRED if _has_expired(ordered) else ""
         if not problem:
             try:
                 act = self._vehicle.motors_off if ordered.order == "motors off" else self._vehicle.land
@@ -193,10 +193,6 @@ class VehicleProcess:
             except VehicleError as error:
                 problem = str(error)
         self._line.send(CommandForwarded(ordered.order, ordered.reason, problem))
-
-    @staticmethod
-    def _has_expired(ordered: VehicleCommand) -> bool:
-        return time.monotonic() > ordered.by_s
 
     def _publish_status(self) -> None:
         now_s = self._call.clock.now_s()
@@ -295,9 +291,12 @@ class VehicleProcess:
             self._vehicle.log_to(None)
 
     def _await_takeoff_clearance(self) -> bool:
-        """Wait for the worker's word, attending the vehicle. Raises PipeClosedError."""
+        """Wait for the worker's word, attending the vehicle. Raises PipeClosedError, VehicleError for one that is too
+        late."""
         while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
             self._note(answer)
+        if isinstance(answer, TakeOffCommand) and _has_expired(answer):
+            raise _late_take_off_error()
         return isinstance(answer, TakeOffCommand)
 
     def _take_off(self, orders: FlightRequest) -> FlightRecord:
@@ -336,7 +335,7 @@ class VehicleProcess:
         match message:
             case CancelFlight(trial_id, reason) if trial_id == self._trial_id:
                 self._stop = self._stop or StopRequest(reason)
-            case VehicleCommand(order, reason) if self._has_expired(message):
+            case VehicleCommand(order, reason) if _has_expired(message):
                 self._line.send(CommandForwarded(order, reason, _EXPIRED))
             case VehicleCommand(order, reason):
                 if order == "motors off":
@@ -345,3 +344,16 @@ class VehicleProcess:
                 self._line.send(CommandForwarded(order, reason))
             case _:
                 pass
+
+
+def _has_expired(ordered: VehicleCommand | TakeOffCommand) -> bool:
+    return time.monotonic() > ordered.by_s
+
+
+def _late_take_off_error() -> VehicleError:
+    error = VehicleError(
+        "It was not flown: the take-off reached the vehicle's process too late, because that stood still.",
+        hint="See that nothing holds up this computer, then ask for the flight again.",
+    )
+    error.not_flown = True
+    return error

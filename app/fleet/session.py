@@ -9,6 +9,7 @@ import os
 import queue
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -37,6 +38,8 @@ from app.vehicles.base import CheckItem, Identity, OptionValue
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 SHUTDOWN_TIMEOUT_S: Final = 5.0
+TAKE_OFF_TIMEOUT_S: Final = 2.0
+"""Nothing takes off later after its operator's word than that operator expects it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +179,7 @@ class VehicleConnection:
             self.trial_id = None
 
     def take_off(self) -> None:
-        self._post(TakeOffCommand())
+        self._post(TakeOffCommand(by_s=time.monotonic() + TAKE_OFF_TIMEOUT_S))
 
     def cancel_take_off(self) -> None:
         self._post(CancelTakeOff())

@@ -46,7 +46,10 @@ class GainsStaged:
 
 @dataclass(frozen=True, slots=True)
 class TakeOffCommand:
-    """Said to the process: the gains are right and the lift-off is recorded."""
+    """Said to the process: the gains are right and the lift-off is recorded; not to be carried out after `by_s` of this
+    computer's monotonic clock."""
+
+    by_s: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """What the process of a session does with its vehicle, flown in lock-step in this one."""
 
+import math
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from multiprocessing import Pipe
@@ -101,7 +103,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
         rig.drone.autopilot.ignores_parameters = not takes_its_safe_gains
 
     line.on_staged = refuse
-    line.workers_end.send(TakeOffCommand())
+    line.workers_end.send(TakeOffCommand(by_s=math.inf))
     process._fly(orders(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert "would not arm" in trouble.what
@@ -110,6 +112,22 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
     assert [type(said) for said in line.said if isinstance(said, SafeGainsRestored | FlightFinished)] == (
         [SafeGainsRestored, FlightFinished] if takes_its_safe_gains else [FlightFinished]
     )
+
+
+def test_a_take_off_that_comes_too_late_does_not_take_place(rig: LockstepRig, tmp_path: Path) -> None:
+    """Seen: the process stood still for 20 s, and the vehicle took off when nobody expected it any more."""
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    line.workers_end.send(TakeOffCommand(by_s=time.monotonic() - 0.001))
+    process._fly(orders(rig, tmp_path))
+    staged, restored, failure, _ = (said for said in line.said if not isinstance(said, ConnectionOpened))
+    assert (staged, restored) == (GainsStaged(dict(TUNED)), SafeGainsRestored(dict(SAFE)))
+    assert isinstance(failure, FlightFailure)
+    assert (failure.not_flown, failure.unsafe) == (True, False)
+    assert "too late" in failure.what
+    assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
+    assert not rig.told("SCRIPT_ITEM"), "no block of its flight plan was asked for"
+    assert process._vehicle.read_gains() == SAFE
 
 
 def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: LockstepRig, tmp_path: Path) -> None:
