@@ -1,6 +1,6 @@
 """Vehicles over HTTP."""
 
-from typing import Final, Literal
+from typing import Literal
 
 from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
@@ -34,11 +34,10 @@ from app.fleet.schemas import (
     VehicleOrder,
 )
 from app.fleet.states import ActKind
+from app.live.messages import NO_LINK
 from app.schemas import Page
 
 router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])
-
-_NO_LINK: Final = "No worker has a link to this vehicle, so it was told nothing: use its own remote control now."
 
 
 @router.get("")
@@ -135,8 +134,10 @@ async def _order(
     live: Live, vehicle_id: int, order: Literal["land", "motors off"], body: VehicleOrder | None, sentence: str
 ) -> OrderAnswer:
     reason = (body or VehicleOrder()).reason
-    accepted = live.worker_running and (await live.send_vehicle_command(vehicle_id, order, reason)).accepted
-    return OrderAnswer(accepted=accepted, sentence=sentence if accepted else _NO_LINK)
+    if not live.worker_running:
+        return OrderAnswer(accepted=False, sentence=NO_LINK)
+    answer = await live.send_vehicle_command(vehicle_id, order, reason)
+    return OrderAnswer(accepted=answer.accepted, sentence=sentence if answer.accepted else answer.problem)
 
 
 @router.post("/{vehicle_id}/release")

@@ -9,6 +9,7 @@ import os
 import select
 import signal
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import fields
@@ -45,7 +46,7 @@ from app.trials.crew import (
 )
 from app.trials.flying import FlightMonitor
 from app.vehicles.base import ConnectedVehicle, FlightRecord, StopRequest
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, restore_safe_gains
 
 POLL_INTERVAL_S: Final = 0.005
@@ -55,7 +56,7 @@ LOST_AFTER_S: Final = 3.0
 LOCK_TIMEOUT_S: Final = 120.0
 """How long a session waits for the one of a worker that was killed: it may be landing, or waiting for a lost link."""
 RECONNECT_INTERVAL_S: Final = 2.0
-_EXPIRED: Final = "It came too late, when whoever asked had been told that it could not be; it was not passed on."
+_EXPIRED: Final = "It reached the vehicle's process too late and was not passed on; whoever asked was told so."
 
 
 class PipeClosedError(Exception):
@@ -67,9 +68,23 @@ class WorkerPipe:
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
+        self._received: deque[ToVehicleProcess] = deque()
 
     def receive(self) -> ToVehicleProcess | None:
         """The next message; None when there is none. Raises PipeClosedError."""
+        return self._received.popleft() if self._received else self._read()
+
+    def receive_command(self) -> VehicleCommand | None:
+        """The next order, past what waits before it; None when there is none, also of a broken pipe."""
+        with suppress(PipeClosedError):
+            while (message := self._read()) is not None:
+                self._received.append(message)
+        found = next((each for each in self._received if isinstance(each, VehicleCommand)), None)
+        if found is not None:
+            self._received.remove(found)
+        return found
+
+    def _read(self) -> ToVehicleProcess | None:
         try:
             return self._pipe.recv() if self._pipe.poll() else None
         except (EOFError, OSError) as error:
@@ -122,7 +137,9 @@ class VehicleProcess:
         self._line, self._call = line, call
         self._speed = float(call.options.get("clock_speed", 1.0))
         self._identity = call.identity
+        self._is_open = self._may_interrupt = False
         self._vehicle = self._open_vehicle()
+        self._is_open = True
         self._show_due_s = 0.0
         self._trial_id: int | None = None
         self._stop: StopRequest | None = None
@@ -160,7 +177,9 @@ class VehicleProcess:
     def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
         connect = get_kind(self._call.kind).connect
         assert connect is not None, self._call.kind
-        vehicle = connect(self._call.options, safe_gains, self._identity, self._call.trial_parameters)
+        vehicle = connect(
+            self._call.options, safe_gains, self._identity, self._call.trial_parameters, self._while_waiting
+        )
         self._pin(vehicle)
         return vehicle
 
@@ -184,7 +203,30 @@ class VehicleProcess:
         self._forward_command(message)
         return None
 
-    def _forward_command(self, ordered: VehicleCommand) -> None:
+    def _while_waiting(self) -> None:
+        """In whatever takes time on the ground: an order goes out at once, and ends that."""
+        if not self._is_open:
+            return
+        self._publish_status()
+        ordered = self._line.receive_command()
+        if ordered is not None and self._forward_command(ordered) and self._may_interrupt:
+            self._may_interrupt = False
+            raise InterruptedByOrderError(
+                f"It was interrupted: {ordered.order} was ordered ({ordered.reason}).",
+                hint="See what the vehicle does, then ask again.",
+            )
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """By the first order that comes: what follows upon it, as giving the safe gains back, is done to the end."""
+        self._may_interrupt = True
+        try:
+            yield
+        finally:
+            self._may_interrupt = False
+
+    def _forward_command(self, ordered: VehicleCommand) -> bool:
+        """Whether it went out."""
         problem = _EXPIRED if _has_expired(ordered) else ""
         if not problem:
             try:
@@ -192,7 +234,8 @@ class VehicleProcess:
                 act(ordered.reason)
             except VehicleError as error:
                 problem = str(error)
-        self._line.send(CommandForwarded(ordered.order, ordered.reason, problem))
+        self._line.send(CommandForwarded(ordered.number, ordered.order, ordered.reason, problem))
+        return not problem
 
     def _publish_status(self) -> None:
         now_s = self._call.clock.now_s()
@@ -222,7 +265,8 @@ class VehicleProcess:
             if self._vehicle.condition().armed:  # whatever takes time would keep Land waiting
                 raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
             self._require_vehicle(asked.safe_gains)
-            answer = self._perform(asked.kind)
+            with self._interruptible():
+                answer = self._perform(asked.kind)
         except VehicleError as error:
             return VehicleResponse(problem=str(error), concern=self._vehicle.concern, held=self._held())
         return answer
@@ -233,7 +277,7 @@ class VehicleProcess:
             case ActKind.CHECK:
                 checks = self._vehicle.check()
             case ActKind.PARAMETERS:
-                parameters = self._vehicle.parameters(self._progress)
+                parameters = self._vehicle.parameters(lambda _count, _of: None)
             case ActKind.RESTORE:
                 self._vehicle.restore()
             case ActKind.RELEASE:
@@ -249,10 +293,6 @@ class VehicleProcess:
             identity=self._vehicle.identity,
         )
 
-    def _progress(self, _count: int, _of: int) -> None:
-        self._poll_commands()
-        self._publish_status()
-
     def _require_vehicle(self, safe_gains: Mapping[str, float]) -> None:
         """A vehicle whose safe gains a person has changed is connected anew, which writes them once it is pinned."""
         if dict(self._vehicle.safe_gains) != dict(safe_gains):
@@ -267,7 +307,7 @@ class VehicleProcess:
             self._require_vehicle(orders.safe_gains)
             with self._logged(orders):
                 try:
-                    self._line.send(GainsStaged(self._vehicle.stage(orders.gains)))
+                    self._line.send(GainsStaged(self._stage(orders.gains)))
                     if self._await_takeoff_clearance():
                         self._line.send(FlightLanded(self._take_off(orders)))
                 finally:
@@ -290,6 +330,10 @@ class VehicleProcess:
         finally:
             self._vehicle.log_to(None)
 
+    def _stage(self, gains: Mapping[str, float]) -> dict[str, float]:
+        with self._interruptible():
+            return self._vehicle.stage(gains)
+
     def _await_takeoff_clearance(self) -> bool:
         """Wait for the worker's word, attending the vehicle. Raises PipeClosedError, VehicleError for one that is too
         late."""
@@ -306,12 +350,14 @@ class VehicleProcess:
         asked: set[str] = set()
 
         def should_stop() -> StopRequest | None:
+            self._may_interrupt = False  # from here on the flight itself hears orders
             stop = self._should_stop()
             if stop is not None:
                 asked.add(stop.reason)
             return stop
 
-        record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=should_stop)
+        with self._interruptible():
+            record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=should_stop)
         monitor.flush()
         monitor.phase("landed")
         return mark_if_requested(record, asked)
@@ -335,13 +381,13 @@ class VehicleProcess:
         match message:
             case CancelFlight(trial_id, reason) if trial_id == self._trial_id:
                 self._stop = self._stop or StopRequest(reason)
-            case VehicleCommand(order, reason) if _has_expired(message):
-                self._line.send(CommandForwarded(order, reason, _EXPIRED))
-            case VehicleCommand(order, reason):
+            case VehicleCommand(number, order, reason) if _has_expired(message):
+                self._line.send(CommandForwarded(number, order, reason, _EXPIRED))
+            case VehicleCommand(number, order, reason):
                 if order == "motors off":
                     self._stop = StopRequest(reason, motors_off=True)
                 self._stop = self._stop or StopRequest(reason)
-                self._line.send(CommandForwarded(order, reason))
+                self._line.send(CommandForwarded(number, order, reason))
             case _:
                 pass
 

@@ -5,12 +5,14 @@ pipe between them breaks: a flight is then aborted, the vehicle lands and is lef
 ends; the next worker's session waits until then.
 """
 
+import itertools
 import os
 import queue
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -19,7 +21,7 @@ from typing import Final
 
 from app.core.clock import REAL_TIME, Clock
 from app.fleet.states import ActKind
-from app.live.messages import FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
+from app.live.messages import NO_LINK, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import process_context
 from app.trials.crew import (
     CancelFlight,
@@ -37,6 +39,10 @@ from app.trials.crew import (
 from app.vehicles.base import CheckItem, Identity, OptionValue
 from app.vehicles.errors import SafeGainsError, VehicleError
 
+_ENDED: Final = (
+    "The process that had the vehicle's link ended; nobody knows whether it told the vehicle. Use the vehicle's own "
+    "remote control now."
+)
 SHUTDOWN_TIMEOUT_S: Final = 5.0
 TAKE_OFF_TIMEOUT_S: Final = 2.0
 """Nothing takes off later after its operator's word than that operator expects it."""
@@ -92,8 +98,9 @@ class VehicleResponse:
 @dataclass(frozen=True, slots=True)
 class VehicleCommand:
     """Said to the process at any moment: land, or motors off; not to be carried out after `by_s` of this computer's
-    monotonic clock."""
+    monotonic clock. `number` comes back in the answer."""
 
+    number: int
     order: VehicleCommandKind
     reason: str
     by_s: float
@@ -103,6 +110,7 @@ class VehicleCommand:
 class CommandForwarded:
     """Said by the process: an order was passed on to the vehicle; `problem` when it could not be."""
 
+    number: int
     order: VehicleCommandKind
     reason: str
     problem: str = ""
@@ -132,6 +140,9 @@ class VehicleConnection:
         self._process = context.Process(target=run, args=(theirs, call), name=f"session {call.name}", daemon=True)
         self._process.start()
         theirs.close()
+        self._numbers = itertools.count(1)
+        self._orders: dict[int, Future[str]] = {}
+        """Those that the process has not answered, by their numbers."""
         self._ended = threading.Event()
         self._open = False
         self.trial_id: int | None = None
@@ -187,9 +198,19 @@ class VehicleConnection:
     def cancel_flight(self, trial_id: int, reason: str) -> None:
         self._post(CancelFlight(trial_id, reason))
 
-    def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
-        """Whether the process was told; it passes the order on at once. False while there is no link."""
-        return self._open and self.alive and self._post(VehicleCommand(order, reason, by_s))
+    def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
+        """What will say why the order did not go out to the vehicle, or nothing once it has."""
+        told: Future[str] = Future()
+        number = next(self._numbers)
+        self._orders[number] = told
+        command = VehicleCommand(number, order, reason, by_s)
+        if not (self._open and self.alive and self._post(command)):
+            self._answer_order(number, NO_LINK)
+        return told
+
+    def _answer_order(self, number: int, problem: str) -> None:
+        if (told := self._orders.pop(number, None)) is not None:
+            told.set_result(problem)
 
     def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
@@ -212,8 +233,11 @@ class VehicleConnection:
         try:
             while True:
                 match self._pipe.recv():
-                    case VehicleStatus() | CommandForwarded() as news:
-                        self._hear_of(news)
+                    case VehicleStatus() as status:
+                        self._hear_of(status)
+                    case CommandForwarded(number, problem=problem) as forwarded:
+                        self._answer_order(number, problem)
+                        self._hear_of(forwarded)
                     case said:
                         self._said.put(said)
         except (EOFError, OSError):
@@ -221,6 +245,8 @@ class VehicleConnection:
         finally:
             self._ended.set()
             self._said.put(None)
+            for number in tuple(self._orders):
+                self._answer_order(number, _ENDED)
             with self._sending:
                 self._pipe.close()
 

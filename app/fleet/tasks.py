@@ -8,7 +8,7 @@ afterwards.
 import datetime as dt
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -28,7 +28,7 @@ from app.fleet.acts import ActTask, LinkedVehicle
 from app.fleet.seat import run_vehicle_process
 from app.fleet.session import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleConnection, VehicleResponse
 from app.fleet.states import GIVES_GAINS, ActKind
-from app.live.messages import VehicleCommandKind, VehicleLinkState, VehicleStatus
+from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.trials.flying import AbortRegistry, Publish
 from app.vehicles.errors import SafeGainsError, VehicleError
 
@@ -107,11 +107,12 @@ class VehicleConnectionManager:
 
     # ---- from any thread
 
-    def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> bool:
-        """Whether the vehicle's session was told. A flight that waits for its take-off stands down by it too."""
+    def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
+        """What will say why the order did not go out to the vehicle, or nothing once it has. A flight that waits for
+        its take-off stands down by it too."""
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:
-            return False
+            return _refused(NO_LINK)
         told = session.send_command(order, reason, by_s)
         if (trial_id := session.trial_id) is not None:
             self._abort_registry.abort(trial_id, reason)
@@ -299,7 +300,7 @@ class VehicleConnectionManager:
                 if concern and not slot.concern:
                     self._record_in_background(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern
-            case CommandForwarded(order, reason, problem):
+            case CommandForwarded(order=order, reason=reason, problem=problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
                 self._record_in_background(lambda t: acts.record_command(t, vehicle_id, kind, reason, problem=problem))
 
@@ -357,6 +358,12 @@ def _answered(transaction: Transaction, task: ActTask, answered: VehicleResponse
         acts.pin_identity(transaction, vehicle_id, answered.identity)
     read_back = answered.held if task.kind in GIVES_GAINS and answered.held else None
     acts.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
+
+
+def _refused(problem: str) -> Future[str]:
+    told: Future[str] = Future()
+    told.set_result(problem)
+    return told
 
 
 def _no_link_error() -> VehicleError:

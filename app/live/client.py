@@ -33,6 +33,8 @@ from app.live.messages import (
 FIRST_PAUSE_S: Final = 0.05
 LONGEST_PAUSE_S: Final = 0.5
 ANSWER_TIMEOUT_S: Final = 2.0
+ORDER_TIMEOUT_S: Final = 1.5
+"""What comes later is not carried out: that leaves the worker the time to say so."""
 PING_EVERY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
@@ -164,7 +166,7 @@ class LiveClient:
 
 
 def _deadline_s() -> float:
-    return time.monotonic() + ANSWER_TIMEOUT_S
+    return time.monotonic() + ORDER_TIMEOUT_S
 
 
 def _link_down(why: str) -> LinkDownError:

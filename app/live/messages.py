@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 MAX_LINE_BYTES: Final = 256 * 1024
+NO_LINK: Final = "No worker has a link to this vehicle, so it was told nothing: use its own remote control now."
 
 Phase = Literal["staging", "staged", "flying", "landed", "ended"]
 VehicleLinkState = Literal["connecting", "connected", "gone"]
@@ -73,7 +74,7 @@ class WorkerHello:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abort:
     """End this trial's flight now: safe gains, land. `request` comes back in the answer. After `by_s` of the computer's
-    monotonic clock whoever asked has been told that it could not be: it is not carried out any more."""
+    monotonic clock it is not carried out any more, and whoever asked is told that it could not be."""
 
     request: int
     trial_id: int
@@ -107,11 +108,13 @@ class VehicleOrder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleOrderAnswer:
-    """`accepted` is False when the worker has no link to that vehicle."""
+    """`accepted` once the process that has the vehicle's link has passed the order on; `problem` says why it was not,
+    and then it is not carried out later."""
 
     request: int
     vehicle_id: int
     accepted: bool
+    problem: str = ""
     type: Literal["order answer"] = "order answer"
 
 

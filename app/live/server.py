@@ -10,6 +10,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -40,6 +41,13 @@ SLOW_CLIENT_BYTES: Final = 256 * 1024
 """Unread bytes beyond which a client gets neither telemetry nor a vehicle's status until it has caught up."""
 STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
 """Unread bytes beyond which a client is dropped; it reconnects and reads the database."""
+CONFIRMATION_S: Final = 0.25
+"""How long after the time of an order the word is waited for that it went out just in time."""
+LATE: Final = "The order reached the worker too late and is not carried out: use the vehicle's own remote control now."
+UNCONFIRMED: Final = (
+    "The process that has the vehicle's link did not answer, and does not carry the order out later: use the vehicle's "
+    "own remote control now."
+)
 
 _log = structlog.get_logger(__name__)
 
@@ -48,8 +56,9 @@ class LiveServer:
     """Listens at `path` between enter and exit.
 
     `abort(trial_id, reason)` is called on the socket's thread and says whether that trial flies;
-    `order(vehicle_id, order, reason, by_s)` whether that vehicle was told; `hello()` describes the worker to a new
-    client. All must return at once. What comes after its time, because this process stood still, is not carried out.
+    `order(vehicle_id, order, reason, by_s)` will say why that vehicle could not be told, or nothing once it was;
+    `hello()` describes the worker to a new client. All must return at once. What comes after its time, because this
+    process stood still, is not carried out.
     """
 
     def __init__(
@@ -57,7 +66,7 @@ class LiveServer:
         path: Path,
         *,
         abort: Callable[[int, str], bool],
-        order: Callable[[int, VehicleCommandKind, str, float], bool],
+        order: Callable[[int, VehicleCommandKind, str, float], Future[str]],
         hello: Callable[[], WorkerHello],
     ) -> None:
         self._path = path
@@ -65,6 +74,7 @@ class LiveServer:
         self._order = order
         self._hello = hello
         self._writers: set[asyncio.StreamWriter] = set()
+        self._orders: set[asyncio.Task[None]] = set()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name="live", daemon=True)
 
@@ -119,10 +129,11 @@ class LiveServer:
                 accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
                 answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
                 _log.info("abort asked", trial_id=trial_id, reason=reason, accepted=accepted)
-            case VehicleOrder(request=request, vehicle_id=vehicle_id, order=order, reason=reason, by_s=by_s):
-                accepted = _is_in_time(by_s) and self._order(vehicle_id, order, reason, by_s)
-                answer = VehicleOrderAnswer(request=request, vehicle_id=vehicle_id, accepted=accepted)
-                _log.info("order given", vehicle_id=vehicle_id, order=order, reason=reason, accepted=accepted)
+            case VehicleOrder() as ordered:
+                task = self._loop.create_task(self._pass_on(ordered, writer))
+                self._orders.add(task)
+                task.add_done_callback(self._orders.discard)
+                return
             case Ping(request=request):
                 answer = Pong(request=request)
             case other:
@@ -130,6 +141,18 @@ class LiveServer:
                     f"A client sent {other.type!r}, which only the worker sends.",
                     hint="Connect to the worker's socket with Gainline only.",
                 )
+        writer.write(encode(answer))
+
+    async def _pass_on(self, ordered: VehicleOrder, writer: asyncio.StreamWriter) -> None:
+        """Answer as soon as the vehicle's process has, and soon after its time when that says nothing."""
+        problem = LATE
+        if _is_in_time(ordered.by_s):
+            told = asyncio.wrap_future(self._order(ordered.vehicle_id, ordered.order, ordered.reason, ordered.by_s))
+            await asyncio.wait({told}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
+            problem = told.result() if told.done() else UNCONFIRMED
+        vehicle_id, accepted = ordered.vehicle_id, not problem
+        _log.info("order given", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
+        answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)
         writer.write(encode(answer))
 
     def _send_all(self, message: FromWorker) -> None:

@@ -34,11 +34,12 @@ class VehicleKind:
 
     `experiments` names those that it can fly; where that depends on its settings, `suits(options)` those that it can
     fly with these. `open(options, safe_gains, trial_parameters)` gets complete, checked options and returns a vehicle
-    that holds its safe gains. `connect(options, safe_gains, identity, trial_parameters)` opens a link that stays open
-    between flights; None: the kind has none, and is opened for each flight. It raises VehicleError when nobody answers,
-    or another than `identity` (None: whoever answers); an armed vehicle is returned, with nothing written to it and its
-    `concern` set. In the folder `trial_parameters` either keeps what a trial changes beside the gains, which is put
-    back even if this process dies.
+    that holds its safe gains. `connect(options, safe_gains, identity, trial_parameters, on_wait)` opens a link that
+    stays open between flights; None: the kind has none, and is opened for each flight. `on_wait` is called twice a
+    second at least while the vehicle is waited for on the ground; what it raises ends what is under way. `connect`
+    raises VehicleError when nobody answers, or another than `identity` (None: whoever answers); an armed vehicle is
+    returned, with nothing written to it and its `concern` set. In the folder `trial_parameters` either keeps what a
+    trial changes beside the gains, which is put back even if this process dies.
     `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
     says whether a vehicle of a real kind is a simulation all the same. `check_gains(options, gains)` raises GainsError
     for gains that such a vehicle is never given, whatever anybody overrules.
@@ -52,7 +53,7 @@ class VehicleKind:
     experiments: tuple[str, ...]
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains, Path | None], Vehicle]
-    connect: Callable[[Options, Gains, Identity | None, Path], ConnectedVehicle] | None = None
+    connect: Callable[[Options, Gains, Identity | None, Path, Callable[[], None]], ConnectedVehicle] | None = None
     find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
     is_simulation: Callable[[Options, Hosts], bool] = _never
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None

@@ -338,7 +338,7 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
     manager.maintain()
     manager._reconnect_executor.shutdown()
     assert events == ["found", "closed"]
-    assert not manager.order(vehicle["id"], "land", "a person asks", by_s=0.0)
+    assert "No worker has a link" in manager.order(vehicle["id"], "land", "a person asks", by_s=0.0).result(0)
     assert seen(client, vehicle)["state"] == "disconnected"
 
 

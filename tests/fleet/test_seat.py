@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from multiprocessing import Pipe
 from pathlib import Path
 
@@ -11,15 +12,46 @@ import pytest
 
 from app.fleet import seat as seat_module
 from app.fleet.seat import VehicleProcess, WorkerPipe
-from app.fleet.session import ConnectionOpened, ConnectionRequest, FromVehicleProcess, VehicleRequest
+from app.fleet.session import (
+    CommandForwarded,
+    ConnectionOpened,
+    ConnectionRequest,
+    FromVehicleProcess,
+    VehicleCommand,
+    VehicleRequest,
+)
 from app.fleet.states import ActKind
-from app.trials.crew import FlightFailure, FlightFinished, FlightRequest, GainsStaged, SafeGainsRestored, TakeOffCommand
+from app.trials.crew import (
+    CancelFlight,
+    CancelTakeOff,
+    FlightFailure,
+    FlightFinished,
+    FlightLanded,
+    FlightRequest,
+    GainsStaged,
+    SafeGainsRestored,
+    TakeOffCommand,
+)
 from app.vehicles.base import FlightOptions, Identity
 from app.vehicles.kinds import Options
+from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED
 from tests.vehicles.mavlink.rigs import LockstepRig
+
+
+class AnsweringRig(LockstepRig):
+    """Calls `on_heard` with whatever reaches the drone."""
+
+    on_heard: Callable[[Message], None] = staticmethod(lambda _message: None)
+
+    def write(self, data: bytes) -> bool:
+        seen = len(self.heard)
+        taken = super().write(data)
+        for _, message in self.heard[seen:]:
+            self.on_heard(message)
+        return taken
 
 
 class RecordingPipe(WorkerPipe):
@@ -29,7 +61,7 @@ class RecordingPipe(WorkerPipe):
         self.workers_end, theirs = Pipe()
         super().__init__(theirs)
         self.said: list[FromVehicleProcess] = []
-        self.on_staged: Callable[[], None] = lambda: None
+        self.on_staged: Callable[[], object] = lambda: None
 
     def send(self, message: FromVehicleProcess) -> None:
         self.said.append(message)
@@ -40,9 +72,13 @@ class RecordingPipe(WorkerPipe):
 
 
 @pytest.fixture
-def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[AnsweringRig]:
     def connect(
-        options: Options, safe_gains: Mapping[str, float], identity: Identity | None, trial_parameters: Path
+        options: Options,
+        safe_gains: Mapping[str, float],
+        identity: Identity | None,
+        trial_parameters: Path,
+        on_wait: Callable[[], None],
     ) -> MavlinkVehicle:
         return MavlinkVehicle(
             options,
@@ -54,15 +90,18 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[LockstepRig]:
             observes=True,
             decided=identity is not None,
             trial_parameters=trial_parameters,
+            on_wait=on_wait,
         )
 
-    with LockstepRig() as one:
+    with AnsweringRig() as one:
         kind = replace(MAVLINK, connect=connect)
         monkeypatch.setattr(seat_module, "get_kind", lambda _: kind)
         yield one
 
 
-def started(rig: LockstepRig, line: WorkerPipe, folder: Path, safe_gains: Mapping[str, float] = SAFE) -> VehicleProcess:
+def started(
+    rig: AnsweringRig, line: WorkerPipe, folder: Path, safe_gains: Mapping[str, float] = SAFE
+) -> VehicleProcess:
     call = ConnectionRequest(
         vehicle_id=1,
         name="Bench drone",
@@ -77,7 +116,7 @@ def started(rig: LockstepRig, line: WorkerPipe, folder: Path, safe_gains: Mappin
     return VehicleProcess(line, call)
 
 
-def orders(rig: LockstepRig, folder: Path) -> FlightRequest:
+def orders(rig: AnsweringRig, folder: Path) -> FlightRequest:
     return FlightRequest(
         campaign_id=1,
         trial_id=1,
@@ -93,7 +132,7 @@ def orders(rig: LockstepRig, folder: Path) -> FlightRequest:
 
 @pytest.mark.parametrize("takes_its_safe_gains", [True, False])
 def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains_can_be_verified(
-    rig: LockstepRig, tmp_path: Path, takes_its_safe_gains: bool
+    rig: AnsweringRig, tmp_path: Path, takes_its_safe_gains: bool
 ) -> None:
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
@@ -114,7 +153,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
     )
 
 
-def test_a_take_off_that_comes_too_late_does_not_take_place(rig: LockstepRig, tmp_path: Path) -> None:
+def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, tmp_path: Path) -> None:
     """Seen: the process stood still for 20 s, and the vehicle took off when nobody expected it any more."""
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
@@ -130,7 +169,7 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(rig: LockstepRig, tm
     assert process._vehicle.read_gains() == SAFE
 
 
-def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: LockstepRig, tmp_path: Path) -> None:
+def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: AnsweringRig, tmp_path: Path) -> None:
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
     assert line.said == [ConnectionOpened(identity=process._vehicle.identity, concern="", held=dict(SAFE))]
@@ -142,7 +181,7 @@ def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: 
 
 
 def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_safe_gains_become(
-    rig: LockstepRig, tmp_path: Path
+    rig: AnsweringRig, tmp_path: Path
 ) -> None:
     """Its owner's gains, met for the first time, and a slip of the hand in the safe gains named for it."""
     process = started(rig, RecordingPipe(), tmp_path, safe_gains=TUNED)
@@ -152,3 +191,114 @@ def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_sa
     assert "nothing was written" in answered.concern
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=SAFE))
     assert (answered.concern, answered.held) == ("", dict(SAFE))
+
+
+MOTORS_OFF = VehicleCommand(7, "motors off", "people below", math.inf)
+LAND = VehicleCommand(8, "land", "it drifts", math.inf)
+
+
+def order_when(
+    rig: AnsweringRig, line: RecordingPipe, kind: str, *ordered: VehicleCommand, nth: int = 1
+) -> list[float]:
+    """Give orders as the drone hears the n-th message of that kind from now on; the vehicle's time of that."""
+    heard: list[str] = []
+    ordered_s: list[float] = []
+
+    def on_heard(message: Message) -> None:
+        heard.append(message.get_type())
+        if message.get_type() == kind and heard.count(kind) == nth:
+            ordered_s.append(rig.now_s())
+            for each in ordered:
+                line.workers_end.send(each)
+
+    rig.on_heard = on_heard
+    return ordered_s
+
+
+def stops_told_s(rig: AnsweringRig) -> list[float]:
+    return [at_s for at_s, message in rig.heard if message.get_type() == "COMMAND_LONG"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "while_it_hears"),
+    [
+        (ActKind.CHECK, "PARAM_REQUEST_READ"),
+        (ActKind.PARAMETERS, "PARAM_REQUEST_LIST"),
+        (ActKind.RESTORE, "PARAM_SET"),
+        (ActKind.RELEASE, "PARAM_SET"),
+    ],
+)
+def test_an_order_is_carried_out_at_once_and_ends_the_act_under_way(
+    rig: AnsweringRig, tmp_path: Path, kind: ActKind, while_it_hears: str
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    ordered_s, told = order_when(rig, line, while_it_hears, MOTORS_OFF), len(stops_told_s(rig))
+    answered = process._act(VehicleRequest(kind=kind, safe_gains=SAFE))
+    assert "interrupted: motors off was ordered (people below)" in answered.problem
+    assert line.said[-1] == CommandForwarded(7, "motors off", "people below")
+    assert stops_told_s(rig)[told] - ordered_s[0] < 0.5
+
+
+def test_an_order_that_comes_too_late_is_not_passed_on_and_interrupts_nothing(
+    rig: AnsweringRig, tmp_path: Path
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    order_when(rig, line, "PARAM_SET", replace(MOTORS_OFF, by_s=time.monotonic() - 0.001))
+    told = len(stops_told_s(rig))
+    assert process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE)).problem == ""
+    said = line.said[-1]
+    assert isinstance(said, CommandForwarded)
+    assert (said.number, "too late" in said.problem) == (7, True)
+    assert len(stops_told_s(rig)) == told
+
+
+def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_with_its_safe_gains(
+    rig: AnsweringRig, tmp_path: Path
+) -> None:
+    """Land, and motors off at once after it, which comes while the safe gains are given back; what waits before them in
+    the pipe is kept."""
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    line.workers_end.send(CancelFlight(9, "of another flight"))
+    line.on_staged = lambda: line.workers_end.send(CancelTakeOff())
+    order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
+    process._fly(orders(rig, tmp_path))
+    answers = [said for said in line.said if isinstance(said, CommandForwarded)]
+    assert [(said.order, said.problem) for said in answers] == [("land", ""), ("motors off", "")]
+    [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
+    assert ("interrupted: land was ordered (it drifts)" in failure.what, failure.unsafe) == (True, False)
+    assert SafeGainsRestored(dict(SAFE)) in line.said
+    assert not any(isinstance(said, GainsStaged) for said in line.said)
+    assert line.receive() == CancelFlight(9, "of another flight")
+    assert process._vehicle.read_gains() == SAFE
+
+
+def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_ground(
+    rig: AnsweringRig, tmp_path: Path
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    line.workers_end.send(TakeOffCommand(by_s=math.inf))
+    line.on_staged = partial(order_when, rig, line, "PARAM_REQUEST_READ", LAND)
+    process._fly(orders(rig, tmp_path))
+    [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
+    assert ("land was ordered" in failure.what, failure.not_flown, failure.unsafe) == (True, True, False)
+    assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
+    assert process._vehicle.read_gains() == SAFE
+
+
+def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_out_and_they_are_verified(
+    rig: AnsweringRig, tmp_path: Path
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    line.workers_end.send(TakeOffCommand(by_s=math.inf))
+    line.on_staged = partial(order_when, rig, line, "PARAM_SET", MOTORS_OFF, nth=2)
+    process._fly(orders(rig, tmp_path))
+    assert CommandForwarded(7, "motors off", "people below") in line.said
+    assert not any(isinstance(said, FlightFailure) for said in line.said)
+    assert any(isinstance(said, FlightLanded) for said in line.said)
+    assert SafeGainsRestored(dict(SAFE)) in line.said
+    assert process._vehicle.concern == ""

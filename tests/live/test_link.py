@@ -8,6 +8,7 @@ import stat
 import threading
 import time
 from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -60,10 +61,17 @@ def status(altitude_m: float = 0.1) -> VehicleStatus:
     )
 
 
+def told(problem: str = "") -> Future[str]:
+    """What became of an order, at once."""
+    answer: Future[str] = Future()
+    answer.set_result(problem)
+    return answer
+
+
 def server(
     path: Path,
     abort: Callable[[int, str], bool] = lambda _trial, _why: False,
-    order: Callable[[int, VehicleCommandKind, str, float], bool] = lambda _vehicle, _order, _why, _by_s: False,
+    order: Callable[[int, VehicleCommandKind, str, float], Future[str]] = lambda *_: told("nobody has its link"),
 ) -> LiveServer:
     return LiveServer(
         path, abort=abort, order=order, hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[2])
@@ -170,16 +178,17 @@ def test_an_abort_reaches_the_worker_and_its_answer_comes_back(tmp_path: Path) -
 def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_vehicle(tmp_path: Path) -> None:
     given: list[tuple[int, VehicleCommandKind, str]] = []
 
-    def order(vehicle_id: int, what: VehicleCommandKind, reason: str, _by_s: float) -> bool:
+    def order(vehicle_id: int, what: VehicleCommandKind, reason: str, _by_s: float) -> Future[str]:
         given.append((vehicle_id, what, reason))
-        return vehicle_id == 5
+        return told("" if vehicle_id == 5 else "nobody has its link")
 
     async def scenario() -> None:
         with server(tmp_path / "w.sock", order=order):
             async with connected(tmp_path / "w.sock") as web:
                 await web.until(lambda: web.client.connected)
                 assert (await web.client.order(5, "land", "it drifts")).accepted
-                assert not (await web.client.order(6, "motors off", "it burns")).accepted
+                refused = await web.client.order(6, "motors off", "it burns")
+                assert (refused.accepted, refused.problem) == (False, "nobody has its link")
 
     asyncio.run(scenario())
     assert given == [(5, "land", "it drifts"), (6, "motors off", "it burns")]
@@ -195,9 +204,9 @@ def test_what_comes_after_its_time_is_not_carried_out(tmp_path: Path) -> None:
         done.append(reason)
         return True
 
-    def order(_vehicle_id: int, _order: VehicleCommandKind, reason: str, _by_s: float) -> bool:
+    def order(_vehicle_id: int, _order: VehicleCommandKind, reason: str, _by_s: float) -> Future[str]:
         done.append(reason)
-        return True
+        return told()
 
     with server(path, abort, order), socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as web:
         web.connect(str(path))
@@ -209,13 +218,66 @@ def test_what_comes_after_its_time_is_not_carried_out(tmp_path: Path) -> None:
                 encode(VehicleOrder(request=request, vehicle_id=5, order="motors off", reason=reason, by_s=by_s))
             )
         answers = [decode(reader.readline()) for _ in range(4)]
-    assert [answer.accepted for answer in answers if isinstance(answer, AbortAnswer | VehicleOrderAnswer)] == [
-        False,
-        False,
-        True,
-        True,
-    ]
+    accepted = {
+        (type(answer), answer.request): answer.accepted
+        for answer in answers
+        if isinstance(answer, AbortAnswer | VehicleOrderAnswer)
+    }
+    assert accepted == {
+        (AbortAnswer, 0): False,
+        (VehicleOrderAnswer, 0): False,
+        (AbortAnswer, 1): True,
+        (VehicleOrderAnswer, 1): True,
+    }
     assert done == ["abort in time", "in time"]
+
+
+def test_an_order_is_acknowledged_once_the_vehicles_process_has_taken_it_and_holds_up_nothing(tmp_path: Path) -> None:
+    """Seen: it was acknowledged as soon as it was in the pipe of a process that was busy, which discarded it later."""
+    slow: Future[str] = Future()
+    given: list[str] = []
+
+    def order(_vehicle_id: int, _order: VehicleCommandKind, reason: str, _by_s: float) -> Future[str]:
+        given.append(reason)
+        return slow
+
+    async def scenario() -> None:
+        with server(tmp_path / "w.sock", lambda *_: True, order):
+            async with connected(tmp_path / "w.sock") as web:
+                await web.until(lambda: web.client.connected)
+                asked = asyncio.create_task(web.client.order(5, "land", "it drifts"))
+                await web.until(lambda: given == ["it drifts"])
+                assert (await web.client.abort(2, "meanwhile")).accepted
+                assert not asked.done()
+                slow.set_result("")
+                answer = await asked
+                assert (answer.accepted, answer.problem) == (True, "")
+
+    asyncio.run(scenario())
+
+
+def test_an_order_that_nobody_takes_is_told_to_be_not_carried_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_module, "ORDER_TIMEOUT_S", 0.05)
+    never: Future[str] = Future()
+    deadlines_s: list[float] = []
+
+    def order(_vehicle_id: int, _order: VehicleCommandKind, _reason: str, by_s: float) -> Future[str]:
+        deadlines_s.append(by_s)
+        return never
+
+    async def scenario() -> None:
+        with server(tmp_path / "w.sock", order=order):
+            async with connected(tmp_path / "w.sock") as web:
+                await web.until(lambda: web.client.connected)
+                answer = await web.client.order(5, "motors off", "it burns")
+                assert not answer.accepted
+                assert "did not answer, and does not carry the order out later" in answer.problem
+                assert time.monotonic() > deadlines_s[0], "from then on its process refuses it"
+                never.set_result("")  # late, to nobody
+
+    asyncio.run(scenario())
 
 
 def test_a_worker_that_stands_still_is_noticed_and_one_that_goes_on_too(

@@ -4,7 +4,7 @@ from typing import Final
 
 from app.core.policy import Gains
 from app.vehicles.base import CheckItem
-from app.vehicles.errors import VehicleError
+from app.vehicles.errors import InterruptedByOrderError, VehicleError
 from app.vehicles.mavlink import parameters
 from app.vehicles.mavlink.profiles.base import GainSet, check_gains
 from app.vehicles.mavlink.radio import AutopilotLink
@@ -63,6 +63,8 @@ class GainStore:
         """Read the gains, and judge whether they are those that they should be."""
         try:
             held, found = self.read(), ""
+        except InterruptedByOrderError:
+            raise
         except VehicleError as error:
             held, found = {}, str(error)
         return CheckItem(

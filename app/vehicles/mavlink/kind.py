@@ -1,5 +1,6 @@
 """The kind `mavlink`: vehicles under Paparazzi, ArduCopter or PX4 at the other end of a link."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -35,10 +36,21 @@ def _open(options: Options, safe_gains: Gains, trial_parameters: Path | None) ->
 
 
 def _connect(
-    options: Options, safe_gains: Gains, identity: Identity | None, trial_parameters: Path
+    options: Options,
+    safe_gains: Gains,
+    identity: Identity | None,
+    trial_parameters: Path,
+    on_wait: Callable[[], None],
 ) -> ConnectedVehicle:
-    decided = identity is not None
-    return _vehicle(options, safe_gains, identity, observes=True, decided=decided, trial_parameters=trial_parameters)
+    return _vehicle(
+        options,
+        safe_gains,
+        identity,
+        observes=True,
+        decided=identity is not None,
+        trial_parameters=trial_parameters,
+        on_wait=on_wait,
+    )
 
 
 def _vehicle(
@@ -49,6 +61,7 @@ def _vehicle(
     observes: bool,
     decided: bool,
     trial_parameters: Path | None = None,
+    on_wait: Callable[[], None] = lambda: None,
 ) -> "MavlinkVehicle":
     """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows.
 
@@ -71,6 +84,7 @@ def _vehicle(
             decided=decided,
             trial_parameters=trial_parameters,
             source=source,
+            on_wait=on_wait,
         )
     except BaseException:
         if source is not None:

@@ -13,6 +13,7 @@ from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Target
 from app.vehicles.mavlink.radio import REPLY_TIMEOUT_S, AutopilotLink
+from app.vehicles.mavlink.signals import PacketReceived
 from app.vehicles.mavlink.transports import Transport
 
 TAKEOFF_ALTITUDE_M: Final = 3.0
@@ -31,11 +32,12 @@ def open_radio(
     clock: Clock | None,
     *,
     overhear: Callable[[Received], None] | None,
+    on_wait: Callable[[list[PacketReceived]], None] = lambda _heard: None,
     transport: Transport | None = None,
 ) -> AutopilotLink:
-    """`clock` is the vehicle's time, by default that of its options; `transport` is read by whoever listens, in place
-    of a thread that reads the address. Raises LinkError when its link or its log cannot be opened, InputError for a
-    signing key that cannot be read or used."""
+    """`clock` is the vehicle's time, by default that of its options; `overhear` and `on_wait` are as of AutopilotLink;
+    `transport` is read by whoever listens, in place of a thread that reads the address. Raises LinkError when its link
+    or its log cannot be opened, InputError for a signing key that cannot be read or used."""
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
     key_file = str(options["signing_key_file"])
@@ -56,7 +58,13 @@ def open_radio(
         altitude_m=TAKEOFF_ALTITUDE_M,
     )
     return AutopilotLink(
-        link, profile, clock, aim, patience_s=REPLY_TIMEOUT_S * timeout_factor_of(options), overhear=overhear
+        link,
+        profile,
+        clock,
+        aim,
+        patience_s=REPLY_TIMEOUT_S * timeout_factor_of(options),
+        overhear=overhear,
+        on_wait=on_wait,
     )
 
 

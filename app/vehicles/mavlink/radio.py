@@ -92,7 +92,8 @@ class VehicleMemory:
 
 class AutopilotLink:
     """A link with a profile; an answer is waited for `patience_s`. Only the autopilot's own component is listened to;
-    `overhear` gets every message besides, of whichever. For one thread."""
+    `overhear` gets every message besides, of whichever. Whatever waits for the vehicle `listen`s: `on_wait` is told
+    then of what came, every `patience_s` at least, and what it raises ends what is under way. For one thread."""
 
     def __init__(
         self,
@@ -103,6 +104,7 @@ class AutopilotLink:
         *,
         patience_s: float = REPLY_TIMEOUT_S,
         overhear: Callable[[Received], None] | None = None,
+        on_wait: Callable[[list[PacketReceived]], None] = lambda _heard: None,
     ) -> None:
         self.link: Final = link
         self.profile: Final = profile
@@ -111,6 +113,7 @@ class AutopilotLink:
         self.patience_s: Final = patience_s
         self.seen: Final = VehicleMemory()
         self._overhear = overhear
+        self._on_wait = on_wait
 
     @property
     def timeout_factor(self) -> float:
@@ -145,6 +148,12 @@ class AutopilotLink:
             self.link.send(message.kind, **message.fields)
 
     def listen(self, timeout_s: float) -> list[PacketReceived]:
+        """As `receive`, on behalf of what takes time: raises whatever `on_wait` does."""
+        heard = self.receive(timeout_s)
+        self._on_wait(heard)
+        return heard
+
+    def receive(self, timeout_s: float) -> list[PacketReceived]:
         """What has come since the last call, waiting at most so long for the first. Raises LinkError as `send`."""
         messages = self.link.receive(timeout_s)
         if self._overhear is not None:

@@ -109,10 +109,10 @@ class TrialRunner:
             self._error = self._error or error
 
     def _listen(self) -> None:
-        heard = self._radio.listen(LISTEN_S)
+        heard = self._radio.receive(LISTEN_S)
         now_s = self._radio.clock.now_s()
         if now_s - self._listened_s > STALL_S:
-            heard += self._radio.listen(LISTEN_S)
+            heard += self._radio.receive(LISTEN_S)
         self._listened_s = now_s
         for each in in_order(heard, self._look()):
             if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):

@@ -60,6 +60,7 @@ class MavlinkVehicle:
         trial_parameters: Path | None = None,
         source: AltitudeSource | None = None,
         transport: Transport | None = None,
+        on_wait: Callable[[], None] = lambda: None,
     ) -> None:
         """Connect, wait for the vehicle (the one of that `identity`, where it is given), and write the safe gains, once
         it is known to be disarmed. Unless they were `decided` by a person for this very vehicle, they are only compared
@@ -68,6 +69,7 @@ class MavlinkVehicle:
         `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
         closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it. The folder
         `trial_parameters` keeps what a trial changes beside the gains, for whoever connects next if this process dies.
+        `on_wait` is called while the vehicle is waited for on the ground; what it raises ends what is under way.
 
         With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
         without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
@@ -83,7 +85,8 @@ class MavlinkVehicle:
         self._order: RepeatedCommand | None = None
         self._lookout = None if source is None else AlignedAltitudeSource(source)
         overhear = None if source is None else source.on_message
-        self._radio = open_radio(options, clock, overhear=overhear, transport=transport)
+        self._on_wait = on_wait
+        self._radio = open_radio(options, clock, overhear=overhear, on_wait=self._while_waiting, transport=transport)
         self._gauges = StatusReader(self._radio)
         try:
             self._gains = GainStore(self._radio, safe_gains)
@@ -196,9 +199,9 @@ class MavlinkVehicle:
         asked for is repeated every second until telemetry agrees. Raises LinkError when the link is closed."""
         until_s = self._radio.clock.now_s() + timeout_s
         while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
-            heard = self._listen(min(left_s, _LISTEN_S))
-            if self._order is not None:
-                self._order.proceed(heard)
+            heard = self._radio.receive(min(left_s, _LISTEN_S))
+            self._judge_heard()
+            self._repeat_order(heard)
 
     def check(self) -> tuple[CheckItem, ...]:
         """Everything that has to be so before a flight; what is not so is an item, not an error. It takes two seconds
@@ -327,10 +330,13 @@ class MavlinkVehicle:
         preflight.identify(self._radio)
         self._listen(0.0)
 
-    def _listen(self, timeout_s: float) -> list[PacketReceived]:
+    def _listen(self, timeout_s: float) -> None:
         """Between flights: a vehicle that somebody else arms, or that tells another version or hardware id than the
         pinned one, is only observed from then on."""
-        heard = self._radio.listen(timeout_s)
+        self._radio.listen(timeout_s)
+        self._judge_heard()
+
+    def _judge_heard(self) -> None:
         armed = preflight.ARMED if preflight.is_armed(self._radio) else ""
         change = preflight.identity_change(self._radio, self._pinned)
         if self._state not in QUARANTINE_STATES:
@@ -338,7 +344,15 @@ class MavlinkVehicle:
                 self._observe(why)
         elif change not in self._why:
             self._why = f"{self._why} {change}"
-        return heard
+
+    def _while_waiting(self, heard: list[PacketReceived]) -> None:
+        """What takes time keeps no order waiting, neither one that stands nor one that comes."""
+        self._repeat_order(heard)
+        self._on_wait()
+
+    def _repeat_order(self, heard: list[PacketReceived]) -> None:
+        if self._order is not None:
+            self._order.proceed(heard)
 
     # ---- flying
 
@@ -406,7 +420,7 @@ class MavlinkVehicle:
         no person flies it."""
         heartbeat = self._radio.seen.heartbeat
         by_hand = heartbeat is not None and heartbeat.mode in self._radio.profile.manual_modes
-        if not by_hand and not self._radio.is_disarmed:
+        if not by_hand and not self._radio.is_disarmed and self._order is None:
             with suppress(LinkError):
                 self._order = RepeatedCommand(self._radio, Action.LAND)
 

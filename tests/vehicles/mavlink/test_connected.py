@@ -376,6 +376,17 @@ def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() ->
             assert "PSC_POSZ_P" in {text(message, "param_id") for message in rig.told("PARAM_SET")}
 
 
+def test_what_was_ordered_is_repeated_also_while_something_else_takes_its_time() -> None:
+    with LockstepRig() as rig, connected(rig) as vehicle:
+        enter_block(rig, START_ENGINE, TAKE_OFF)
+        attend_until(vehicle, lambda: (vehicle.condition().altitude_m or 0.0) > 1.0)
+        rig.muted = True
+        vehicle.land("nobody hears it")
+        told = blocks_told(rig).count(LAND_HERE)
+        vehicle.check()
+        assert blocks_told(rig).count(LAND_HERE) >= told + 5
+
+
 @pytest.mark.parametrize("raises_once", [False, True])
 def test_motors_off_is_heard_also_after_the_program_failed_while_the_vehicle_lands(raises_once: bool) -> None:
     """Whoever watches the flight raises, perhaps whoever is asked whether to stop too; then a person acts."""

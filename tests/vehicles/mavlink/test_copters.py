@@ -238,7 +238,8 @@ def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_
     assert MAVLINK.connect is not None
     with UdpRig("px4") as rig:
         options = rig.options(clock_speed=rig.speed)
-        vehicle = MAVLINK.connect(options, SAFE["px4"], Identity(system_id=1, autopilot="px4", version=""), folder)
+        identity = Identity(system_id=1, autopilot="px4", version="")
+        vehicle = MAVLINK.connect(options, SAFE["px4"], identity, folder, lambda: None)
         with closing(vehicle):
             assert f"is kept in {folder}/udp-127.0.0.1-" in vehicle.concern
 

@@ -2164,7 +2164,8 @@ export type OptionInfo = {
 /**
  * OrderAnswer
  *
- * `accepted` is false when the worker has no link to the vehicle; what comes of it is seen in its status.
+ * `accepted` once the process that has the vehicle's link has passed the order on; what comes of it is seen in the
+ * vehicle's status. When it is false, `sentence` says why, and the order is not carried out later.
  */
 export type OrderAnswer = {
     /**

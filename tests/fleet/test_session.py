@@ -1,0 +1,102 @@
+"""The worker's end of a session, with real processes at the other end that behave as the worst vehicle's might."""
+
+import os
+import queue
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from app.fleet.session import (
+    CommandForwarded,
+    ConnectionOpened,
+    ConnectionRequest,
+    VehicleCommand,
+    VehicleConnection,
+)
+from app.live.messages import VehicleStatus
+from app.vehicles.base import Identity
+
+PATIENCE_S = 60.0
+IDENTITY = Identity(system_id=1, autopilot="paparazzi", version="5.18")
+OPENED = ConnectionOpened(identity=IDENTITY, concern="", held={"kp": 283.0})
+
+
+def obeys(pipe: Connection, _call: ConnectionRequest) -> None:
+    """Takes every order, but to land when it `drifts`."""
+    pipe.send(OPENED)
+    while isinstance(ordered := pipe.recv(), VehicleCommand):
+        problem = "it knows no such block" if ordered.reason == "drifts" else ""
+        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.reason, problem))
+
+
+def is_busy(pipe: Connection, _call: ConnectionRequest) -> None:
+    """Looks at no order before the second one, and answers them from the last to the first."""
+    pipe.send(OPENED)
+    first, second = pipe.recv(), pipe.recv()
+    for ordered in (second, first):
+        pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.reason))
+    pipe.recv()
+
+
+def dies_of_it(pipe: Connection, _call: ConnectionRequest) -> None:
+    pipe.send(OPENED)
+    pipe.recv()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+Heard = VehicleStatus | CommandForwarded
+
+
+@contextmanager
+def session(
+    run: Callable[[Connection, ConnectionRequest], None], folder: Path
+) -> Iterator[tuple[VehicleConnection, "queue.SimpleQueue[Heard]"]]:
+    """One that is open, and what it hears."""
+    heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
+    call = ConnectionRequest(
+        vehicle_id=5,
+        name="Drone",
+        kind="mavlink",
+        options={},
+        safe_gains={},
+        identity=None,
+        lock=folder / "vehicle.lock",
+        trial_parameters=folder / "parameters.json",
+    )
+    one = VehicleConnection(call, run, hear=heard.put)
+    try:
+        assert one.wait_until_open() == OPENED
+        yield one, heard
+    finally:
+        one.close()
+
+
+def told(answer: Future[str]) -> str:
+    return answer.result(PATIENCE_S)
+
+
+def test_an_order_is_carried_out_when_the_process_says_so_and_not_before(tmp_path: Path) -> None:
+    with session(is_busy, tmp_path) as (one, heard):
+        land = one.send_command("land", "it drifts", 1.0)
+        assert not land.done()
+        stop = one.send_command("motors off", "people below", 1.0)
+        assert (told(stop), told(land)) == ("", "")
+        assert [heard.get(timeout=PATIENCE_S) for _ in range(2)] == [
+            CommandForwarded(2, "motors off", "people below"),
+            CommandForwarded(1, "land", "it drifts"),
+        ]
+
+
+def test_an_order_that_the_vehicle_cannot_be_given_is_answered_with_the_reason(tmp_path: Path) -> None:
+    with session(obeys, tmp_path) as (one, _):
+        assert told(one.send_command("land", "drifts", 1.0)) == "it knows no such block"
+        assert told(one.send_command("motors off", "drifts no more", 1.0)) == ""
+
+
+def test_orders_to_a_process_that_dies_of_them_are_answered(tmp_path: Path) -> None:
+    with session(dies_of_it, tmp_path) as (one, _):
+        assert "nobody knows whether it told the vehicle" in told(one.send_command("land", "it drifts", 1.0))
+        assert one.send_command("motors off", "again", 1.0).done()
