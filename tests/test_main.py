@@ -86,7 +86,12 @@ def test_without_a_built_dashboard_the_first_page_says_what_to_do(client: TestCl
 
 
 def test_health_names_the_version_and_whether_a_worker_runs(client: TestClient) -> None:
-    assert client.get("/api/health").json() == {"status": "ok", "version": __version__, "worker": "absent"}
+    assert client.get("/api/health").json() == {
+        "status": "ok",
+        "version": __version__,
+        "worker": "absent",
+        "vehicles_not_answering": [],
+    }
 
 
 def test_the_catalogue_offers_what_a_campaign_can_be_made_of(client: TestClient) -> None:

@@ -21,10 +21,18 @@ from app.vehicles.open import VEHICLE_KINDS, get_kind
 router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
+class VehicleTrouble(BaseModel):
+    vehicle_id: int
+    trouble: str
+
+
 class Health(BaseModel):
+    """`vehicles_not_answering`: those that no order reaches, because the process that has their link stands still."""
+
     status: Literal["ok"]
     version: str
     worker: Literal["running", "not answering", "absent"]
+    vehicles_not_answering: list[VehicleTrouble]
 
 
 class GainInfo(BaseModel):
@@ -105,9 +113,16 @@ class Catalogue(BaseModel):
 
 
 @router.get("/health")
-def get_health(live: Live) -> Health:
-    """Whether the program answers, and whether a worker is there to fly and compute."""
-    return Health(status="ok", version=__version__, worker=live.worker)
+async def get_health(live: Live) -> Health:
+    """Whether the program answers, whether a worker is there to fly and compute, and whether orders reach every
+    connected vehicle."""
+    silent = live.hub.vehicles("not answering")
+    return Health(
+        status="ok",
+        version=__version__,
+        worker=live.worker,
+        vehicles_not_answering=[VehicleTrouble(vehicle_id=each.vehicle_id, trouble=each.trouble) for each in silent],
+    )
 
 
 @router.get("/catalogue")

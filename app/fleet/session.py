@@ -5,6 +5,7 @@ pipe between them breaks: a flight is then aborted, the vehicle lands and is lef
 ends; the next worker's session waits until then.
 """
 
+import datetime as dt
 import itertools
 import os
 import queue
@@ -14,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
@@ -42,6 +43,12 @@ from app.vehicles.errors import SafeGainsError, VehicleError
 _ENDED: Final = (
     "The process that had the vehicle's link ended; nobody knows whether it told the vehicle. Use the vehicle's own "
     "remote control now."
+)
+SILENT_AFTER_S: Final = 2.0
+"""A process that has its vehicle says something five times a second."""
+NOT_ANSWERING: Final = (
+    "The process that has its link does not answer: orders do not reach the vehicle. If it flies, use its own remote "
+    "control now."
 )
 SHUTDOWN_TIMEOUT_S: Final = 5.0
 TAKE_OFF_TIMEOUT_S: Final = 2.0
@@ -124,7 +131,8 @@ MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 class VehicleConnection:
     """The worker's handle of such a process: a FlightBackend for flights, and a link to the vehicle in between.
 
-    `hear` is told, on a thread of the session's own, how the vehicle is and what became of orders. One conversation at
+    `hear` is told, on a thread of the session's own, how the vehicle is and what became of orders; of a process that
+    stands still, every two seconds that it does not answer. One conversation at
     a time: a flight or an act; orders may come at any moment, from any thread.
     """
 
@@ -230,14 +238,21 @@ class VehicleConnection:
         return said
 
     def _listen(self) -> None:
+        status = VehicleStatus(vehicle_id=self.call.vehicle_id, state="connecting", at=_now(), step="")
+        patience_s: float | None = None
         try:
             while True:
+                while not self._pipe.poll(patience_s):
+                    self._hear_of(replace(status, state="not answering", at=_now(), trouble=NOT_ANSWERING))
                 match self._pipe.recv():
                     case VehicleStatus() as status:
                         self._hear_of(status)
                     case CommandForwarded(number, problem=problem) as forwarded:
                         self._answer_order(number, problem)
                         self._hear_of(forwarded)
+                    case ConnectionOpened(concern=concern) as opened:
+                        status, patience_s = replace(status, concern=concern), self.call.clock.wall_s(SILENT_AFTER_S)
+                        self._said.put(opened)
                     case said:
                         self._said.put(said)
         except (EOFError, OSError):
@@ -260,3 +275,7 @@ class VehicleConnection:
     def _send(self, message: ToVehicleProcess) -> None:
         with self._sending:
             self._pipe.send(message)
+
+
+def _now() -> str:
+    return dt.datetime.now(dt.UTC).isoformat()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.live.memory import LiveState
-from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleStatus, encode
+from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleLinkState, VehicleStatus, encode
 
 WAITING_CHANGES: Final = 2000
 """Changes a stream may lag behind before it is ended; its client comes back with the last id and misses none."""
@@ -100,6 +100,10 @@ class Hub:
     @property
     def streams(self) -> int:
         return len(self._subscriptions)
+
+    def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
+        """How the vehicles are whose link is in that state."""
+        return self._memory.vehicles(state)
 
     def publish(self, item: Change | Live) -> None:
         match item:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleStatus
+from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleLinkState, VehicleStatus
 
 _OVER = frozenset({"landed", "ended"})
 
@@ -44,6 +44,10 @@ class LiveState:
             for flight, heard_s in self._flights.values()
         )
         return [*vehicles, *flights]
+
+    def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
+        """The newest status of each vehicle whose link is in that state."""
+        return [status for status, _ in self._vehicles.values() if status.state == state]
 
     def _grown(self, message: Telemetry) -> Telemetry:
         """The message with everything measured before it."""

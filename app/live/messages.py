@@ -14,7 +14,7 @@ MAX_LINE_BYTES: Final = 256 * 1024
 NO_LINK: Final = "No worker has a link to this vehicle, so it was told nothing: use its own remote control now."
 
 Phase = Literal["staging", "staged", "flying", "landed", "ended"]
-VehicleLinkState = Literal["connecting", "connected", "gone"]
+VehicleLinkState = Literal["connecting", "connected", "gone", "not answering"]
 VehicleCommandKind = Literal["land", "motors off"]
 
 
@@ -50,7 +50,8 @@ class FlightPhase:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleStatus(Condition):
     """How a vehicle with a link of its own is; `at` is UTC in ISO 8601. While nothing of it is heard the state is
-    `gone`, and the rest is as last heard. `concern` says why it may only be observed; empty when it may fly. `age_s` as
+    `gone`, and `not answering` while the process that has its link tells nothing; the rest is as last heard then, and
+    `trouble` says what the latter means. `concern` says why it may only be observed; empty when it may fly. `age_s` as
     in `Telemetry`; the other ages are as they were when it was said."""
 
     vehicle_id: int

@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+import pytest
+
+from app.fleet import session as session_module
 from app.fleet.session import (
     CommandForwarded,
     ConnectionOpened,
@@ -21,6 +24,9 @@ from app.vehicles.base import Identity
 
 PATIENCE_S = 60.0
 IDENTITY = Identity(system_id=1, autopilot="paparazzi", version="5.18")
+STATUS = VehicleStatus(
+    vehicle_id=5, state="connected", at="2026-11-24T00:00:00+00:00", step="record", armed=True, altitude_m=2.9
+)
 OPENED = ConnectionOpened(identity=IDENTITY, concern="", held={"kp": 283.0})
 
 
@@ -45,6 +51,21 @@ def dies_of_it(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     pipe.recv()
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def goes_on(pipe: Connection, _call: ConnectionRequest) -> None:
+    """Tells how its vehicle is, then nothing until an order comes; then it goes on."""
+    pipe.send(OPENED)
+    pipe.send(STATUS)
+    ordered = pipe.recv()
+    pipe.send(CommandForwarded(ordered.number, ordered.order, ordered.reason))
+    pipe.send(STATUS)
+    pipe.recv()
+
+
+def says_nothing(pipe: Connection, _call: ConnectionRequest) -> None:
+    pipe.send(OPENED)
+    pipe.recv()
 
 
 Heard = VehicleStatus | CommandForwarded
@@ -100,3 +121,33 @@ def test_orders_to_a_process_that_dies_of_them_are_answered(tmp_path: Path) -> N
     with session(dies_of_it, tmp_path) as (one, _):
         assert "nobody knows whether it told the vehicle" in told(one.send_command("land", "it drifts", 1.0))
         assert one.send_command("motors off", "again", 1.0).done()
+
+
+def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_module, "SILENT_AFTER_S", 0.05)
+    with session(goes_on, tmp_path) as (one, heard):
+        assert heard.get(timeout=PATIENCE_S) == STATUS
+        for _ in range(3):
+            silent = heard.get(timeout=PATIENCE_S)
+            assert isinstance(silent, VehicleStatus)
+            assert (silent.vehicle_id, silent.state, silent.step, silent.armed) == (5, "not answering", "record", True)
+            assert "orders do not reach the vehicle" in silent.trouble
+            assert "remote control" in silent.trouble
+        assert one.pid is not None
+        one.send_command("land", "go on", 1.0)
+        while isinstance(news := heard.get(timeout=PATIENCE_S), VehicleStatus) and news.state == "not answering":
+            pass
+        assert isinstance(news, CommandForwarded)
+        assert heard.get(timeout=PATIENCE_S) == STATUS
+
+
+def test_a_process_that_has_never_told_how_its_vehicle_is_is_shown_as_not_answering_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_module, "SILENT_AFTER_S", 0.05)
+    with session(says_nothing, tmp_path) as (_, heard):
+        silent = heard.get(timeout=PATIENCE_S)
+        assert isinstance(silent, VehicleStatus)
+        assert (silent.vehicle_id, silent.state, silent.armed, silent.concern) == (5, "not answering", None, "")

@@ -140,3 +140,34 @@ def test_a_vehicle_in_the_air_is_landed_when_the_worker_is_killed_and_is_there_a
         assert vehicle.in_state("ready")["held"] == SAFE
         assert serving.worker_pid() != before
         assert vehicle.status(lambda status: status["state"] == "connected")["armed"] is False
+
+
+@pytest.mark.complete
+def test_a_vehicle_whose_process_stands_still_takes_no_order_and_does_not_fly_when_it_goes_on(serving: Serving) -> None:
+    with connected(serving, "Still") as (vehicle, _):
+        trial_id = vehicle.planned(vehicle.campaign())
+        serving.post(f"/trials/{trial_id}/stage")
+        serving.trial(trial_id, "staged")
+        session = vehicle.session_pid()
+        os.kill(session, signal.SIGSTOP)
+        try:
+            serving.post(f"/trials/{trial_id}/take-off")
+            serving.trial(trial_id, "flying")
+            shown = vehicle.status(lambda status: status["state"] == "not answering")
+            named = serving.get("/health")["vehicles_not_answering"]
+            assert named == [{"vehicle_id": vehicle.id, "trouble": shown["trouble"]}]
+            for order in ("land", "motors-off"):  # which takes longer than a take-off is still in time
+                told = serving.post(f"/vehicles/{vehicle.id}/{order}", {"reason": "nobody answers"})
+                assert (told["accepted"], "remote control" in told["sentence"]) == (False, True)
+        finally:
+            os.kill(session, signal.SIGCONT)
+        assert "too late" in serving.trial(trial_id, "planned")["flight"]["problem"]
+        ready = vehicle.status(lambda status: status["state"] == "connected")
+        assert (ready["armed"], ready["trouble"]) == (False, "")
+        assert serving.get("/health")["vehicles_not_answering"] == []
+        assert vehicle.in_state("ready")["held"] == SAFE
+        orders = wait_for("the orders in the books", lambda: vehicle.orders() if len(vehicle.orders()) == 2 else None)
+        assert [(act["kind"], act["state"], "too late" in act["problem"]) for act in orders] == [
+            ("motors off", "failed", True),
+            ("land", "failed", True),
+        ]

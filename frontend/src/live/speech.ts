@@ -69,7 +69,10 @@ export function newsSentences(before: News, now: News, known: (vehicleId: number
 function statusSentences(before: VehicleStatus, now: VehicleStatus, { name, minBatteryV }: Known): Sentence[] {
   const said: Sentence[] = [];
   if (before.state === "connected" && now.state === "gone") said.push(shout(`Link to ${name} lost.`));
-  if (before.state === "gone" && now.state === "connected") said.push(say(`Link to ${name} is back.`));
+  if (before.state !== "not answering" && now.state === "not answering")
+    said.push(shout(`Orders do not reach ${name}. Use the remote control.`));
+  if (before.state !== "connected" && before.state !== "connecting" && now.state === "connected")
+    said.push(say(`Link to ${name} is back.`));
   if (before.armed === false && now.armed === true) said.push(say("Armed."));
   const step = STEPS[now.step];
   if (before.step !== now.step && step !== undefined) said.push(step);

@@ -61,6 +61,8 @@ test("a vehicle that is gone or being sought is not current, however new the new
   expect(aged(heard({ state: "gone" }), after(0)).isCurrent).toBe(false);
   expect(linkText(aged(heard({ state: "gone" }), after(0)))).toBe("link gone");
   expect(linkText(aged(heard({ state: "connecting", packet_age_s: null }), after(0)))).toBe("connecting");
+  const still = aged(heard({ state: "not answering" }), after(0));
+  expect([still.isCurrent, linkText(still)]).toEqual([false, "its process does not answer"]);
   expect(linkText(null)).toBe("no news of it");
   expect(ageText(null)).toBe("never heard");
 });

@@ -1,6 +1,6 @@
 /** How a connected vehicle is, as the stream last said, and how old that is by now. */
 
-export type LinkState = "connecting" | "connected" | "gone";
+export type LinkState = "connecting" | "connected" | "gone" | "not answering";
 
 export interface VehicleStatus {
   vehicleId: number;
@@ -85,6 +85,8 @@ export function linkText(one: Aged | null): string {
       return "connecting";
     case "gone":
       return "link gone";
+    case "not answering":
+      return "its process does not answer";
     case "connected":
       return one.isCurrent || one.linkAgeS === null ? ageText(one.linkAgeS) : `silent for ${ageText(one.linkAgeS)}`;
   }
@@ -124,7 +126,7 @@ function gains(value: unknown): Record<string, number> {
   );
 }
 
-const LINKS: readonly LinkState[] = ["connecting", "connected", "gone"];
+const LINKS: readonly LinkState[] = ["connecting", "connected", "gone", "not answering"];
 
 /** The status in one event of the stream; null for anything else. */
 export function statusFrom(json: string): VehicleStatus | null {

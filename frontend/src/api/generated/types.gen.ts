@@ -1728,6 +1728,8 @@ export type GroupBrief = {
 
 /**
  * Health
+ *
+ * `vehicles_not_answering`: those that no order reaches, because the process that has their link stands still.
  */
 export type Health = {
     /**
@@ -1742,6 +1744,10 @@ export type Health = {
      * Worker
      */
     worker: 'running' | 'not answering' | 'absent';
+    /**
+     * Vehicles Not Answering
+     */
+    vehicles_not_answering: Array<VehicleTrouble>;
 };
 
 /**
@@ -3748,6 +3754,20 @@ export type VehicleOrder = {
  * person has looked at it and releases it.
  */
 export type VehicleState = 'disconnected' | 'ready' | 'staged' | 'flying' | 'quarantined';
+
+/**
+ * VehicleTrouble
+ */
+export type VehicleTrouble = {
+    /**
+     * Vehicle Id
+     */
+    vehicle_id: number;
+    /**
+     * Trouble
+     */
+    trouble: string;
+};
 
 /**
  * ProblemField

@@ -1,0 +1,40 @@
+"""What `/api/health` says of vehicles that no order reaches."""
+
+import os
+from concurrent.futures import Future
+
+from fastapi.testclient import TestClient
+
+from app.live.address import live_address
+from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello
+from app.live.server import LiveServer
+from app.settings import Settings
+from tests.api.test_abort import wait_until
+from tests.builders import get
+
+
+def status(vehicle_id: int, state: VehicleLinkState, trouble: str = "") -> VehicleStatus:
+    at = "2026-11-24T00:00:00+00:00"
+    return VehicleStatus(vehicle_id=vehicle_id, state=state, at=at, step="record", trouble=trouble)
+
+
+def test_a_vehicle_whose_process_stands_still_is_named_until_it_goes_on(client: TestClient, settings: Settings) -> None:
+    def named() -> object:
+        return get(client, "/api/health")["vehicles_not_answering"]
+
+    with LiveServer(
+        live_address(settings.data_dir),
+        abort=lambda *_: False,
+        order=lambda *_: Future(),
+        hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[]),
+    ) as worker:
+        wait_until(lambda: get(client, "/api/health")["worker"] == "running")
+        worker.publish(status(4, "gone", "The telemetry log cannot be written."))
+        worker.publish(status(5, "not answering", "Orders do not reach it."))
+        wait_until(lambda: named() == [{"vehicle_id": 5, "trouble": "Orders do not reach it."}])
+        worker.publish(status(5, "connected"))
+        wait_until(lambda: named() == [])
+        worker.publish(status(5, "not answering", "Orders do not reach it."))
+        wait_until(lambda: named() != [])
+    wait_until(lambda: named() == [])
+    assert get(client, "/api/health")["worker"] == "absent"
