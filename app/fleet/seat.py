@@ -6,23 +6,21 @@ vehicle is dropped when the worker does not read: nothing that flies waits for a
 
 import datetime as dt
 import os
-import select
 import signal
 import time
-from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import fields
 from multiprocessing.connection import Connection
 from typing import Final
 
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
+from app.fleet.pipe import PipeClosedError, WorkerPipe
 from app.fleet.session import (
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
-    FromVehicleProcess,
     ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
@@ -55,55 +53,10 @@ LOST_AFTER_S: Final = 3.0
 """Without a heartbeat for so long, a vehicle is shown as gone."""
 LOCK_TIMEOUT_S: Final = 120.0
 """How long a session waits for the one of a worker that was killed: it may be landing, or waiting for a lost link."""
+STANDING_ORDER_TIMEOUT_S: Final = 60.0
+"""How long after its worker's end a process repeats an order: shorter than the next one's session waits."""
 RECONNECT_INTERVAL_S: Final = 2.0
 _EXPIRED: Final = "It reached the vehicle's process too late and was not passed on; whoever asked was told so."
-
-
-class PipeClosedError(Exception):
-    """The pipe is broken: nobody keeps the books any more."""
-
-
-class WorkerPipe:
-    """The process's end of the pipe. Once it is broken, `hear` says so; `show` and `say` are for nobody then."""
-
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-        self._received: deque[ToVehicleProcess] = deque()
-
-    def receive(self) -> ToVehicleProcess | None:
-        """The next message; None when there is none. Raises PipeClosedError."""
-        return self._received.popleft() if self._received else self._read()
-
-    def receive_command(self) -> VehicleCommand | None:
-        """The next order, past what waits before it; None when there is none, also of a broken pipe."""
-        with suppress(PipeClosedError):
-            while (message := self._read()) is not None:
-                self._received.append(message)
-        found = next((each for each in self._received if isinstance(each, VehicleCommand)), None)
-        if found is not None:
-            self._received.remove(found)
-        return found
-
-    def _read(self) -> ToVehicleProcess | None:
-        try:
-            return self._pipe.recv() if self._pipe.poll() else None
-        except (EOFError, OSError) as error:
-            raise PipeClosedError from error
-
-    def is_open(self) -> bool:
-        """To be asked while nothing is to be heard. Raises PipeClosedError rather than say no."""
-        self.receive()
-        return True
-
-    def send(self, message: FromVehicleProcess) -> None:
-        with suppress(OSError):
-            self._pipe.send(message)
-
-    def send_if_ready(self, message: FromVehicleProcess) -> None:
-        """Say it if it can be said at once."""
-        with suppress(OSError, ValueError):
-            if select.select([], [self._pipe], [], 0.0)[1]:
-                self._pipe.send(message)
 
 
 def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
@@ -149,14 +102,32 @@ class VehicleProcess:
     def run(self) -> None:
         """Do what is asked, one thing after the other. Raises PipeClosedError at the end, VehicleError when the link
         fails."""
-        while True:
-            match self._next():
-                case FlightRequest() as orders:
-                    self._fly(orders)
-                case VehicleRequest() as asked:
-                    self._line.send(self._act(asked))
-                case _:
-                    continue  # of a flight that is over
+        try:
+            while True:
+                self._carry_out(self._next())
+        except PipeClosedError:
+            self._finish_order()
+            raise
+
+    def _carry_out(self, asked: ToVehicleProcess) -> None:
+        match asked:
+            case FlightRequest() as orders:
+                self._fly(orders)
+            case VehicleRequest():
+                self._line.send(self._act(asked))
+            case _:
+                pass  # of a flight that is over
+
+    def _finish_order(self) -> None:
+        """Nobody listens any more: a vehicle that was told to land, or to stop its motors, is told so while it has not
+        obeyed, is armed and is heard."""
+        until_s = self._call.clock.now_s() + STANDING_ORDER_TIMEOUT_S
+        while self._is_disobeyed() and self._call.clock.now_s() < until_s:
+            self._vehicle.attend(POLL_INTERVAL_S * self._speed)
+
+    def _is_disobeyed(self) -> bool:
+        status = self._status()
+        return self._vehicle.has_standing_order and status.armed is True and status.state == "connected"
 
     def close(self) -> None:
         self._vehicle.close()

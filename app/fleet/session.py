@@ -1,8 +1,8 @@
 """A connected vehicle's session: a process of its own that keeps the link open between flights.
 
 This is the worker's side; the process itself is in `seat`. It never touches the database. When the worker dies, the
-pipe between them breaks: a flight is then aborted, the vehicle lands and is left with its safe gains, and the process
-ends; the next worker's session waits until then.
+pipe between them breaks: a flight is then aborted, the vehicle lands and is left with its safe gains, one that was told
+to land outside of a flight is told so until it has, and the process ends; the next worker's session waits until then.
 """
 
 import datetime as dt

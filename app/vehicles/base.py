@@ -183,6 +183,11 @@ class ConnectedVehicle(Vehicle, Protocol):
         """Why it may only be observed; empty when it may fly."""
         ...
 
+    @property
+    def has_standing_order(self) -> bool:
+        """Whether it has not obeyed yet what `land` or `motors_off` asked for, which is repeated."""
+        ...
+
     def condition(self) -> Condition:
         """How it is, as last heard: nothing is waited for."""
         ...

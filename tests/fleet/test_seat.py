@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from app.fleet import seat as seat_module
-from app.fleet.seat import VehicleProcess, WorkerPipe
+from app.fleet.pipe import PipeClosedError, WorkerPipe
+from app.fleet.seat import VehicleProcess
 from app.fleet.session import (
     CommandForwarded,
     ConnectionOpened,
@@ -39,16 +40,22 @@ from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED
 from tests.vehicles.mavlink.rigs import LockstepRig
+from tests.vehicles.mavlink.test_connected import START_ENGINE, TAKE_OFF
 
 
 class AnsweringRig(LockstepRig):
-    """Calls `on_heard` with whatever reaches the drone."""
+    """Calls `on_heard` with whatever is sent to the drone, which hears nothing before `deaf_until_s`."""
 
     on_heard: Callable[[Message], None] = staticmethod(lambda _message: None)
+    deaf_until_s = 0.0
 
     def write(self, data: bytes) -> bool:
         seen = len(self.heard)
-        taken = super().write(data)
+        if self.drone.time_s < self.deaf_until_s:
+            self.heard += [(self.drone.time_s, message) for message in self._codec.parse(data)]
+            taken = True
+        else:
+            taken = super().write(data)
         for _, message in self.heard[seen:]:
             self.on_heard(message)
         return taken
@@ -302,3 +309,59 @@ def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_o
     assert any(isinstance(said, FlightLanded) for said in line.said)
     assert SafeGainsRestored(dict(SAFE)) in line.said
     assert process._vehicle.concern == ""
+
+
+def in_the_air(rig: AnsweringRig, process: VehicleProcess) -> None:
+    """As somebody else has it take off."""
+    for block in (START_ENGINE, TAKE_OFF):
+        rig.drone.autopilot._enter(block)  # type: ignore[attr-defined]
+        process._vehicle.attend(1.0)
+    while rig.drone.body.altitude_m < 2.0:
+        process._vehicle.attend(0.1)
+
+
+def left_alone(process: VehicleProcess, line: RecordingPipe, rig: AnsweringRig, *ordered: VehicleCommand) -> float:
+    """Give orders, and let the worker die; for how long the process went on."""
+    for each in ordered:
+        line.workers_end.send(each)
+    line.workers_end.close()
+    begun_s = rig.now_s()
+    with pytest.raises(PipeClosedError):
+        process.run()
+    return rig.now_s() - begun_s
+
+
+def test_a_vehicle_that_has_not_heard_land_yet_is_told_also_after_the_worker_died(
+    rig: AnsweringRig, tmp_path: Path
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    in_the_air(rig, process)
+    rig.deaf_until_s = rig.now_s() + 5.0
+    assert 5.0 < left_alone(process, line, rig, LAND) < 60.0
+    assert rig.drone.body.stands
+
+
+def test_a_vehicle_that_never_obeys_is_left_alone_after_a_minute(rig: AnsweringRig, tmp_path: Path) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    in_the_air(rig, process)
+    rig.deaf_until_s = math.inf
+    assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
+
+
+def test_a_vehicle_that_falls_silent_is_not_told_any_more(rig: AnsweringRig, tmp_path: Path) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    in_the_air(rig, process)
+    rig.muted = True
+    assert left_alone(process, line, rig, LAND) < 5.0
+
+
+@pytest.mark.parametrize("ordered", [(), (LAND,), (MOTORS_OFF,)], ids=["nothing", "land", "motors off"])
+def test_a_vehicle_on_the_ground_keeps_no_process_waiting(
+    rig: AnsweringRig, tmp_path: Path, ordered: tuple[VehicleCommand, ...]
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    assert left_alone(process, line, rig, *ordered) < 0.1

@@ -29,7 +29,7 @@ class RepeatedCommand:
         self._answered = False
         self._by_hand_since_s: float | None = None
         self._landing_since_s: float | None = None
-        self._is_over = False
+        self.is_over = False
         self._send()
 
     def proceed(self, heard: list[PacketReceived]) -> None:
@@ -38,9 +38,9 @@ class RepeatedCommand:
             self._note(each)
         now_s = self._radio.clock.now_s()
         is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
-        self._is_over = self._is_over or is_late or self._has_stopped() or self._has_landed(now_s)
+        self.is_over = self.is_over or is_late or self._has_stopped() or self._has_landed(now_s)
         is_due = now_s - self._sent_s >= self._every_s(now_s)
-        if is_due and self._landing_since_s is None and not self._is_over:
+        if is_due and self._landing_since_s is None and not self.is_over:
             self._send()
 
     def _note(self, heard: PacketReceived) -> None:
@@ -53,7 +53,7 @@ class RepeatedCommand:
             elif self._by_hand_since_s is None:
                 self._by_hand_since_s = heard.now_s
             elif heard.now_s - self._by_hand_since_s >= self._radio.witness_gap_s:
-                self._is_over = True
+                self.is_over = True
 
     def _every_s(self, now_s: float) -> float:
         if self._action is Action.LAND:

@@ -179,6 +179,11 @@ class MavlinkVehicle:
             return ""
         return " ".join(part for part in (self._why, self._asked) if part)
 
+    @property
+    def has_standing_order(self) -> bool:
+        """Whether it has not obeyed yet what `land` or `motors_off` asked for."""
+        return self._order is not None and not self._order.is_over
+
     def condition(self) -> Condition:
         """How it is, as last heard: nothing is waited for. Altitude counts as in a record."""
         step = self._state if self._flight is None else self._flight.state

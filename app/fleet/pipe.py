@@ -1,0 +1,55 @@
+"""The end of the pipe that a vehicle's process has to the worker."""
+
+import select
+from collections import deque
+from contextlib import suppress
+from multiprocessing.connection import Connection
+
+from app.fleet.session import FromVehicleProcess, ToVehicleProcess, VehicleCommand
+
+
+class PipeClosedError(Exception):
+    """The pipe is broken: nobody keeps the books any more."""
+
+
+class WorkerPipe:
+    """The process's end of the pipe. Once it is broken, `hear` says so; `show` and `say` are for nobody then."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._received: deque[ToVehicleProcess] = deque()
+
+    def receive(self) -> ToVehicleProcess | None:
+        """The next message; None when there is none. Raises PipeClosedError."""
+        return self._received.popleft() if self._received else self._read()
+
+    def receive_command(self) -> VehicleCommand | None:
+        """The next order, past what waits before it; None when there is none, also of a broken pipe."""
+        with suppress(PipeClosedError):
+            while (message := self._read()) is not None:
+                self._received.append(message)
+        found = next((each for each in self._received if isinstance(each, VehicleCommand)), None)
+        if found is not None:
+            self._received.remove(found)
+        return found
+
+    def _read(self) -> ToVehicleProcess | None:
+        try:
+            return self._pipe.recv() if self._pipe.poll() else None
+        except (EOFError, OSError) as error:
+            raise PipeClosedError from error
+
+    def is_open(self) -> bool:
+        """To be asked while nothing is to be heard. Raises PipeClosedError rather than say no."""
+        self.receive()
+        return True
+
+    def send(self, message: FromVehicleProcess) -> None:
+        with suppress(OSError):
+            self._pipe.send(message)
+
+    def send_if_ready(self, message: FromVehicleProcess) -> None:
+        """Say it if it can be said at once."""
+        with suppress(OSError, ValueError):
+            if select.select([], [self._pipe], [], 0.0)[1]:
+                self._pipe.send(message)
