@@ -18,6 +18,7 @@ from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
 from app.fleet.pipe import PipeClosedError, WorkerPipe
 from app.fleet.session import (
+    TAKE_OFF_TIMEOUT_S,
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
@@ -91,6 +92,7 @@ class VehicleProcess:
         self._speed = float(call.options.get("clock_speed", 1.0))
         self._identity = call.identity
         self._is_open = self._may_interrupt = False
+        self._take_off_by_s: float | None = None
         self._vehicle = self._open_vehicle()
         self._is_open = True
         self._show_due_s = 0.0
@@ -179,9 +181,10 @@ class VehicleProcess:
         if not self._is_open:
             return
         self._publish_status()
+        self._require_in_time()
         ordered = self._line.receive_command()
         if ordered is not None and self._forward_command(ordered) and self._may_interrupt:
-            self._may_interrupt = False
+            self._end_interruptions()
             raise InterruptedByOrderError(
                 f"It was interrupted: {ordered.order} was ordered ({ordered.reason}).",
                 hint="See what the vehicle does, then ask again.",
@@ -189,12 +192,16 @@ class VehicleProcess:
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """By the first order that comes: what follows upon it, as giving the safe gains back, is done to the end."""
+        """By the first order that comes."""
         self._may_interrupt = True
         try:
             yield
         finally:
-            self._may_interrupt = False
+            self._end_interruptions()
+
+    def _end_interruptions(self) -> None:
+        """What follows goes to its end: the flight, which hears orders itself, or giving the safe gains back."""
+        self._may_interrupt, self._take_off_by_s = False, None
 
     def _forward_command(self, ordered: VehicleCommand) -> bool:
         """Whether it went out."""
@@ -279,8 +286,8 @@ class VehicleProcess:
             with self._logged(orders):
                 try:
                     self._line.send(GainsStaged(self._stage(orders.gains)))
-                    if self._await_takeoff_clearance():
-                        self._line.send(FlightLanded(self._take_off(orders)))
+                    if (cleared := self._await_takeoff_clearance()) is not None:
+                        self._line.send(FlightLanded(self._take_off(orders, cleared)))
                 finally:
                     self._line.send(SafeGainsRestored(restore_safe_gains(self._vehicle)))
         except GainlineError as error:
@@ -305,29 +312,39 @@ class VehicleProcess:
         with self._interruptible():
             return self._vehicle.stage(gains)
 
-    def _await_takeoff_clearance(self) -> bool:
-        """Wait for the worker's word, attending the vehicle. Raises PipeClosedError, VehicleError for one that is too
-        late."""
+    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
+        """Wait for the worker's word, attending the vehicle. Raises PipeClosedError."""
         while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
             self._note(answer)
-        if isinstance(answer, TakeOffCommand) and _has_expired(answer):
-            raise _late_take_off_error()
-        return isinstance(answer, TakeOffCommand)
+        return answer if isinstance(answer, TakeOffCommand) else None
 
-    def _take_off(self, orders: FlightRequest) -> FlightRecord:
+    def _require_in_time(self) -> None:
+        """Until it arms: every wait on the ground moves the deadline on, which only a process that stands still misses.
+        Raises VehicleError then."""
+        by_s, now_s = self._take_off_by_s, time.monotonic()
+        if by_s is None:
+            return
+        self._take_off_by_s = now_s + TAKE_OFF_TIMEOUT_S if now_s <= by_s else None
+        if now_s > by_s:
+            raise _late_take_off_error()
+
+    def _take_off(self, orders: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
         experiment = get_experiment(orders.experiment)
         monitor = FlightMonitor(orders.campaign_id, orders.trial_id, experiment, self._publish, self._call.clock)
-        monitor.phase("flying")
         asked: set[str] = set()
 
         def should_stop() -> StopRequest | None:
-            self._may_interrupt = False  # from here on the flight itself hears orders
+            self._require_in_time()
+            self._end_interruptions()
             stop = self._should_stop()
             if stop is not None:
                 asked.add(stop.reason)
             return stop
 
         with self._interruptible():
+            self._take_off_by_s = cleared.by_s
+            self._require_in_time()
+            monitor.phase("flying")
             record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=should_stop)
         monitor.flush()
         monitor.phase("landed")
@@ -363,13 +380,13 @@ class VehicleProcess:
                 pass
 
 
-def _has_expired(ordered: VehicleCommand | TakeOffCommand) -> bool:
+def _has_expired(ordered: VehicleCommand) -> bool:
     return time.monotonic() > ordered.by_s
 
 
 def _late_take_off_error() -> VehicleError:
     error = VehicleError(
-        "It was not flown: the take-off reached the vehicle's process too late, because that stood still.",
+        "It was not flown: the take-off came too late, because the vehicle's process stood still.",
         hint="See that nothing holds up this computer, then ask for the flight again.",
     )
     error.not_flown = True

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -174,6 +175,33 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, t
     assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
     assert not rig.told("SCRIPT_ITEM"), "no block of its flight plan was asked for"
     assert process._vehicle.read_gains() == SAFE
+
+
+def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
+    rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the last check, after its take-off command came in time."""
+    stood_still_s = 0.0
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + stood_still_s)
+    monkeypatch.setattr(seat_module, "time", clock)
+
+    def stand_still(message: Message) -> None:
+        nonlocal stood_still_s
+        if message.get_type() == "PARAM_REQUEST_READ":
+            stood_still_s = 20.0
+
+    def watch() -> None:
+        rig.on_heard = stand_still
+
+    line.on_staged = watch
+    line.workers_end.send(TakeOffCommand(by_s=time.monotonic() + 3600.0))
+    process._fly(orders(rig, tmp_path))
+    [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
+    assert (failure.not_flown, failure.unsafe, "too late" in failure.what) == (True, False, True)
+    assert SafeGainsRestored(dict(SAFE)) in line.said
+    assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
 
 
 def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: AnsweringRig, tmp_path: Path) -> None:

@@ -133,17 +133,17 @@ class MavlinkVehicle:
     ) -> FlightRecord:
         """Arm, take off to 3 m, record, land, disarm, and restore the safe gains.
 
-        The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_stop` is asked every
-        10 ms. Raises VehicleError when nothing was staged, the vehicle is not ready, does not hold the staged gains any
-        more or could not be told to take off, which is then `not_flown`; what `on_sample` and `should_stop` raise lands
-        the vehicle, and is raised again once it is down.
+        The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_stop` is asked once
+        everything is ready for arming, and then every 10 ms. Raises VehicleError when nothing was staged, the vehicle
+        is not ready, does not hold the staged gains any more or could not be told to take off, which is then
+        `not_flown`; what `on_sample` and `should_stop` raise lands the vehicle, and is raised again once it is down.
         """
         try:
             self._require_not_quarantined()
             self._require_staged()
-            ground, stop = self._observe_ground(STANDSTILL_S), should_stop()
-            if stop is None:
-                self._parameters.set()
+            ground = self._observe_ground(STANDSTILL_S)
+            self._parameters.set()
+            stop = should_stop()
         except BaseException as error:
             if isinstance(error, VehicleError):
                 error.not_flown = True
