@@ -50,6 +50,8 @@ NOT_ANSWERING: Final = (
     "The process that has its link does not answer: orders do not reach the vehicle. If it flies, use its own remote "
     "control now."
 )
+MAX_UNANSWERED_ORDERS: Final = 50
+"""Far fewer than fit into the pipe of a process that reads nothing: whoever gives orders must not wait for it."""
 SHUTDOWN_TIMEOUT_S: Final = 5.0
 TAKE_OFF_TIMEOUT_S: Final = 2.0
 """Nothing takes off later after its operator's word than that operator expects it."""
@@ -209,6 +211,9 @@ class VehicleConnection:
     def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
         """What will say why the order did not go out to the vehicle, or nothing once it has."""
         told: Future[str] = Future()
+        if len(self._orders) >= MAX_UNANSWERED_ORDERS:
+            told.set_result(NOT_ANSWERING)
+            return told
         number = next(self._numbers)
         self._orders[number] = told
         command = VehicleCommand(number, order, reason, by_s)

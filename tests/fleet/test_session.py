@@ -68,6 +68,11 @@ def says_nothing(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.recv()
 
 
+def reads_nothing(pipe: Connection, _call: ConnectionRequest) -> None:
+    pipe.send(OPENED)
+    signal.pause()
+
+
 Heard = VehicleStatus | CommandForwarded
 
 
@@ -151,3 +156,14 @@ def test_a_process_that_has_never_told_how_its_vehicle_is_is_shown_as_not_answer
         silent = heard.get(timeout=PATIENCE_S)
         assert isinstance(silent, VehicleStatus)
         assert (silent.vehicle_id, silent.state, silent.armed, silent.concern) == (5, "not answering", None, "")
+
+
+def test_orders_to_a_process_that_reads_nothing_hold_up_nobody(tmp_path: Path) -> None:
+    """Whoever gives them passes on the orders and aborts of every other vehicle too."""
+    with session(reads_nothing, tmp_path) as (one, _):
+        answers = [one.send_command("land", "again and again", 1.0) for _ in range(5000)]
+        assert not answers[0].done()
+        assert "does not answer" in told(answers[-1])
+        assert one.pid is not None
+        os.kill(one.pid, signal.SIGKILL)
+        assert "nobody knows whether it told the vehicle" in told(answers[0])
