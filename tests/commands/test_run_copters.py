@@ -115,7 +115,7 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: 
             assert MAVLINK.connect is not None
             pinned = Identity(system_id=1, autopilot="px4", version="1.16.0")
             options = rig.options(clock_speed=rig.speed)
-            with closing(MAVLINK.connect(options, SAFE["px4"], pinned, folder)) as vehicle:
+            with closing(MAVLINK.connect(options, SAFE["px4"], pinned, folder, lambda: None)) as vehicle:
                 assert vehicle.concern == ""
         else:
             with flying_run(rig, "--set", "min_battery_v=50") as process:
