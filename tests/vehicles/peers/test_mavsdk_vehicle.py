@@ -54,7 +54,6 @@ def test_mavsdks_vehicle_takes_gains_flies_a_trial_and_has_its_safe_gains_back()
     flight = record.trajectory
     assert (record.ending, record.reason) == ("completed", "")
     assert (flight.time_s[0], flight.time_s[-1]) == pytest.approx((-1.0, RECORD_S), abs=0.2)
-    assert len(flight.time_s) / (flight.time_s[-1] - flight.time_s[0]) > 40.0
     np.testing.assert_allclose(flight["altitude_m"][flight.time_s < 0.0], 0.0, atol=1e-3)
     assert flight["altitude_m"][-1] == pytest.approx(3.0, abs=0.05)
     assert flight["climb_rate_m_s"].max() == pytest.approx(1.5)
