@@ -80,6 +80,10 @@ class Body:
         self.climb_rate_m_s = 0.0
         self.thrust = 0.0
         self.battery_v = FULL_BATTERY_V
+        self.north_m = 0.0
+        """From where it was switched on."""
+        self.steered_m_s = self.wind_m_s = 0.0
+        """How fast its autopilot, and how fast the wind, moves it north while it is off the ground."""
         self.motors_dead = False
         """A fault: whatever is commanded, nothing turns."""
 
@@ -92,6 +96,10 @@ class Body:
     def stands(self) -> bool:
         """On the ground, by height and speed."""
         return abs(self.altitude_m) < _STANDS_BELOW_M and abs(self.climb_rate_m_s) < _STANDS_BELOW_M_S
+
+    @property
+    def north_m_s(self) -> float:
+        return 0.0 if self.is_resting or self.stands else self.steered_m_s + self.wind_m_s
 
     def advance(self, steps: int, command: Integers) -> None:
         """Let so many steps of 1/512 s pass under `command`. Raises VehicleError when the simulation broke down."""
@@ -111,6 +119,7 @@ class Body:
             )
         self.altitude_m, self.climb_rate_m_s = float(row[ALTITUDE]), float(row[CLIMB_RATE])
         self.thrust, self.battery_v = float(row[THRUST]), float(row[BATTERY])
+        self.north_m += self.north_m_s * steps / RATE_HZ
 
     def forget_error_sum(self) -> None:
         """Empty the vertical loop's integrator."""

@@ -22,6 +22,7 @@ _JUMP_EVERY: Final = 25
 _TWICE_EVERY: Final = 5
 _SWAP_EVERY: Final = 4
 _WRONG_SYSTEM: Final = 77
+_WIND_M_S: Final = 2.0
 
 
 class FaultTarget(Protocol):
@@ -212,6 +213,18 @@ class WrongSystem(Fault):
         return [replace(letter, system=_WRONG_SYSTEM) for letter in letters]
 
 
+class CarriedAway(Fault):
+    """Off the ground the drone is carried north at 2 m/s, and does not hold against it."""
+
+    name = "carried-away"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.body.wind_m_s = _WIND_M_S
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.body.wind_m_s = 0.0
+
+
 class MocapLost(Fault):
     """Motion capture does not see the drone any more, says so, and repeats where it was."""
 
@@ -264,6 +277,7 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             DuplicatedPackets,
             ReorderedPackets,
             WrongSystem,
+            CarriedAway,
             MocapLost,
             MocapFrozen,
             MocapDrift,

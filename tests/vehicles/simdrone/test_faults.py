@@ -190,6 +190,7 @@ def test_packets_may_come_from_another_system() -> None:
 def test_the_registry_holds_what_was_promised() -> None:
     promised = (
         "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost frozen-position jumping-position low-battery "
-        "reboot duplicated-packets reordered-packets wrong-system mocap-lost mocap-frozen mocap-drift"
+        "reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost mocap-frozen "
+        "mocap-drift"
     )
     assert list(FAULTS) == promised.split()

@@ -266,6 +266,8 @@ class Copter(ABC):
         body, manners = self._body, self.firmware
         return telemetry.Snapshot(
             boot_s=self.boot_s,
+            north_m=body.north_m,
+            north_m_s=body.north_m_s,
             local_m=body.altitude_m + manners.ground_m,
             altitude_m=body.altitude_m,
             climb_rate_m_s=body.climb_rate_m_s,

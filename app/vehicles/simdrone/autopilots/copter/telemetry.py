@@ -28,6 +28,8 @@ class Snapshot:
     """Heights: `local_m` in the local frame, `altitude_m` above the place of takeoff; both up."""
 
     boot_s: float
+    north_m: float
+    north_m_s: float
     local_m: float
     altitude_m: float
     climb_rate_m_s: float
@@ -68,7 +70,7 @@ def heartbeat(now: Snapshot) -> Fields:
 
 def local_position(now: Snapshot) -> Fields:
     down = {"z": -now.local_m, "vz": -now.climb_rate_m_s}
-    return {"time_boot_ms": now.boot_ms, "x": 0.0, "y": 0.0, "vx": 0.0, "vy": 0.0, **down}
+    return {"time_boot_ms": now.boot_ms, "x": now.north_m, "y": 0.0, "vx": now.north_m_s, "vy": 0.0, **down}
 
 
 def global_position(now: Snapshot) -> Fields:

@@ -25,7 +25,9 @@ from app.vehicles.simdrone.autopilots.paparazzi import telemetry
 from app.vehicles.simdrone.autopilots.paparazzi.plan import (
     BLOCKS,
     DESCENT_M_S,
+    HOME_HEIGHT_M,
     LANDED_AFTER_S,
+    MAX_DISTANCE_M,
     TAKEOFF,
     WAYPOINTS,
     Engine,
@@ -37,9 +39,11 @@ from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, ver
 
 KILL: Final = 0
 FAILSAFE: Final = 1
+HOME: Final = 2
 NAV: Final = 13
-MODES: Final = (KILL, FAILSAFE, 2, NAV, 19)
+MODES: Final = (KILL, FAILSAFE, HOME, NAV, 19)
 FAILSAFE_DESCENT_M_S: Final = 1.3
+HOMING_M_S: Final = 3.0
 
 GROUND_COUNTS: Final = 25
 """Height of the local origin's plane below the vehicle on the ground, 1/256 m: there it reads 0.098 m."""
@@ -70,8 +74,8 @@ _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
 
 class Paparazzi:
     """One autopilot from switching on; see `Autopilot`. `tuned_telemetry` says whether it was built with a telemetry
-    file that sends the position at 51 Hz; otherwise it comes at 1.25 Hz. `kill_setting` and `landed_after_s` as in its
-    settings and its flight plan."""
+    file that sends the position at 51 Hz; otherwise it comes at 1.25 Hz. `kill_setting`, `landed_after_s` and
+    `max_distance_m` as in its settings and its flight plan; `tells_mode`: its heartbeat has the mode's number."""
 
     def __init__(
         self,
@@ -81,6 +85,8 @@ class Paparazzi:
         tuned_telemetry: bool = True,
         kill_setting: str = KILL_SETTING,
         landed_after_s: float = LANDED_AFTER_S,
+        max_distance_m: float = MAX_DISTANCE_M,
+        tells_mode: bool = False,
     ) -> None:
         self.dialect = PAPARAZZI
         self.system, self.component = system, COMPONENT
@@ -94,6 +100,8 @@ class Paparazzi:
         self._kill_setting = kill_setting
         self._settings = Settings(kill_setting)
         self._plan = FlightPlan(landed_after_s=landed_after_s)
+        self._max_distance_m = max_distance_m
+        self._tells_mode = tells_mode
         self._motors_on = False
         self._reported_seq: int | None = None
         self._listing: int | None = None
@@ -173,17 +181,28 @@ class Paparazzi:
             self.took_off = True
 
     def _navigate(self) -> None:
-        if self.mode in (KILL, FAILSAFE):
+        """Too far from HOME it flies there by itself, and runs no block any more until its mode is set again."""
+        distance_m = abs(self._body.north_m)
+        if self.mode == NAV and distance_m > self._max_distance_m:
+            self._set_mode(HOME)
+        self._body.steered_m_s = -self._homing_m_s() if self.mode == HOME else 0.0
+        if self.mode in (KILL, FAILSAFE, HOME):
             return
-        following = self._plan.next(_NAV_TICKS * TICK_S, self.height_m, flies=self._flies)
+        following = self._plan.next(_NAV_TICKS * TICK_S, self.height_m, distance_m, flies=self._flies)
         if following is not None:
             self._enter(following)
+
+    def _homing_m_s(self) -> float:
+        """Slower over the last metres."""
+        return min(max(self._body.north_m, -HOMING_M_S), HOMING_M_S)
 
     def _command(self) -> Integers:
         if not self.armed:
             return MOTORS_OFF
         if self.mode == FAILSAFE:
             return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
+        if self.mode == HOME:
+            return self._altitude(HOME_HEIGHT_M)
         match self._plan.block.vertical:
             case Vertical.THROTTLE:
                 return MOTORS_OFF
@@ -244,6 +263,9 @@ class Paparazzi:
             battery_v=body.battery_v,
             mode=self.mode,
             motors_on=self.armed,
+            north_m=body.north_m,
+            north_m_s=body.north_m_s,
+            tells_mode=self._tells_mode,
         )
 
     def _send(self, kind: str, *, counter: str = "", **fields: FieldValue) -> None:
@@ -329,8 +351,8 @@ class Paparazzi:
         self._send("SCRIPT_ITEM", counter="blocks", seq=seq, name=BLOCKS[seq].name, **_sender(message))
 
     def _hear_block(self, message: Message) -> None:
-        """Go to a block, unless somebody is still reading the list; there is no answer either way."""
-        if not self._is_listing_blocks:
+        """Go to a block, unless somebody is still reading the list, or it flies HOME; there is no answer either way."""
+        if not self._is_listing_blocks and self.mode != HOME:
             self._enter(int(number(message, "seq")))
 
     def _hear_mission_ack(self, _message: Message) -> None:

@@ -9,6 +9,10 @@ LANDED_AFTER_S: Final = 3.0
 """By this program's flight plan. Plans without such a guard stop the thrust of a vehicle that is told to land in the
 first second, before it counts as flying."""
 DEFAULT_ALTITUDE_M: Final = 2.0
+MAX_DISTANCE_M: Final = 50.0
+"""max_dist_from_home: farther than that from HOME, the origin, no block is flown any more."""
+HOME_HEIGHT_M: Final = 1.0
+"""home_mode_height: at which it flies back then, and stays."""
 
 CLIMB: Final = 2
 WAYPOINTS: Final = ("dummy", "HOME", "CLIMB", "STDBY", "p1", "p2", "p3", "p4", "CAM", "TD")
@@ -34,8 +38,8 @@ class Engine(Enum):
 @dataclass(frozen=True, slots=True)
 class Block:
     """One block. `after` is the block that follows at once, where it only passes through; `landed` the one that
-    follows when the vehicle no longer flies. `max_time_s` and `max_height_m` (local z, up) are exceptions that lead to
-    "land here"."""
+    follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an
+    axis from HOME) are exceptions that lead to "land here"."""
 
     name: str
     vertical: Vertical = Vertical.WAYPOINT
@@ -45,6 +49,11 @@ class Block:
     landed: str | None = None
     max_time_s: float = float("inf")
     max_height_m: float = float("inf")
+    max_distance_m: float = float("inf")
+
+    def is_over(self, time_s: float, height_m: float, distance_m: float) -> bool:
+        """Whether one of its exceptions holds."""
+        return time_s > self.max_time_s or height_m > self.max_height_m or distance_m > self.max_distance_m
 
 
 BLOCKS: Final = (
@@ -52,7 +61,7 @@ BLOCKS: Final = (
     Block("Geo init", Vertical.THROTTLE, engine=Engine.KILL, after="Holding point"),
     Block("Holding point", Vertical.THROTTLE, engine=Engine.KILL),
     Block("Start Engine", Vertical.THROTTLE, engine=Engine.RESURRECT),
-    Block("Takeoff", waypoint="CLIMB", max_time_s=45.0, max_height_m=4.5),
+    Block("Takeoff", waypoint="CLIMB", max_time_s=45.0, max_height_m=4.5, max_distance_m=8.0),
     Block("Standby"),
     Block("stay_p1", waypoint="p1"),
     Block("go_p2", waypoint="p2"),
@@ -102,14 +111,12 @@ class FlightPlan:
         if self.seq == LAND_HERE:
             self.altitudes_m["TD"] = height_m
 
-    def next(self, elapsed_s: float, height_m: float, *, flies: bool) -> int | None:
-        """Let time pass in the block; the block that the plan leads to, if to another."""
+    def next(self, elapsed_s: float, height_m: float, distance_m: float, *, flies: bool) -> int | None:
+        """Let time pass in the block, so far from HOME; the block that the plan leads to, if to another."""
         self.time_s += elapsed_s
         block = self.block
         if block.after is not None:
             return BY_NAME[block.after]
         if block.landed is not None and not flies and self.time_s > self._landed_after_s:
             return BY_NAME[block.landed]
-        if self.time_s > block.max_time_s or height_m > block.max_height_m:
-            return LAND_HERE
-        return None
+        return LAND_HERE if block.is_over(self.time_s, height_m, distance_m) else None

@@ -50,6 +50,9 @@ class Snapshot:
     battery_v: float
     mode: int
     motors_on: bool
+    north_m: float
+    north_m_s: float
+    tells_mode: bool
 
     @property
     def boot_ms(self) -> int:
@@ -62,13 +65,13 @@ class Snapshot:
 
 
 def heartbeat(now: Snapshot) -> Fields:
-    """NAV and HOME look alike."""
+    """NAV and HOME look alike where the mode's own number is not told."""
     mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8}.get(now.mode, 4)
     return {
         "type": 2,
         "autopilot": 9,
         "base_mode": mode | (ARMED if now.motors_on else 0),
-        "custom_mode": 0,
+        "custom_mode": now.mode if now.tells_mode else 0,
         "system_status": 4 if now.motors_on else 3,
         "mavlink_version": 3,
     }
@@ -78,10 +81,10 @@ def local_position(now: Snapshot) -> Fields:
     """z down, in steps of the autopilot's integers."""
     return {
         "time_boot_ms": now.boot_ms,
-        "x": 0.0,
+        "x": _stepped(now.north_m, POSITION_BITS),
         "y": 0.0,
         "z": -_stepped(now.height_m, POSITION_BITS),
-        "vx": 0.0,
+        "vx": _stepped(now.north_m_s, SPEED_BITS),
         "vy": 0.0,
         "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS),
     }
