@@ -49,10 +49,29 @@ def test_the_plan_brings_the_vehicle_down_by_itself_but_never_within_a_trial(fli
     assert {each.attrib["cond"]: each.attrib["deroute"] for each in takeoff.iterfind("exception")} == {
         "block_time > 45": LAND,
         "stateGetPositionEnu_f()->z > 4.5": LAND,
+        "stateGetPositionEnu_f()->x > 8": LAND,
+        "0 > stateGetPositionEnu_f()->x + 8": LAND,
+        "stateGetPositionEnu_f()->y > 8": LAND,
+        "0 > stateGetPositionEnu_f()->y + 8": LAND,
     }
     assert FLIGHT_S < 45.0
     simulation = next(each for each in simulated.BLOCKS if each.name == TAKE_OFF)
-    assert (simulation.max_time_s, simulation.max_height_m) == (45.0, 4.5)
+    assert (simulation.max_time_s, simulation.max_height_m, simulation.max_distance_m) == (45.0, 4.5, 8.0)
+
+
+def test_the_trials_radius_and_the_plans_exceptions_act_long_before_its_home_mode(
+    flight_plan: ElementTree.Element,
+) -> None:
+    farthest_m, home_m = (float(flight_plan.attrib[name]) for name in ("max_dist_from_home", "home_mode_height"))
+    assert (farthest_m, home_m) == (simulated.MAX_DISTANCE_M, simulated.HOME_HEIGHT_M)
+    assert home_m > float(flight_plan.attrib["security_height"])
+    limit_m = next(each for each in simulated.BLOCKS if each.name == TAKE_OFF).max_distance_m
+    options = {each.name: each.default for each in MAVLINK.options}
+    assert options["radius_m"] < limit_m == options["plan_radius_m"]
+    corner_m = limit_m * 2.0**0.5
+    assert corner_m < farthest_m / 2.0
+    [home] = [each for each in flight_plan.iterfind("waypoints/waypoint") if each.attrib["name"] == "HOME"]
+    assert (float(home.attrib["x"]), float(home.attrib["y"])) == (0.0, 0.0)
 
 
 def test_takeoff_is_a_step_of_altitude_to_the_waypoint_that_is_moved(flight_plan: ElementTree.Element) -> None:

@@ -145,6 +145,11 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
 )
 
 
+HELP: Final = "fly it by hand, or stop its motors"
+"""What is left to a person where a vehicle does not obey."""
+UNHEEDED: Final = f"It was told to land, and does not come down: {HELP}."
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """A limit that is not kept, in words."""

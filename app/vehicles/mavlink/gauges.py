@@ -53,8 +53,10 @@ class StatusReader:
         )
 
     def _mode(self, number: str) -> str:
-        """The block of the flight plan where the vehicle tells of one, for that says more than its mode."""
-        return self._radio.block or self._radio.profile.mode_names.get(number, number)
+        """The block of the flight plan where the vehicle tells of one and flies by it, for that says more."""
+        profile = self._radio.profile
+        name = profile.mode_names.get(number, number)
+        return name if number in profile.deaf_modes else self._radio.block or name
 
     def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
         if now_s - self._counts[-1].at_s >= _EVERY_S:

@@ -160,6 +160,7 @@ MAVLINK: Final = VehicleKind(
         _number("climb_waypoint", "Paparazzi: number of the waypoint that its take-off climbs to", "", 2.0, 1.0, 254.0),
         _number("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
         _number("radius_m", "How far from its start it may drift", "m", 5.0, 0.5, 100.0),
+        _number("plan_radius_m", "Paparazzi: how far from HOME its flight plan lets it fly", "m", 8.0, 0.5, 1000.0),
         _number("clock_speed", "Speed of its time: 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
             name="second_source",

@@ -12,6 +12,8 @@ REPEAT_S: Final = 1.0
 """How often an order is repeated that a vehicle has not obeyed."""
 _LAND_REPEATED_S: Final = 5.0
 """For so long Land is repeated as often as any other order."""
+UNHEEDED_S: Final = 5.0
+"""A vehicle that has not begun to land so long after it was told does not obey."""
 DESCENDING_M_S: Final = -0.2
 """A vehicle that sinks faster than this is landing."""
 

@@ -8,10 +8,11 @@ from typing import Final
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, signing
+from app.vehicles.mavlink.failures import HELP
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Target
+from app.vehicles.mavlink.profiles.base import Profile, Target
 from app.vehicles.mavlink.radio import REPLY_TIMEOUT_S, AutopilotLink
 from app.vehicles.mavlink.signals import PacketReceived
 from app.vehicles.mavlink.transports import Transport
@@ -79,12 +80,17 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
         flying_modes=profile.flying_modes,
         landing_modes=profile.landing_modes,
         manual_modes=profile.manual_modes,
-        mode_names=profile.mode_names,
+        mode_names={**profile.mode_names, **_described(profile)},
         blocks={number: name for name, number in radio.aim.blocks.items()},
         arming_blocks=profile.arming_blocks,
         flying_blocks=profile.flying_blocks,
         landing_blocks=profile.landing_blocks,
     ).stretched(timeout_factor_of(options))
+
+
+def _described(profile: Profile) -> dict[str, str]:
+    """Modes in which it obeys no Land, with what a person has to know of them."""
+    return {mode: f"{profile.mode_names[mode]}: {what}; {HELP}" for mode, what in profile.deaf_modes.items()}
 
 
 def _log_path(folder: str) -> Path | None:

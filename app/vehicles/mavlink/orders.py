@@ -4,7 +4,8 @@ from itertools import takewhile
 from typing import Final
 
 from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
+from app.vehicles.mavlink.failures import UNHEEDED
+from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, UNHEEDED_S, land_every_s
 from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
 from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.signals import Action, PacketReceived
@@ -31,6 +32,12 @@ class RepeatedCommand:
         self._landing_since_s: float | None = None
         self.is_over = False
         self._send()
+
+    @property
+    def trouble(self) -> str:
+        """That it does not land, though it is told to; empty where there is nothing to say."""
+        waits = self._action is Action.LAND and self._radio.clock.now_s() - self._asked_s > UNHEEDED_S
+        return UNHEEDED if waits and not self._is_over and self._landing_since_s is None else ""
 
     def proceed(self, heard: list[PacketReceived]) -> None:
         """Take in what came, and send it again when it is due."""

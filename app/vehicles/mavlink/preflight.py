@@ -244,6 +244,22 @@ def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservat
     )
 
 
+def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radius_m: float) -> CheckItem:
+    """For a flight plan that lands the vehicle by itself so far from HOME, which is where its position counts from, and
+    beyond a larger distance flies it HOME, obeying nobody."""
+    last = watched.positions[-1] if watched.positions else None
+    away_m = None if last is None else max(abs(last.north_m), abs(last.east_m))
+    passed = away_m is not None and away_m + radius_m <= plan_radius_m
+    return CheckItem(
+        name="home",
+        title="Distance from HOME",
+        passed=passed,
+        found="waiting for a position" if away_m is None else f"{away_m:.1f} m, and may drift {radius_m:g} m",
+        needed=f"{plan_radius_m:g} m or less together, where its flight plan lands it (plan_radius_m)",
+        hint="" if passed else "Put it nearer to where it was switched on, or lower radius_m.",
+    )
+
+
 def require(items: Sequence[CheckItem]) -> None:
     """Raises VehicleError naming everything that is not as it must be before a flight, SafeGainsError when the vehicle
     is armed."""

@@ -56,6 +56,9 @@ found in the air; what ends in idle from arm on has been disarmed and has its sa
 COMMANDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.LAND, State.ABORT_LAND})
 """An operator's abort has a meaning in these."""
 
+LANDING: Final = frozenset({State.LAND, State.ABORT_LAND})
+"""It has been told to land, and is heard."""
+
 OVER: Final = frozenset({State.IDLE, State.QUARANTINE})
 QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
 """Nothing that changes the vehicle may be sent but Land and motors off, until a person has released it."""

@@ -6,6 +6,9 @@ from typing import Final
 
 from app.vehicles.base import Sample, ShouldStop, StopRequest
 from app.vehicles.errors import VehicleError
+from app.vehicles.mavlink import watch as watching
+from app.vehicles.mavlink.failures import UNHEEDED
+from app.vehicles.mavlink.limits import DESCENDING_M_S, UNHEEDED_S
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.measurements import Position
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
@@ -25,7 +28,7 @@ from app.vehicles.mavlink.signals import (
     SendGain,
     Tick,
 )
-from app.vehicles.mavlink.states import State
+from app.vehicles.mavlink.states import LANDING, State
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.watch import TrialObservation
 
@@ -91,6 +94,16 @@ class TrialRunner:
     def datum_m(self) -> float:
         """Where altitudes count from, on the vehicle's own datum."""
         return self._trial.plan.datum_m
+
+    @property
+    def trouble(self) -> str:
+        """That it does not land, though it was told to; empty where there is nothing to say."""
+        trial, now_s = self._trial, self._radio.clock.now_s()
+        last = trial.watch.last
+        if trial.state not in LANDING or now_s - trial.since_s < UNHEEDED_S or last is None:
+            return ""
+        airborne = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+        return UNHEEDED if airborne and last.climb_rate_m_s >= DESCENDING_M_S else ""
 
     def fly(self) -> TrialResult:
         """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""

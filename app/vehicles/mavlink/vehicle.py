@@ -13,7 +13,7 @@ from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, parameters, preflight, records
 from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.gains import GainStore, written
 from app.vehicles.mavlink.gauges import StatusReader
 from app.vehicles.mavlink.machine import Plan
@@ -35,6 +35,7 @@ _LISTEN_S: Final = 0.1
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
 _ANOTHER: Final = "See which vehicle it is, then ask again."
+_KEPT_LANDING: Final = f"It goes on being told to land. If it does not come down, {HELP}."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
@@ -191,6 +192,8 @@ class MavlinkVehicle:
         troubles = (
             f"The telemetry log {problem}." if problem else "",
             self._lookout.source.trouble if self._lookout is not None else "",
+            self._flight.trouble if self._flight is not None else "",
+            self._order.trouble if self._order is not None else "",
         )
         return self._gauges.read(
             step=(State.IDLE if step in _ON_THE_GROUND else step).value,
@@ -388,6 +391,9 @@ class MavlinkVehicle:
         items = preflight.evaluate_items(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if self._lookout is not None:
             items = (*items, preflight.evaluate_secondary(self._lookout, watched))
+        if self._radio.profile.flying_blocks:
+            radius_m, plan_radius_m = float(self._options["radius_m"]), float(self._options["plan_radius_m"])
+            items = (*items, preflight.evaluate_distance(watched, radius_m=radius_m, plan_radius_m=plan_radius_m))
         return watched, (*items, self._gains.check())
 
     def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> TrialResult:
@@ -428,6 +434,7 @@ class MavlinkVehicle:
         if not by_hand and not self._radio.is_disarmed and self._order is None:
             with suppress(LinkError):
                 self._order = RepeatedCommand(self._radio, Action.LAND)
+                self._asked = _KEPT_LANDING
 
     def _plan(self, ground: Ground) -> Plan:
         profile = self._radio.profile
@@ -479,7 +486,9 @@ class MavlinkVehicle:
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
-            reason=" ".join(part for part in (reason, both.remark) if part),
+            reason=" ".join(
+                part for part in (reason, _KEPT_LANDING if self._order is not None else "", both.remark) if part
+            ),
             settings={**self._options, **both.settings},
         )
 

@@ -33,6 +33,11 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
           Quarantined
         </span>
       )}
+      {aged?.status.trouble && (
+        <span className={classes["trouble"]} role="alert">
+          {aged.status.trouble}
+        </span>
+      )}
       <span className={classes["fact"]} data-bad={stale || undefined} title="How long ago the vehicle was last heard">
         <LinkIcon size={17} aria-hidden />
         <span className="visually-hidden">Link</span>

@@ -48,6 +48,7 @@ class ArduPilot:
         }
     )  # fmt: skip
     manual_modes: Final = frozenset({"0", "1", "2", "5", "7", "11", "13", "14", "16", "18"})
+    deaf_modes: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()

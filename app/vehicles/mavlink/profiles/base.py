@@ -213,6 +213,11 @@ class Profile(Protocol):
         ...
 
     @property
+    def deaf_modes(self) -> Mapping[str, str]:
+        """Those in which it obeys no order to land, with what it does in them."""
+        ...
+
+    @property
     def arming_blocks(self) -> frozenset[str]:
         """Of its flight plan, where it has one: in which it stands on the ground before the take-off."""
         ...

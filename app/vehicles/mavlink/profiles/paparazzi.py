@@ -24,6 +24,9 @@ _LOCAL_ENU: Final = 4
 _WAYPOINT: Final = 16
 _SETTLE_S: Final = 0.5
 _NAV: Final = "4"
+_HOME: Final = "home"
+_HOME_NUMBER: Final = 2
+"""Of the autopilot's mode, in the heartbeat of those releases that tell it: by its base mode it is NAV."""
 
 
 class Paparazzi:
@@ -40,8 +43,11 @@ class Paparazzi:
     climbs_from_ground: Final = False
     flying_modes: Final = frozenset({_NAV})
     landing_modes: Final = frozenset({_NAV})
-    mode_names: Final = MappingProxyType({_NAV: "Automatic", "8": "Guided", "64": "By hand", "80": "By hand"})
+    mode_names: Final = MappingProxyType(
+        {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "By hand", "80": "By hand"}
+    )
     manual_modes: Final = frozenset({"64", "80"})
+    deaf_modes: Final = MappingProxyType({_HOME: "it flies back by itself and obeys no Land"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
@@ -156,8 +162,10 @@ def _without_blocks(what: str) -> VehicleError:
 
 
 def _heartbeat(message: Message) -> Measurement | None:
-    """Its mode is the base mode without the bit for armed."""
-    return base.heartbeat(message, str(int(number(message, "base_mode")) & ~base.ARMED_BIT))
+    """Its mode is the base mode without the bit for armed, but for HOME."""
+    mode = str(int(number(message, "base_mode")) & ~base.ARMED_BIT)
+    is_home = mode == _NAV and number(message, "custom_mode") == _HOME_NUMBER
+    return base.heartbeat(message, _HOME if is_home else mode)
 
 
 def _taken(message: Message) -> Measurement:

@@ -45,6 +45,7 @@ class Px4:
         }
     )  # fmt: skip
     manual_modes: Final = frozenset({"1.0", "2.0", "3.0", "5.0", "7.0"})
+    deaf_modes: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()

@@ -1,0 +1,138 @@
+"""A Paparazzi that was carried beyond the radius of its flight plan flies HOME by itself and obeys no Land: what is
+said of it, and what never is."""
+
+import pytest
+
+from app.vehicles.base import FlightOptions, FlightRecord
+from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.simdrone.autopilots.base import Autopilot
+from app.vehicles.simdrone.autopilots.paparazzi.autopilot import HOME, NAV, Paparazzi
+from app.vehicles.simdrone.autopilots.registry import Make
+from app.vehicles.simdrone.body import Body
+from tests.vehicles.flying import SAFE, TUNED, never, unwatched
+from tests.vehicles.mavlink.rigs import LockstepRig
+from tests.vehicles.mavlink.test_connected import connected
+
+ADVICE = "fly it by hand, or stop its motors"
+LAND_HERE = 13
+
+
+def old_plan(*, max_distance_m: float = 5.5, tells_mode: bool = False) -> Make:
+    """Its HOME mode begins right behind the radius of a trial, while it lands."""
+
+    def make(body: Body, system: int) -> Autopilot:
+        return Paparazzi(body, system=system, max_distance_m=max_distance_m, tells_mode=tells_mode)
+
+    return make
+
+
+def fly(vehicle: MavlinkVehicle) -> FlightRecord:
+    vehicle.stage(TUNED)
+    return vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
+
+
+def lands(rig: LockstepRig, since_s: float) -> int:
+    return sum(
+        message.get_type() == "SCRIPT_ITEM" and getattr(message, "seq", None) == LAND_HERE
+        for at_s, message in rig.heard
+        if at_s > since_s
+    )
+
+
+def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_have_landed() -> None:
+    with LockstepRig(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
+        record = fly(vehicle)
+        assert (record.ending, rig.drone.autopilot.held("aut_mod")) == ("aborted", HOME)
+        assert "It has not landed within 40 s." in record.reason
+        for said in (record.reason, vehicle.concern):
+            assert ADVICE in said
+        over_s = rig.now_s()
+        vehicle.attend(20.0)
+        assert lands(rig, over_s) >= 3
+        assert ADVICE in vehicle.condition().trouble
+        with pytest.raises(SafeGainsError, match="quarantined"):
+            vehicle.stage(SAFE)
+        with pytest.raises(VehicleError, match="armed"):
+            vehicle.release()
+
+
+def test_once_a_pilot_has_set_its_mode_it_lands_and_the_trouble_is_over() -> None:
+    with LockstepRig(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
+        fly(vehicle)
+        rig.drone.autopilot._set_mode(NAV)  # type: ignore[attr-defined]
+        vehicle.attend(30.0)
+        assert rig.drone.body.altitude_m < 0.1
+        assert vehicle.condition().trouble == ""
+        vehicle.motors_off("it stands")
+        vehicle.attend(2.0)
+        vehicle.release()
+        assert vehicle.concern == ""
+
+
+def test_while_it_does_not_come_down_the_operator_is_told_so_before_the_landing_is_given_up() -> None:
+    told: list[tuple[float, str]] = []
+
+    class Watching(LockstepRig):
+        vehicle_now: MavlinkVehicle | None = None
+
+        def read(self, timeout_s: float) -> list[tuple[bytes, tuple[str, int]]]:
+            if self.vehicle_now is not None:
+                told.append((self.now_s(), self.vehicle_now.condition().trouble))
+            return super().read(timeout_s)
+
+    with Watching(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
+        rig.vehicle_now = vehicle
+        fly(vehicle)
+        [landed_s, *_] = [
+            at_s for at_s, each in rig.heard if each.get_type() == "SCRIPT_ITEM" and each.seq == LAND_HERE
+        ]
+        warned_s = next(at_s for at_s, trouble in told if ADVICE in trouble)
+        assert 4.9 < warned_s - landed_s < 15.0
+
+
+def test_a_landing_that_is_obeyed_is_no_trouble() -> None:
+    troubles: set[str] = set()
+
+    class Watching(LockstepRig):
+        vehicle_now: MavlinkVehicle | None = None
+
+        def read(self, timeout_s: float) -> list[tuple[bytes, tuple[str, int]]]:
+            if self.vehicle_now is not None:
+                troubles.add(self.vehicle_now.condition().trouble)
+            return super().read(timeout_s)
+
+    with Watching() as rig, connected(rig) as vehicle:
+        rig.vehicle_now = vehicle
+        assert fly(vehicle).ending == "completed"
+        assert troubles == {""}
+
+
+def test_a_heartbeat_that_tells_home_is_a_finding_of_its_own() -> None:
+    make = old_plan(max_distance_m=4.0, tells_mode=True)
+    with LockstepRig(make=make, faults=["carried-away:3@8"]) as rig, connected(rig) as vehicle:
+        record = fly(vehicle)
+        assert record.ending == "invalid"
+        assert "The vehicle went into mode Home: it flies back by itself and obeys no Land" in record.reason
+        assert vehicle.condition().mode == "Home"
+
+
+@pytest.mark.parametrize(("away_m", "passes"), [(0.0, True), (2.9, True), (-3.1, False)])
+def test_it_is_not_flown_so_far_from_home_that_its_plan_would_act_before_the_trials_radius(
+    away_m: float, passes: bool
+) -> None:
+    with LockstepRig() as rig, connected(rig) as vehicle:
+        rig.drone.body.north_m = away_m
+        [item] = [each for each in vehicle.check() if each.name == "home"]
+        assert item.passed is passes
+        assert (item.found, item.needed) == (
+            f"{abs(away_m):.1f} m, and may drift 5 m",
+            "8 m or less together, where its flight plan lands it (plan_radius_m)",
+        )
+
+
+def test_the_distance_from_home_is_asked_of_paparazzi_alone() -> None:
+    with LockstepRig("px4") as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            assert "home" not in {each.name for each in vehicle.check()}
