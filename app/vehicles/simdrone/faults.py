@@ -118,6 +118,28 @@ class LinkLost(Fault):
         return True
 
 
+class Deaf(Fault):
+    """Nothing that is sent to it is heard; what it says arrives."""
+
+    name = "deaf"
+
+    @property
+    def is_deaf(self) -> bool:
+        return True
+
+
+class TakenOver(Fault):
+    """A pilot switches it to a mode of theirs, in which they hold it where it is, and back at the end."""
+
+    name = "taken-over"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.autopilot.take_over()
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.autopilot.hand_back()
+
+
 @dataclass
 class FrozenPosition(Fault):
     """Packets arrive, but those of the position repeat the last one, its time too."""
@@ -270,6 +292,8 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             ArmRefused,
             NoLiftOff,
             LinkLost,
+            Deaf,
+            TakenOver,
             FrozenPosition,
             JumpingPosition,
             LowBattery,

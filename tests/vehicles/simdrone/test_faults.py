@@ -8,7 +8,7 @@ from app.core.errors import InputError
 from app.vehicles.simdrone.faults import FAULTS, PlannedFault, parse_fault
 from tests.vehicles.simdrone import copters
 from tests.vehicles.simdrone.ground import Heard, flying
-from tests.vehicles.simdrone.paparazzi import START_ENGINE, Pilot, from_vehicle
+from tests.vehicles.simdrone.paparazzi import LAND_HERE, START_ENGINE, Pilot, from_vehicle
 
 
 def positions(messages: list[Heard]) -> list[Heard]:
@@ -187,10 +187,45 @@ def test_packets_may_come_from_another_system() -> None:
     assert systems[-1] == 31
 
 
+def test_a_deaf_drone_obeys_nothing_and_tells_on() -> None:
+    ground = flying("paparazzi", faults=["deaf:4@6"])
+    pilot = Pilot(ground)
+    pilot.hover()
+    ground.expect("LOCAL_POSITION_NED", lambda message: message.time_boot_ms > 8000, within_s=20.0)
+    pilot.block(LAND_HERE)
+    assert len(positions(ground.listen(1.0))) > 40
+    assert pilot.read("gui_v_kp") is None
+    ground.listen(4.0)
+    pilot.block(LAND_HERE)
+    ground.expect("SCRIPT_CURRENT", lambda message: message.seq > LAND_HERE)
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "by_hand", "automatic"), [("paparazzi", (80, 0), (4, 0)), ("px4", (81, 3 << 16), (29, 0x03040000))]
+)
+def test_a_pilot_takes_it_over_holds_it_and_hands_it_back(
+    autopilot: str, by_hand: tuple[int, int], automatic: tuple[int, int]
+) -> None:
+    ground = flying(autopilot, faults=["taken-over:4@18"])
+    if autopilot == "paparazzi":
+        pilot = Pilot(ground)
+        pilot.set_gains(1624, 1356, 195)
+        pilot.take_off()
+    else:
+        copters.Px4(ground).hover()
+    ground.listen(8.0)
+    before_m = ground.expect("LOCAL_POSITION_NED").z
+    for base_mode, custom_mode in (by_hand, automatic):
+        beat = ground.expect("HEARTBEAT", lambda heard, mode=base_mode: heard.base_mode & 127 == mode, within_s=16.0)
+        assert (beat.custom_mode, beat.base_mode & 128) == (custom_mode, 128)
+        ground.listen(2.0)
+        assert ground.expect("LOCAL_POSITION_NED").z == pytest.approx(before_m, abs=0.4)
+
+
 def test_the_registry_holds_what_was_promised() -> None:
     promised = (
-        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost frozen-position jumping-position low-battery "
-        "reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost mocap-frozen "
-        "mocap-drift"
+        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf taken-over frozen-position "
+        "jumping-position low-battery reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost "
+        "mocap-frozen mocap-drift"
     )
     assert list(FAULTS) == promised.split()

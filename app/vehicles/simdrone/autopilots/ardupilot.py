@@ -99,6 +99,8 @@ _FIRMWARE: Final = FirmwareProfile(
     ),
     land="LAND",
     hold="BRAKE",
+    by_hand="ALT_HOLD",
+    automatic="GUIDED",
     refused=FAILED,
     unready="Pre",
     no_estimate="Arm: Need Position Estimate",

@@ -55,6 +55,14 @@ class Autopilot(Protocol):
         """Take in what the radio received."""
         ...
 
+    def take_over(self) -> None:
+        """A pilot switches to a mode of theirs, and holds it where it is."""
+        ...
+
+    def hand_back(self) -> None:
+        """The pilot switches back to the mode in which it is told what to do."""
+        ...
+
     def restore_persistent(self, before: Self) -> None:
         """Take over what outlives a reboot from itself as it was."""
         ...

@@ -95,6 +95,8 @@ class Px4(Copter):
         ),
         land="AUTO.LAND",
         hold="AUTO.LOITER",
+        by_hand="POSCTL",
+        automatic="AUTO.LOITER",
         refused=TEMPORARILY_REJECTED,
         unready="Preflight Fail: ",
         no_estimate="Arming denied: resolve system health failures first",

@@ -172,6 +172,12 @@ class Copter(ABC):
                 if self.armed:
                     self.take_off(float("nan"))
 
+    def take_over(self) -> None:
+        self.enter(self.find_mode(self.firmware.by_hand))
+
+    def hand_back(self) -> None:
+        self.enter(self.find_mode(self.firmware.automatic))
+
     def held(self, parameter: str) -> float:
         return self.parameters[parameter]
 

@@ -53,6 +53,10 @@ class FirmwareProfile:
     modes: tuple[FlightMode, ...]
     land: str
     hold: str
+    by_hand: str
+    """A pilot's."""
+    automatic: str
+    """The one that a pilot switches back to."""
     refused: int
     unready: str
     """Says, every now and then, why it would not arm; the reason follows."""

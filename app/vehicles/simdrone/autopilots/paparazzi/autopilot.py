@@ -40,8 +40,12 @@ from app.vehicles.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, ver
 KILL: Final = 0
 FAILSAFE: Final = 1
 HOME: Final = 2
+BY_HAND: Final = 12
 NAV: Final = 13
-MODES: Final = (KILL, FAILSAFE, HOME, NAV, 19)
+MODES: Final = (KILL, FAILSAFE, HOME, BY_HAND, NAV, 19)
+_WITHOUT_PLAN: Final = (KILL, FAILSAFE, HOME, BY_HAND)
+"""In these no block is flown."""
+_KEEP_THEIR_BLOCK: Final = (HOME, BY_HAND)
 FAILSAFE_DESCENT_M_S: Final = 1.3
 HOMING_M_S: Final = 3.0
 
@@ -111,6 +115,7 @@ class Paparazzi:
         self._flies = False
         self._touched_s: float | None = None
         self._touched_m = 0.0
+        self._held_m = 0.0
         self._timetable = Timetable.from_periods(telemetry.PERIODS_S)
         if not tuned_telemetry:
             self._timetable.set("LOCAL_POSITION_NED", telemetry.BARE_POSITION_PERIOD_S)
@@ -159,6 +164,13 @@ class Paparazzi:
 
     # ------------------------------------------------------------ flying
 
+    def take_over(self) -> None:
+        self._set_mode(BY_HAND)
+        self._held_m = self.height_m
+
+    def hand_back(self) -> None:
+        self._set_mode(NAV)
+
     def _set_motors(self, *, on: bool) -> None:
         self._motors_on = on and self.mode != KILL and not self.refuses_arming
         if self._kill_setting:
@@ -186,7 +198,7 @@ class Paparazzi:
         if self.mode == NAV and distance_m > self._max_distance_m:
             self._set_mode(HOME)
         self._body.steered_m_s = -self._homing_m_s() if self.mode == HOME else 0.0
-        if self.mode in (KILL, FAILSAFE, HOME):
+        if self.mode in _WITHOUT_PLAN:
             return
         following = self._plan.next(_NAV_TICKS * TICK_S, self.height_m, distance_m, flies=self._flies)
         if following is not None:
@@ -199,10 +211,8 @@ class Paparazzi:
     def _command(self) -> Integers:
         if not self.armed:
             return MOTORS_OFF
-        if self.mode == FAILSAFE:
-            return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
-        if self.mode == HOME:
-            return self._altitude(HOME_HEIGHT_M)
+        if self.mode in _WITHOUT_PLAN:
+            return self._without_plan()
         match self._plan.block.vertical:
             case Vertical.THROTTLE:
                 return MOTORS_OFF
@@ -210,6 +220,12 @@ class Paparazzi:
                 return self._altitude(self._plan.target_m)
             case Vertical.DESCEND:
                 return self._descent()
+
+    def _without_plan(self) -> Integers:
+        heights_m = {HOME: HOME_HEIGHT_M, BY_HAND: self._held_m}
+        if self.mode in heights_m:
+            return self._altitude(heights_m[self.mode])
+        return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
 
     def _descent(self) -> Integers:
         """Down at a constant rate. On the ground the reference sinks on below the vehicle, which the replica's climb
@@ -351,8 +367,9 @@ class Paparazzi:
         self._send("SCRIPT_ITEM", counter="blocks", seq=seq, name=BLOCKS[seq].name, **_sender(message))
 
     def _hear_block(self, message: Message) -> None:
-        """Go to a block, unless somebody is still reading the list, or it flies HOME; there is no answer either way."""
-        if not self._is_listing_blocks and self.mode != HOME:
+        """Go to a block, unless somebody is still reading the list, or no block is flown; there is no answer either
+        way."""
+        if not self._is_listing_blocks and self.mode not in _KEEP_THEIR_BLOCK:
             self._enter(int(number(message, "seq")))
 
     def _hear_mission_ack(self, _message: Message) -> None:

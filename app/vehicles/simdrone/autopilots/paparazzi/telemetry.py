@@ -36,6 +36,7 @@ _GEOID_MM: Final = 49817
 _KILL: Final = 0
 _FAILSAFE: Final = 1
 _GUIDED: Final = 19
+_BY_HAND: Final = 12
 _NO_TEMPERATURE: Final = 32767
 
 
@@ -66,7 +67,7 @@ class Snapshot:
 
 def heartbeat(now: Snapshot) -> Fields:
     """NAV and HOME look alike where the mode's own number is not told."""
-    mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8}.get(now.mode, 4)
+    mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8, _BY_HAND: 64 | 16}.get(now.mode, 4)
     return {
         "type": 2,
         "autopilot": 9,
