@@ -1,7 +1,7 @@
-"""Whole trials in lockstep over a hostile link: what may never be seen, whatever the link says.
+"""Whole trials in lockstep over a hostile link, or with a vehicle that something befalls: what may never be seen.
 
     ./dev exec python -m bench.hostile                          a sample, as .ci/run has it
-    ./dev exec python -m bench.hostile --all --out docs         every hostility, from every state on, three autopilots
+    ./dev exec python -m bench.hostile --all --out docs         every hazard, from every state on, three autopilots
     ./dev exec python -m bench.hostile --only 117               one run again
 
 Prints what went wrong and a table; with `--out` writes hostile-links.md there. Exits 1 when a single run is not as it
@@ -20,10 +20,10 @@ from typing import Final
 
 from bench.hazards.cases import Case
 from bench.hazards.hostile import Ended, carry_out, cases
-from bench.hazards.hostility import HOSTILITIES
+from bench.hazards.hostility import HAZARDS
 
 STRIDE: Final = 37
-"""Of the sample: from each case to the next another hostility, another state, in the end another autopilot."""
+"""Of the sample: from each case to the next another hazard, another state, in the end another autopilot."""
 VERDICTS: Final = ("completed", "aborted", "invalid", "refused")
 LEFT: Final = ("safe", "quarantined", "unopened")
 
@@ -51,9 +51,9 @@ def fly_all(chosen: Sequence[Case], processes: int) -> Iterator[tuple[Case, Ende
 
 
 def table(flown: Sequence[tuple[Case, Ended]]) -> Iterator[str]:
-    yield f"| what the link does | runs | {' | '.join((*VERDICTS, *LEFT))} | wrong |"
+    yield f"| what befalls it | runs | {' | '.join((*VERDICTS, *LEFT))} | wrong |"
     yield "| --- |" + " --- |" * (len(VERDICTS) + len(LEFT) + 2)
-    for name in HOSTILITIES:
+    for name in HAZARDS:
         ended = [each for case, each in flown if case.mishaps[0].kind == name]
         verdicts, left = Counter(each.outcome for each in ended), Counter(each.vehicle for each in ended)
         counts = [*(verdicts[each] for each in VERDICTS), *(left[each] for each in LEFT)]
@@ -102,20 +102,27 @@ _PAGE: Final = """\
     ./dev exec python -m bench.hostile --all --out docs
     ./dev exec python -m bench.hostile --only 117
 
-Whole trials of [real-flight.md](real-flight.md) with a sound vehicle, which hears everything that is sent to it, and a
-link that tells what it likes: values that are no numbers, in each field; another component, as it is or posing as the
-autopilot; a second vehicle with the same ids, whose clock is so much older; packets late, twice, or from the future;
-a heartbeat or a position in the vehicle's name, once or every second; one kind of message that does not come; the
-wrong echo of a parameter. Each sets in in each state of a trial for good, and in the air for a second and a half, under
-each autopilot. The rig is that of [faults.md](faults.md): lockstep, so a run that is flown again is the same.
+Whole trials of [real-flight.md](real-flight.md) with a sound vehicle and a link that tells what it likes: values that
+are no numbers, in each field; another component, as it is or posing as the autopilot; a second vehicle with the same
+ids, whose clock is so much older; packets late, twice, or from the future; a heartbeat or a position in the vehicle's
+name, once or every second; one kind of message that does not come; the wrong echo of a parameter; an altitude that is
+suddenly a little other; a second source of altitude that jumps, freezes, falls silent or tells no numbers. Or an honest
+link, and a vehicle that something befalls: a pilot who takes it over, for good or for some seconds; deafness; wind.
+Each sets in in each state of a trial for good, and in the air for a second and a half, under each autopilot. The rig is
+that of [faults.md](faults.md): lockstep, so a run that is flown again is the same.
 
-What may never be, read from the packets at the vehicle's antenna and its true height:
+What may never be, read from the packets at the vehicle's antenna, its true height, and what truly befell it:
 
-- its motors told to stop above 0.15 m;
-- a vehicle that is not on the ground a minute after its trial, the program attending to it;
-- a height of more than a metre over the limit of altitude;
-- *safe* said of one that is armed or holds other gains;
-- a record that counts, and is more than 0.35 m from where the vehicle was.
+- its motors told to stop above 0.15 m; a height of more than a metre over the limit of altitude;
+- a vehicle that is not on the ground a minute after its trial, the program attending to it, or that was up for eight
+  seconds then, armed and heard, without sinking and without Land; anything but Land sent to it;
+- anything sent to a vehicle that a pilot flies, once two heartbeats must have told so (it is theirs from then on, also
+  when they switch back: whether they bring it down is not looked at);
+- *safe* said of one that is armed or holds other gains; nothing said of one that is armed or in the air;
+- a trial *not flown* that left the ground; *completed* that was aborted, or met what is not to be borne; a reason that
+  does not name what befell it; gains blamed for what is not theirs; a quarantine without need
+  (`bench/hazards/expectations.py` says what each may do);
+- a record that counts, and is not whole, or more than 0.35 m from where the vehicle was.
 
 {right} of {runs} runs ({autopilots}) were as they must be.{wrong}
 

@@ -103,7 +103,7 @@ class Case:
 
     @property
     def has_second_source(self) -> bool:
-        return any(each.kind in MOCAP for each in self.mishaps)
+        return any(each.kind.startswith("mocap") for each in self.mishaps)
 
     @property
     def safe(self) -> Mapping[str, float]:

@@ -1,7 +1,5 @@
-"""What a link, or somebody on it, may do to what a vehicle says: each hostility is made by one function of a speaker.
-
-The vehicle itself is sound, and hears everything that the ground sends.
-"""
+"""What a link, or somebody on it, may do to what a vehicle says, where each hostility is made by one function of a
+speaker; and what may befall the vehicle itself, which is sound otherwise and hears everything that the ground sends."""
 
 import math
 import random
@@ -17,7 +15,12 @@ ONBOARD_CONTROLLER: Final = 18
 QUADROTOR: Final = 2
 NO_AUTOPILOT: Final = 8
 POSITION: Final = "LOCAL_POSITION_NED"
+SIGHTING: Final = "VISION_POSITION_ESTIMATE"
+"""Of a second source of altitude."""
 FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz")
+UNREAL: Final = (math.nan, math.inf, -math.inf)
+TWINS_S: Final = (0.0, 0.4, 5.0, 3600.0)
+SHIFTS_M: Final = (0.1, 0.2, -0.1, -0.2)
 MAKES: Final[Mapping[str, int]] = {"paparazzi": 9, "ardupilot": 3, "px4": 12}
 BY_HAND: Final[Mapping[str, tuple[int, int]]] = {"paparazzi": (64, 0), "ardupilot": (1, 0), "px4": (1, 3 << 16)}
 """base_mode and custom_mode of a mode in which a person flies."""
@@ -112,6 +115,22 @@ class Silent:
 
 
 @dataclass
+class Frozen:
+    """Every message of one kind says what the first one said, its time too."""
+
+    speaker: Speaker
+    kind: str
+    _told: dict[str, FieldValue] = field(default_factory=dict)
+
+    def arrive(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:  # noqa: ARG002
+        return [self.speaker.changed(frame, self.kind, self._repeat) for frame in frames]
+
+    def _repeat(self, message: Message) -> Mapping[str, FieldValue]:
+        self._told = self._told or {name: getattr(message, name) for name in message.get_fieldnames()}
+        return self._told
+
+
+@dataclass
 class Inserted:
     """`say(now_s)` is heard, too: once, or every so often."""
 
@@ -177,6 +196,10 @@ def _number(name: str, value: float) -> Make:
     return lambda speaker: Changed(speaker, POSITION, lambda _: {name: value})
 
 
+def _higher(kind: str, by_m: float) -> Make:
+    return lambda speaker: Changed(speaker, kind, lambda told: {"z": number(told, "z") - by_m})
+
+
 def _silence(kind: str) -> Make:
     return lambda speaker: Silent(speaker, kind)
 
@@ -226,14 +249,14 @@ def _place(*, height_m: float, every_s: float, ahead_s: float = 0.0, boot_s: flo
 
 
 HOSTILITIES: Final[Mapping[str, Make]] = {
-    **{f"{name} {value}": _number(name, value) for name in FIELDS for value in (math.nan, math.inf, -math.inf)},
+    **{f"{name} {value}": _number(name, value) for name in FIELDS for value in UNREAL},
     "parameters nan": lambda speaker: Changed(speaker, "PARAM_VALUE", lambda _: {"param_value": math.nan}),
     "parameters wrong": lambda speaker: Changed(
         speaker, "PARAM_VALUE", lambda told: {"param_value": number(told, "param_value") + 1.0}
     ),
     "companion": _companion(poses=False),
     "companion as autopilot": _companion(poses=True),
-    **{f"twin {older_s:g} s older": _twin(older_s) for older_s in (0.0, 0.4, 5.0, 3600.0)},
+    **{f"twin {older_s:g} s older": _twin(older_s) for older_s in TWINS_S},
     "late by 0.4 s": lambda _: Late(0.4, every=3, copies=False),
     "late by 2 s": lambda _: Late(2.0, every=7, copies=False),
     "copies after 2 s": lambda _: Late(2.0, every=2, copies=True),
@@ -250,8 +273,24 @@ HOSTILITIES: Final[Mapping[str, Make]] = {
         f"no {kind}": _silence(kind)
         for kind in ("HEARTBEAT", POSITION, "SYS_STATUS", "COMMAND_ACK", "PARAM_VALUE", "EXTENDED_SYS_STATE")
     },
+    **{f"altitude {by_m:+g} m": _higher(POSITION, by_m) for by_m in SHIFTS_M},
+    "mocap nan": lambda speaker: Changed(speaker, SIGHTING, lambda _: {"z": math.nan}),
+    "mocap 1 m higher": _higher(SIGHTING, 1.0),
+    "mocap frozen": lambda speaker: Frozen(speaker, SIGHTING),
+    "mocap silent": _silence(SIGHTING),
 }
-"""By name."""
+"""What a link does, by name."""
+
+MISFORTUNES: Final[Mapping[str, tuple[str, float]]] = {
+    "pilot": ("taken-over", math.inf),
+    "pilot for 1 s": ("taken-over", 1.0),
+    "pilot for 3 s": ("taken-over", 3.0),
+    "deaf": ("deaf", math.inf),
+    "carried away": ("carried-away", math.inf),
+}
+"""What befalls the vehicle itself, by name: a fault of the simulated drone, and how long it lasts at the most."""
+PILOTS: Final = frozenset(name for name, (fault, _) in MISFORTUNES.items() if fault == "taken-over")
+HAZARDS: Final = (*HOSTILITIES, *MISFORTUNES)
 
 
 def _boot_s(drone: Drone) -> float:

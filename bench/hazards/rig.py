@@ -62,6 +62,7 @@ class Rig(Lockstep):
         self.case = case
         self.stages = Stages()
         self.struck: list[Struck] = []
+        self.sent: list[tuple[float, Order]] = []
         self.stops: list[Stopping] = []
         self.heard: int = 0
         self.flew_on: Mapping[str, float] | None = None
@@ -108,6 +109,7 @@ class Rig(Lockstep):
     def _tap(self, told: Order, *, stops: bool) -> None:
         now_s, height_m = self.drone.time_s, self.drone.body.altitude_m
         self.heard += told is not Order.HEARTBEAT
+        self.sent.append((now_s, told))
         if stops:
             self.stops.append(Stopping(now_s, height_m))
         if self.stages.now is None or self.stages.over_s < now_s:
