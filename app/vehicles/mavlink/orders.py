@@ -23,15 +23,18 @@ class RepeatedCommand:
     over once the motors stand, a person flies the vehicle, or it has had the time to land; while it is landing, nothing
     is sent."""
 
-    def __init__(self, radio: AutopilotLink, action: Action) -> None:
-        """Sends it. Raises VehicleError when it takes a block of a flight plan that is not known."""
+    def __init__(self, radio: AutopilotLink, action: Action, *, by_person: bool = True) -> None:
+        """Sends it; one that no person has given waits while the newest heartbeat is in a pilot's mode. Raises
+        VehicleError when it takes a block of a flight plan that is not known."""
         self._radio, self._action = radio, action
         self._asked_s = radio.clock.now_s()
         self._answered = False
         self._by_hand_since_s: float | None = None
         self._landing_since_s: float | None = None
         self.is_over = False
-        self._send()
+        self._sent_s = float("-inf")
+        if by_person or not self._is_in_pilots_mode():
+            self._send()
 
     @property
     def trouble(self) -> str:
@@ -47,8 +50,18 @@ class RepeatedCommand:
         is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
         self.is_over = self.is_over or is_late or self._has_stopped() or self._has_landed(now_s)
         is_due = now_s - self._sent_s >= self._every_s(now_s)
-        if is_due and self._landing_since_s is None and not self.is_over:
+        held_up = self._landing_since_s is not None or self._may_be_by_hand(now_s)
+        if is_due and not held_up and not self.is_over:
             self._send()
+
+    def _is_in_pilots_mode(self) -> bool:
+        heartbeat = self._radio.seen.heartbeat
+        return heartbeat is not None and heartbeat.mode in self._radio.profile.manual_modes
+
+    def _may_be_by_hand(self, now_s: float) -> bool:
+        """By the newest heartbeat, until the next one is due: Land would take it out of a pilot's hand."""
+        is_news = now_s - self._radio.seen.heartbeat_s < self._radio.witness_gap_s
+        return self._action is Action.LAND and is_news and self._is_in_pilots_mode()
 
     def _note(self, heard: PacketReceived) -> None:
         profile = self._radio.profile

@@ -11,12 +11,12 @@ from app.core.policy import Gains
 from app.vehicles.base import CheckItem, Condition, FlightOptions, FlightRecord, Identity, Sample, ShouldStop
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import addresses, parameters, preflight, records
+from app.vehicles.mavlink import addresses, findings, parameters, preflight, records
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.gains import GainStore, written
 from app.vehicles.mavlink.gauges import StatusReader
-from app.vehicles.mavlink.machine import Plan
+from app.vehicles.mavlink.machine import Plan, Trial
 from app.vehicles.mavlink.opening import limits_of, open_radio
 from app.vehicles.mavlink.orders import RepeatedCommand
 from app.vehicles.mavlink.preflight import Ground
@@ -423,17 +423,16 @@ class MavlinkVehicle:
             self._datum_m, self._flight = self._flight.datum_m, None
         self._state, self._why = flown.trial.state, flown.trial.why
         if self._state is State.QUARANTINE:
-            self._keep_landing()
+            self._keep_landing(flown.trial)
         return flown
 
-    def _keep_landing(self) -> None:
+    def _keep_landing(self, trial: Trial) -> None:
         """A vehicle that could not be landed within its trial is told to land all the same, as long as it is armed and
         no person flies it."""
-        heartbeat = self._radio.seen.heartbeat
-        by_hand = heartbeat is not None and heartbeat.mode in self._radio.profile.manual_modes
+        by_hand = findings.find_taken_over(trial.watch, trial.plan.limits) is not None
         if not by_hand and not self._radio.is_disarmed and self._order is None:
             with suppress(LinkError):
-                self._order = RepeatedCommand(self._radio, Action.LAND)
+                self._order = RepeatedCommand(self._radio, Action.LAND, by_person=False)
                 self._asked = _KEPT_LANDING
 
     def _plan(self, ground: Ground) -> Plan:

@@ -1,12 +1,14 @@
 """A Paparazzi that was carried beyond the radius of its flight plan flies HOME by itself and obeys no Land: what is
 said of it, and what never is."""
 
+from dataclasses import replace
+
 import pytest
 
 from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.simdrone.autopilots.base import Autopilot
+from app.vehicles.simdrone.autopilots.base import Autopilot, OutgoingMessage
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import HOME, NAV, Paparazzi
 from app.vehicles.simdrone.autopilots.registry import Make
 from app.vehicles.simdrone.body import Body
@@ -25,6 +27,43 @@ def old_plan(*, max_distance_m: float = 5.5, tells_mode: bool = False) -> Make:
         return Paparazzi(body, system=system, max_distance_m=max_distance_m, tells_mode=tells_mode)
 
     return make
+
+
+class Flickering(Paparazzi):
+    """Every other one of its heartbeats tells a pilot's mode, as nobody's does who flies it."""
+
+    first = 0
+    _beats = 0
+
+    def tick(self) -> list[OutgoingMessage]:
+        return [self._flickered(letter) for letter in super().tick()]
+
+    def _flickered(self, letter: OutgoingMessage) -> OutgoingMessage:
+        if letter.kind != "HEARTBEAT":
+            return letter
+        self._beats += 1
+        by_hand = self.armed and (self._beats + self.first) % 2
+        return replace(letter, fields={**letter.fields, "base_mode": 80 | 128}) if by_hand else letter
+
+
+class FlickeringOtherwise(Flickering):
+    first = 1
+
+
+@pytest.mark.parametrize("kind", [Flickering, FlickeringOtherwise])
+def test_one_heartbeat_of_a_pilot_keeps_no_quarantined_vehicle_from_being_told_to_land_on(
+    kind: type[Flickering],
+) -> None:
+    """Whichever of the two was the last one before the quarantine."""
+
+    def make(body: Body, system: int) -> Autopilot:
+        return kind(body, system=system, max_distance_m=5.5)
+
+    with LockstepRig(make=make, faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
+        assert "It has not landed within 40 s." in fly(vehicle).reason
+        over_s = rig.now_s()
+        vehicle.attend(20.0)
+        assert lands(rig, over_s) >= 3
 
 
 def fly(vehicle: MavlinkVehicle) -> FlightRecord:

@@ -100,6 +100,29 @@ def test_a_person_who_takes_the_vehicle_over_is_not_disturbed_and_one_heartbeat_
     assert ordered.seconds(5, HEARTBEAT) == [0, 0, 0, 0, 0]
 
 
+def test_a_pilots_mode_in_one_heartbeat_is_not_overruled_before_the_next_one_has_told() -> None:
+    """Land would take the vehicle out of a hand that has just taken it."""
+    ordered = Ordered()
+    by_turns = [ordered.second(each) for each in (HEARTBEAT, flying(mode=STABILIZE)) * 5]
+    assert sum(by_turns[0::2]) >= 4
+    assert sum(by_turns[1::2]) == 0
+
+
+def test_a_pilots_mode_in_the_last_heartbeat_of_all_holds_land_up_for_a_moment_only() -> None:
+    ordered = Ordered()
+    ordered.second(flying(mode=STABILIZE))
+    assert sum(ordered.seconds(5)) >= 3
+
+
+def test_land_that_is_given_without_a_person_waits_for_the_second_heartbeat_of_a_pilot() -> None:
+    ordered = Ordered()
+    ordered.told(flying(mode=STABILIZE))
+    ordered.sent.clear()
+    ordered.order = RepeatedCommand(ordered.radio, Action.LAND, by_person=False)
+    assert not ordered.sent
+    assert sum(ordered.seconds(4, HEARTBEAT)) >= 3
+
+
 def test_a_vehicle_that_flies_again_long_after_it_was_landing_is_somebody_elses() -> None:
     ordered = Ordered()
     ordered.seconds(25, flying(mode=LAND))
