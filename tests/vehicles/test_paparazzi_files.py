@@ -66,8 +66,8 @@ def test_the_trials_radius_and_the_plans_exceptions_act_long_before_its_home_mod
     assert (farthest_m, home_m) == (simulated.MAX_DISTANCE_M, simulated.HOME_HEIGHT_M)
     assert home_m > float(flight_plan.attrib["security_height"])
     limit_m = next(each for each in simulated.BLOCKS if each.name == TAKE_OFF).max_distance_m
-    options = {each.name: each.default for each in MAVLINK.options}
-    assert options["radius_m"] < limit_m == options["plan_radius_m"]
+    options = MAVLINK.check({}, field="options")
+    assert float(options["radius_m"]) < limit_m == options["plan_radius_m"]
     corner_m = limit_m * 2.0**0.5
     assert corner_m < farthest_m / 2.0
     [home] = [each for each in flight_plan.iterfind("waypoints/waypoint") if each.attrib["name"] == "HOME"]

@@ -7,6 +7,7 @@ import pytest
 
 from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone.autopilots.base import Autopilot, OutgoingMessage
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import HOME, NAV, Paparazzi
@@ -71,12 +72,12 @@ def fly(vehicle: MavlinkVehicle) -> FlightRecord:
     return vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
 
 
+def is_land(message: Message) -> bool:
+    return message.get_type() == "SCRIPT_ITEM" and number(message, "seq") == LAND_HERE
+
+
 def lands(rig: LockstepRig, since_s: float) -> int:
-    return sum(
-        message.get_type() == "SCRIPT_ITEM" and getattr(message, "seq", None) == LAND_HERE
-        for at_s, message in rig.heard
-        if at_s > since_s
-    )
+    return sum(at_s > since_s and is_land(message) for at_s, message in rig.heard)
 
 
 def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_have_landed() -> None:
@@ -123,9 +124,7 @@ def test_while_it_does_not_come_down_the_operator_is_told_so_before_the_landing_
     with Watching(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
         rig.vehicle_now = vehicle
         fly(vehicle)
-        [landed_s, *_] = [
-            at_s for at_s, each in rig.heard if each.get_type() == "SCRIPT_ITEM" and each.seq == LAND_HERE
-        ]
+        landed_s = next(at_s for at_s, each in rig.heard if is_land(each))
         warned_s = next(at_s for at_s, trouble in told if ADVICE in trouble)
         assert 4.9 < warned_s - landed_s < 15.0
 

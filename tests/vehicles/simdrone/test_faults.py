@@ -216,7 +216,11 @@ def test_a_pilot_takes_it_over_holds_it_and_hands_it_back(
     ground.listen(8.0)
     before_m = ground.expect("LOCAL_POSITION_NED").z
     for base_mode, custom_mode in (by_hand, automatic):
-        beat = ground.expect("HEARTBEAT", lambda heard, mode=base_mode: heard.base_mode & 127 == mode, within_s=16.0)
+
+        def is_it(heard: Heard, mode: int = base_mode) -> bool:
+            return bool(heard.base_mode & 127 == mode)
+
+        beat = ground.expect("HEARTBEAT", is_it, within_s=16.0)
         assert (beat.custom_mode, beat.base_mode & 128) == (custom_mode, 128)
         ground.listen(2.0)
         assert ground.expect("LOCAL_POSITION_NED").z == pytest.approx(before_m, abs=0.4)
