@@ -6,6 +6,7 @@ Everything is judged as an item; what refuses a flight and what a person is show
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 from app.vehicles.base import CheckItem, Identity
@@ -27,6 +28,7 @@ ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight from h
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
+_GOES_ON_S: Final = 1.0
 _DISARMED: Final = "disarmed"
 _VERSION_ATTEMPTS: Final = 2
 _NAME_ATTEMPTS: Final = 2
@@ -58,7 +60,15 @@ class GroundObservation:
     def ground(self) -> Ground:
         """Raises ValueError when no position came."""
         altitude_m = statistics.median(position.altitude_m for position in self.positions)
-        return Ground(altitude_m, self.positions[-1], self.seen_m)
+        return Ground(altitude_m, self._last, self.seen_m)
+
+    @property
+    def _last(self) -> Position:
+        """The newest that goes on from the one before it: a lone one by another clock is nobody's."""
+        for newer, older in pairwise(reversed(self.positions)):
+            if 0.0 < newer.time_boot_s - older.time_boot_s < _GOES_ON_S:
+                return newer
+        return self.positions[-1]
 
 
 # ---- meeting the vehicle
