@@ -39,7 +39,7 @@ _TWINS: Final = Expected(told=(*_DOUBLED, *_NO_POSITION, _MOVED), ends=AIR, quar
 _UNSEEN: Final = Expected(told=("second source of altitude", "Second source of altitude: "), ends=AIR)
 _ONCE: Final = Expected(told=(_MOVED, "Its clock: "))
 _SHIFTED: Final = Expected(told=(_MOVED, _NOT_LANDED), quarantines=True)
-_PILOT: Final = Expected(told=_BY_HAND, ends=(*AIR, Stage.LAND), aborts=True, quarantines=True)
+_PILOT: Final = Expected(told=_BY_HAND, ends=AIR, aborts=True, quarantines=True)
 
 EXPECTED: Final[Mapping[str, Expected]] = {
     **{f"{name} {value}": _BLIND for name, value in product(("x", "y", "z", "vz"), UNREAL)},

@@ -11,7 +11,7 @@ from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, Mishap, tuned_gains
-from bench.hazards.hostility import HAZARDS, HOSTILITIES, MISFORTUNES, Hostility, Speaker
+from bench.hazards.hostility import HAZARDS, HOSTILITIES, MISFORTUNES, PILOTS, Hostility, Speaker
 from bench.hazards.rig import Rig, Struck
 from bench.hazards.stages import Stage
 from bench.hazards.truth import Moment, Said, Truth, judge
@@ -70,6 +70,8 @@ class HostileRig(Rig):
         self.acting: list[tuple[Hostility, float]] = []
         self.moments: list[Moment] = []
         self._arrived_s = 0.0
+        self._pilot_told_s: list[float] = []
+        self._overruled_s = FOR_GOOD_S
         self._ticks = 0
         super().__init__(case)
         self._speaker = Speaker(case.autopilot, DIALECTS[case.autopilot], self.drone, random.Random(case.seed))
@@ -80,7 +82,20 @@ class HostileRig(Rig):
             if now_s < until_s:
                 frames = hostility.arrive(frames, now_s)
         self._arrived_s = now_s if frames else self._arrived_s
+        self._watch_pilot(frames, now_s)
         return frames
+
+    def _watch_pilot(self, frames: list[bytes], now_s: float) -> None:
+        """When heartbeats tell of a pilot after the take-off, and when it is taken from one who was told of."""
+        flown = any(each.kind in PILOTS and each.begun_s < now_s < each.ended_s for each in self.struck)
+        if not flown or self.stages.first_s(Stage.TAKEOFF) is None:
+            return
+        if self.drone.autopilot.is_by_hand:
+            read = (self._speaker.read(frame) for frame in frames)
+            beats = any(message is not None and message.get_type() == "HEARTBEAT" for message in read)
+            self._pilot_told_s += [now_s] if beats else []
+        elif self._pilot_told_s:
+            self._overruled_s = min(self._overruled_s, now_s)
 
     def tick(self) -> None:
         super().tick()
@@ -101,6 +116,8 @@ class HostileRig(Rig):
             sent=self.sent,
             stops=self.stops,
             moments=self.moments,
+            pilot_told_s=self._pilot_told_s,
+            overruled_s=self._overruled_s,
             armed=self.drone.autopilot.armed,
             holds_safe=self.holds(self.case.safe),
         )

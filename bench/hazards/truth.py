@@ -24,8 +24,8 @@ HOVERS_M: Final = 2.0
 SINKS_M_S: Final = -0.2
 LAND_WITHIN_S: Final = 8.0
 """A vehicle that does not sink is told to land as often: every six seconds under Paparazzi."""
-SEEN_S: Final = 2.5
-"""A pilot who has flown it for so long is seen by two heartbeats, wherever they fall."""
+SEEN_S: Final = 2.3
+"""Two heartbeats that agree lie no further apart, where they come once a second."""
 QUIET: Final = frozenset({Order.HEARTBEAT, Order.ASK})
 """What changes nothing on a vehicle."""
 
@@ -70,6 +70,10 @@ class Truth:
     moments: Sequence[Moment]
     armed: bool
     holds_safe: bool
+    pilot_told_s: Sequence[float] = ()
+    """When heartbeats told of a pilot, from the take-off on."""
+    overruled_s: float = FOR_GOOD_S
+    """When the vehicle was taken from that pilot by an order."""
 
     @property
     def hazard(self) -> Struck | None:
@@ -89,10 +93,16 @@ class Truth:
     def flies(self) -> bool:
         return bool(self.moments) and self.moments[-1].flies
 
+    @property
+    def may_be_in_hand(self) -> bool:
+        """Whether two heartbeats have told that a pilot flies it: then it is theirs, also when they switch back."""
+        return len(self.pilot_told_s) > 1 and self.overruled_s == FOR_GOOD_S
+
     def in_hand_since_s(self) -> float:
-        """From when on nobody can overlook that a pilot flies it, or has."""
-        flown = [each for each in self.struck if each.kind in PILOTS and each.ended_s - each.begun_s >= SEEN_S]
-        return min((each.begun_s + SEEN_S for each in flown), default=FOR_GOOD_S)
+        """From when on nobody can overlook them."""
+        seen_s = min(self.pilot_told_s, default=FOR_GOOD_S) + SEEN_S
+        flown = any(each.kind in PILOTS and each.ended_s > seen_s for each in self.struck)
+        return seen_s if flown and self.overruled_s > seen_s else FOR_GOOD_S
 
 
 def judge(truth: Truth, said: Said) -> tuple[str, ...]:
@@ -104,7 +114,7 @@ def _vehicle(truth: Truth, said: Said) -> Iterator[str]:
     stops = [stop.height_m for stop in truth.stops if stop.height_m > LIFTED_M]
     if stops:
         yield f"its motors were told to stop at {max(stops):.2f} m"
-    if truth.flies and truth.in_hand_since_s() == FOR_GOOD_S:
+    if truth.flies and not truth.may_be_in_hand:
         yield f"it was left at {truth.moments[-1].height_m:.2f} m"
     if (highest_m := max((each.height_m for each in truth.moments), default=0.0)) > CEILING_M:
         yield f"it rose to {highest_m:.2f} m"
@@ -129,17 +139,19 @@ def _orders(truth: Truth) -> Iterator[str]:
             yield f"{order} was sent while a pilot flew it"
         elif flies and at_s > over_s and order not in {*QUIET, Order.LAND}:
             yield f"{order} was sent to it in the air after its trial"
-    longest_s = max(_waits(truth, in_hand_s), default=0.0)
+    if truth.overruled_s < FOR_GOOD_S and np.interp(truth.overruled_s, heights[:, 0], heights[:, 1]) > LIFTED_M:
+        yield "it was taken from a pilot whom a heartbeat had told of"
+    longest_s = 0.0 if truth.may_be_in_hand else max(_waits(truth), default=0.0)
     if longest_s > LAND_WITHIN_S:
         yield f"it was left in the air for {longest_s:.0f} s without Land"
 
 
-def _waits(truth: Truth, in_hand_s: float) -> Iterator[float]:
+def _waits(truth: Truth) -> Iterator[float]:
     """How long it stayed up after its trial, armed, heard and in nobody's hands, since it was last told to land."""
     lands = [at_s for at_s, order in truth.sent if order is Order.LAND]
     since_s: float | None = None
     for now in truth.after:
-        if not (now.armed and now.flies and now.heard and now.climb_rate_m_s > SINKS_M_S) or now.time_s > in_hand_s:
+        if not (now.armed and now.flies and now.heard and now.climb_rate_m_s > SINKS_M_S):
             since_s = None
             continue
         since_s = now.time_s if since_s is None else since_s

@@ -1,6 +1,6 @@
 """What was seen on real links, flown again; and the judge of trials over hostile links is judged."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -105,7 +105,7 @@ def happened(moments: Sequence[Moment] = DOWN, kind: str = "disarmed once", **mo
 
 def test_a_trial_that_is_told_as_it_was_is_right() -> None:
     assert judge(happened(), SAFE_AND_SOUND) == ()
-    assert judge(happened(UP, "pilot"), QUARANTINED) == ()
+    assert judge(happened(UP, "pilot", pilot_told_s=[16.5, 17.0]), QUARANTINED) == ()
     assert judge(happened(kind="deaf"), Said("invalid", "quarantined", "It did not confirm.", "Look at it.")) == ()
 
 
@@ -128,9 +128,20 @@ def test_nothing_but_land_is_sent_to_one_in_the_air_after_its_trial(order: Order
 
 
 def test_nothing_is_sent_to_one_that_a_pilot_flies() -> None:
-    assert judge(happened(UP, "pilot", sent=[(17.0, Order.LAND)]), QUARANTINED) == ()
-    assert judge(happened(UP, "pilot", sent=[(19.0, Order.LAND)]), QUARANTINED) == (
+    told: Mapping[str, Any] = {"pilot_told_s": [16.5, 17.0]}
+    assert judge(happened(UP, "pilot", sent=[(17.0, Order.LAND)], **told), QUARANTINED) == ()
+    assert judge(happened(UP, "pilot", sent=[(19.0, Order.LAND)], **told), QUARANTINED) == (
         "land was sent while a pilot flew it",
+    )
+    assert judge(happened(DOWN, "pilot", overruled_s=17.0, **told), QUARANTINED) == (
+        "it was taken from a pilot whom a heartbeat had told of",
+    )
+
+
+def test_one_heartbeat_of_a_pilot_is_no_reason_to_leave_it_in_the_air() -> None:
+    assert judge(happened(UP, "pilot for 1 s", pilot_told_s=[16.5]), QUARANTINED) == (
+        "it was left at 3.00 m",
+        "it was left in the air for 19 s without Land",
     )
 
 

@@ -47,6 +47,11 @@ class Autopilot(Protocol):
     @property
     def armed(self) -> bool: ...
 
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether a pilot flies it, and nobody has switched it out of that since."""
+        ...
+
     def held(self, parameter: str) -> float:
         """What a parameter is now, whatever was said of it on the wire. Raises KeyError for an unknown name."""
         ...

@@ -172,6 +172,10 @@ class Copter(ABC):
                 if self.armed:
                     self.take_off(float("nan"))
 
+    @property
+    def is_by_hand(self) -> bool:
+        return self.mode.name == self.firmware.by_hand
+
     def take_over(self) -> None:
         self.enter(self.find_mode(self.firmware.by_hand))
 

@@ -164,6 +164,10 @@ class Paparazzi:
 
     # ------------------------------------------------------------ flying
 
+    @property
+    def is_by_hand(self) -> bool:
+        return self.mode == BY_HAND
+
     def take_over(self) -> None:
         self._set_mode(BY_HAND)
         self._held_m = self.height_m
