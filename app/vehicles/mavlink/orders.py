@@ -40,7 +40,7 @@ class RepeatedCommand:
     def trouble(self) -> str:
         """That it does not land, though it is told to; empty where there is nothing to say."""
         waits = self._action is Action.LAND and self._radio.clock.now_s() - self._asked_s > UNHEEDED_S
-        return UNHEEDED if waits and not self._is_over and self._landing_since_s is None else ""
+        return UNHEEDED if waits and not self.is_over and self._landing_since_s is None else ""
 
     def proceed(self, heard: list[PacketReceived]) -> None:
         """Take in what came, and send it again when it is due."""
