@@ -31,7 +31,13 @@ _NO_POSITION: Final = ("stood still", "position was lost", "Position: ", "Its cl
 _DOUBLED: Final = ("Two vehicles speak", "Its system id: ")
 _MOVED: Final = "Standing still: "
 _NO_GAINS: Final = ("did not confirm", "could not be verified", "it holds", "failsafe", "Motors off: ")
-_BY_HAND: Final = ("took the vehicle over by hand", "went into mode", "would not arm", "did not lift off")
+_BY_HAND: Final = (
+    "took the vehicle over by hand",
+    "may have flown",
+    "went into mode",
+    "would not arm",
+    "did not lift off",
+)
 
 _BLIND: Final = Expected(told=(*_NO_POSITION, _NOT_LANDED), ends=AIR, quarantines=True)
 _UNVERIFIED: Final = Expected(told=_NO_GAINS, quarantines=True)

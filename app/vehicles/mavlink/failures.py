@@ -32,6 +32,7 @@ class Failure(StrEnum):
     SLOW_CLOCK = "F9e"
     TAKEN_OVER = "F10a"
     UNEXPECTED = "F10b"
+    INTERRUPTED = "F10c"
     OWN_LANDING = "F11"
     DOUBLED = "F12"
     FALL = "F13"
@@ -122,6 +123,12 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "land",
             "quarantine",
             "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.",
+        ),
+        Failure.INTERRUPTED: Response(
+            "one heartbeat in a mode in which a person flies it, and the next in another",
+            "note",
+            "invalid",
+            "A person may have flown the vehicle for a moment.",
         ),
         Failure.OWN_LANDING: Response(
             "a landing that was not asked for: its own failsafe, or an exception of its flight plan",

@@ -19,6 +19,8 @@ _OWN_CEILING_M: Final = 0.5
 _LOW_BATTERY_S: Final = 1.0
 _NO_BATTERY_S: Final = 10.0
 _IMPACT_BELOW_M: Final = 0.5
+_CLIMBED_WITHIN_M: Final = 1.0
+"""PX4 hovers from 0.8 m below its set point on (NAV_MC_ALT_RAD)."""
 
 
 def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
@@ -56,6 +58,15 @@ def find_unexpected(
     elif blocks and watch.block and watch.block not in blocks:
         why = f"Its flight plan went to the block “{watch.block}”."
     return Finding(failure=Failure.UNEXPECTED, why=why) if why else None
+
+
+def find_interrupted_climb(watch: TrialObservation, limits: Limits) -> Finding | None:
+    """A vehicle that hovers before it was ever near its set point: its own failsafe, or a person, has stopped it."""
+    mode = mode_of(watch, limits)
+    if mode not in limits.hovering_modes or watch.highest_m >= limits.set_point_m - _CLIMBED_WITHIN_M:
+        return None
+    why = f"The vehicle went into mode {_named(mode, limits)} before it had climbed."
+    return Finding(failure=Failure.UNEXPECTED, why=why)
 
 
 def _named(mode: str, limits: Limits) -> str:

@@ -20,10 +20,11 @@ DESCENDING_M_S: Final = -0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it;
-    modes are as `Heartbeat` names them, empty where any will do, `mode_names` what people call them, `manual_modes`
-    those in which a person flies; heartbeats come every `heartbeat_s`. `blocks` are a flight plan's by number,
-    `arming_blocks` and so on the names of those that the vehicle may be in, empty where it has none."""
+    """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it. Modes
+    are as `Heartbeat` names them: `flying_modes` and `landing_modes` are empty where any will do, `hovering_modes`
+    follow upon the climb, in `manual_modes` a person flies, `mode_names` is what people call them. Heartbeats come
+    every `heartbeat_s`. `blocks` are a flight plan's by number, `arming_blocks` and so on the names of those that the
+    vehicle may be in, empty where it has none."""
 
     set_point_m: float
     heartbeat_s: float
@@ -39,6 +40,7 @@ class Limits:
     crossing_m: float = 0.3
     crossings: int = 4
     flying_modes: frozenset[str] = frozenset()
+    hovering_modes: frozenset[str] = frozenset()
     landing_modes: frozenset[str] = frozenset()
     manual_modes: frozenset[str] = frozenset()
     mode_names: Mapping[str, str] = field(default_factory=dict)

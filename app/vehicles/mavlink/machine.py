@@ -58,6 +58,8 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
+_IN_TURN: Final = 0.8
+"""Heartbeats nearer than so many periods are not of one vehicle."""
 _IN_PLACE_M: Final = 0.3
 _SHIFT_M: Final = 0.3
 """By how much any altitude may shift on the ground as the motors start."""
@@ -91,7 +93,7 @@ def advance(trial: Trial, event: Event) -> Step:
 
 def _hear(trial: Trial, event: PacketReceived) -> Step:
     watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
-    trial = replace(trial, watch=watch)
+    trial = replace(_with_interruption(trial, watch), watch=watch)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
         return trial, ()
     if trial.state is State.ARM:
@@ -99,6 +101,19 @@ def _hear(trial: Trial, event: PacketReceived) -> Step:
     to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
+
+
+def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
+    """A pilot's mode that only one heartbeat told of is noted, unless that came between two of the vehicle's own."""
+    limits, before = trial.plan.limits, trial.watch
+    is_recording = trial.state in _STATES_WITH_TRIAL_GAINS and bool(_modes(trial))
+    was_by_hand = before.armed and before.mode in limits.manual_modes
+    in_turn_s = _IN_TURN * limits.heartbeat_s
+    is_in_turn = min(before.heartbeat_gap_s, watch.heartbeat_gap_s) >= in_turn_s
+    if not (is_recording and was_by_hand and is_in_turn) or watch.mode in limits.manual_modes:
+        return trial
+    why = f"One heartbeat told of the mode {limits.mode_names.get(before.mode, before.mode)}."
+    return note(trial, Finding(failure=Failure.INTERRUPTED, why=why))
 
 
 def _with_fall(trial: Trial) -> Trial:
@@ -129,9 +144,11 @@ def _arm(trial: Trial, event: Event) -> Step:
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    trial = _with_ground(replace(trial, watch=replace(trial.watch, block="", behind_m=0.0)), now_s)
-    if finding := _left_ground(trial):
+    watch = replace(trial.watch, block="", behind_m=0.0, highest_m=last.altitude_m)
+    trial = _with_ground(replace(trial, watch=watch), now_s)
+    if finding := _left_ground(trial) or _disagreement(trial, now_s):
         return fail(trial, finding, now_s)
+    trial = replace(trial, watch=replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S))
     trial = replace(trial, commanded_s=now_s, commanded_boot_s=last.time_boot_s)
     return enter(trial, State.TAKEOFF, now_s), (PerformAction(Action.TAKE_OFF),)
 
@@ -173,6 +190,19 @@ def _left_ground(trial: Trial) -> Finding | None:
     return Finding(failure=Failure.LOST_POSITION, why=why)
 
 
+def _disagreement(trial: Trial, now_s: float) -> Finding | None:
+    """Between the vehicle's altitude on the ground and that of the second source, which was last seen before any
+    shift."""
+    seen_m, last = agreement.current_altitude_m(trial.watch.second, now_s), trial.watch.last
+    if seen_m is None or last is None:
+        return None
+    apart_m = abs(seen_m + trial.ground_shift_m - last.altitude_m)
+    if apart_m <= agreement.MAX_DIFFERENCE_M:
+        return None
+    why = f"They were {apart_m:.2f} m apart before the take-off command."
+    return Finding(failure=Failure.DISAGREEMENT, why=why)
+
+
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
     why = ""
     if isinstance(event, ActionRefused):
@@ -208,7 +238,7 @@ def _record(trial: Trial, event: Event) -> Step:
     trial = _resting(trial, now_s)
     if _has_rested(trial, DOWN_S, now_s):
         return fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
-    if not _is_whole(trial):
+    if not _is_whole(trial) or _may_be_by_hand(trial, now_s):
         return _overtime(trial, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
@@ -253,7 +283,15 @@ def _landing(trial: Trial, event: Event) -> Step:
 
 
 def _is_land_due(trial: Trial, now_s: float) -> bool:
-    return now_s - trial.repeated_s >= land_every_s(now_s - trial.since_s, trial.plan.land_again_s)
+    every_s = land_every_s(now_s - trial.since_s, trial.plan.land_again_s)
+    return now_s - trial.repeated_s >= every_s and not _may_be_by_hand(trial, now_s)
+
+
+def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
+    """By the newest heartbeat, until the next one is due: Land would take it out of a pilot's hand."""
+    watch, limits = trial.watch, trial.plan.limits
+    is_pilots = bool(_modes(trial)) and watch.armed and watch.mode in limits.manual_modes
+    return is_pilots and now_s - watch.heartbeat_s < limits.confirmation_s
 
 
 def _doubting(trial: Trial) -> Trial:
@@ -299,7 +337,8 @@ def _link_lost(trial: Trial, event: Event) -> Step:
     trial = _doubting(trial)
     if finding := _taken_over(trial):
         return fail(trial, finding, now_s)
-    if isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat):
+    is_heard = isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat)
+    if is_heard and not _may_be_by_hand(trial, now_s):
         return land(trial, State.ABORT_LAND, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
         return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
@@ -378,6 +417,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     return (
         _taken_over(trial)
         or findings.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
+        or findings.find_interrupted_climb(watch, plan.limits)
         or findings.find_doubled(watch)
         or findings.find_link(watch, plan.limits, now_s)
         or findings.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)

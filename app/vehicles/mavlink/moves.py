@@ -174,7 +174,7 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:
-    parts = (trial.why, *(part for part in (trial.doubt, why) if part not in trial.why))
+    parts = (trial.why, *(part for part in dict.fromkeys((trial.doubt, why)) if part not in trial.why))
     return replace(enter(trial, State.QUARANTINE, now_s), why=joined(*parts)), ()
 
 

@@ -78,6 +78,7 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
         min_battery_v=float(options["min_battery_v"]),
         radius_m=float(options["radius_m"]),
         flying_modes=profile.flying_modes,
+        hovering_modes=profile.hovering_modes,
         landing_modes=profile.landing_modes,
         manual_modes=profile.manual_modes,
         mode_names={**profile.mode_names, **_described(profile)},

@@ -72,6 +72,8 @@ class TrialObservation:
     advanced_s: float
     accepted_s: float
     battery_s: float
+    heartbeat_gap_s: float = 0.0
+    """Between the last two heartbeats."""
     battery_v: float | None = None
     low_since_s: float | None = None
     stuck_s: float = 0.0
@@ -93,6 +95,8 @@ class TrialObservation:
     landed: bool | None = None
     landed_s: float = 0.0
     grounded_since_s: float | None = None
+    highest_m: float = float("-inf")
+    """Of its altitudes since the command."""
     lifted: bool = False
     """Whether it was ever above the ground."""
     behind_m: float = 0.0
@@ -255,6 +259,7 @@ def _hear_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float)
     return replace(
         watch,
         heartbeat_s=now_s,
+        heartbeat_gap_s=now_s - watch.heartbeat_s,
         armed=heartbeat.armed,
         armed_since_s=watch.armed_since_s if heartbeat.armed == watch.armed else now_s,
         mode=heartbeat.mode,
@@ -328,6 +333,7 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
     return replace(
         watch,
         behind_m=_behind_m(watch, position),
+        highest_m=max(watch.highest_m, position.altitude_m),
         accepted_s=now_s,
         last=position,
         origin=watch.origin or position,

@@ -6,7 +6,13 @@ import pytest
 
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.measurements import BlockEntered
-from app.vehicles.mavlink.signals import AbortRequested, Action, MotorsOffRequested, SecondaryAltitudeReceived
+from app.vehicles.mavlink.signals import (
+    AbortRequested,
+    Action,
+    ActionDone,
+    MotorsOffRequested,
+    SecondaryAltitudeReceived,
+)
 from app.vehicles.mavlink.states import State
 from tests.vehicles.mavlink.test_machine import STAGES
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
@@ -171,3 +177,99 @@ def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle
     assert [kept.second_m for kept in walk.kept][-1] == pytest.approx(3.1 + GROUND_M - 0.1, abs=0.05)
     assert walk.kept[0].second_m is None
     assert walk.gains_sent != list(SAFE_GAINS)
+
+
+def heartbeat_of_a_pilot(walk: TrialDriver) -> TrialDriver:
+    """Until one heartbeat has told of a pilot's mode; the next one is not due yet."""
+    walk.mode = "64"
+    while walk.trial.watch.mode != "64":
+        walk.pass_s(STEP_S)
+    return walk
+
+
+@pytest.mark.parametrize("state", [State.LAND, State.ABORT_LAND, State.LINK_LOST])
+def test_land_is_not_repeated_while_the_newest_heartbeat_tells_of_a_pilot(state: State) -> None:
+    """Seen: every second Land took the vehicle out of his hand before a second heartbeat could tell of him."""
+    walk = STAGES[state]()
+    walk.climb_rate_m_s = 0.0
+    walk.mute = False
+    heartbeat_of_a_pilot(walk)
+    told = len(walk.when(Action.LAND))
+    while not walk.trial.is_over:
+        walk.pass_s(STEP_S)
+    assert len(walk.when(Action.LAND)) == told
+    assert walk.state is State.QUARANTINE
+    assert walk.trial.why.count("The vehicle went into mode 64.") == 1
+
+
+def test_a_record_is_not_ended_while_the_newest_heartbeat_tells_of_a_pilot() -> None:
+    walk = TrialDriver().lift_off()
+    while walk.boot_s < (walk.trial.commanded_boot_s or 0.0) + PLAN.record_s - 0.2:
+        walk.pass_s(STEP_S)
+    walk.mode = "64"
+    walk.pass_s(2.0)
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
+    assert Action.LAND not in walk.actions
+
+
+def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> None:
+    """Seen: a pilot stopped the climb at half a metre for a second, and the flight counted."""
+    walk = heartbeat_of_a_pilot(TrialDriver().lift_off().pass_s(0.5))
+    walk.mode = "4"
+    walk.pass_s(1.0)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
+    assert walk.trial.why == "One heartbeat told of the mode 64."
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    walk.touch_down().disarm().restore()
+    assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
+
+
+def test_the_mode_from_before_the_command_and_one_heartbeat_after_it_are_no_pilot() -> None:
+    """Seen: a PX4, which arms in a mode of a pilot, was left alone after one heartbeat."""
+    walk = TrialDriver(mode="64").arm()
+    walk.climb_rate_m_s = 1.0
+    walk.mode = "64"
+    walk.pass_s(1.3)
+    assert walk.state is State.RECORD
+    walk.pass_s(1.3)
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
+
+
+def test_a_vehicle_whose_second_source_is_off_before_the_command_is_not_told_to_climb() -> None:
+    walk = TrialDriver()
+    walk.give(ActionDone(Action.ARM, walk.now_s))
+    walk.armed = True
+    while walk.state is State.ARM:
+        watched(walk, STEP_S, off_m=1.0 if walk.trial.armed_s is not None else 0.0)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.DISAGREEMENT)
+    assert walk.trial.why == "They were 1.00 m apart before the take-off command."
+
+
+PX4 = replace(
+    PLAN,
+    limits=replace(LIMITS, flying_modes=frozenset({"take-off", "hold"}), hovering_modes=frozenset({"hold"})),
+)
+
+
+def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -> None:
+    """Seen: a pilot let go of a PX4 at 0.3 m; there it hovered through its whole record, and the flight counted."""
+    walk = TrialDriver(plan=PX4, mode="take-off").arm()
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(1.0)
+    walk.climb_rate_m_s, walk.mode = 0.0, "hold"
+    walk.pass_s(2.1)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
+    assert walk.trial.why == "The vehicle went into mode hold before it had climbed."
+
+
+def test_a_vehicle_that_hovers_near_its_set_point_has_climbed_however_it_swings() -> None:
+    walk = TrialDriver(plan=PX4, mode="take-off").arm()
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(2.2)
+    walk.mode = "hold"
+    walk.climb_rate_m_s = -0.8
+    walk.pass_s(1.5)
+    walk.climb_rate_m_s = 0.0
+    walk.pass_s(1.5)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)

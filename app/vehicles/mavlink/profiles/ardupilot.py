@@ -39,6 +39,7 @@ class ArduPilot:
     land_again_s: Final = 1.0
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({str(GUIDED)})
+    hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({str(LAND)})
     mode_names: Final = MappingProxyType(
         {

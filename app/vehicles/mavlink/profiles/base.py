@@ -201,6 +201,11 @@ class Profile(Protocol):
     @property
     def flying_modes(self) -> frozenset[str]: ...
     @property
+    def hovering_modes(self) -> frozenset[str]:
+        """Those of the flying modes that it goes into once it has climbed; none where one mode serves for both."""
+        ...
+
+    @property
     def landing_modes(self) -> frozenset[str]: ...
     @property
     def manual_modes(self) -> frozenset[str]:

@@ -42,6 +42,7 @@ class Paparazzi:
     land_again_s: Final = 6.0
     climbs_from_ground: Final = False
     flying_modes: Final = frozenset({_NAV})
+    hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({_NAV})
     mode_names: Final = MappingProxyType(
         {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "By hand", "80": "By hand"}

@@ -37,6 +37,7 @@ class Px4:
     land_again_s: Final = 1.0
     climbs_from_ground: Final = True
     flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
+    hovering_modes: Final = frozenset({f"{_AUTO}.{_LOITER}"})
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
     mode_names: Final = MappingProxyType(
         {
