@@ -30,7 +30,7 @@ _NOT_LANDED: Final = "It has not landed within 40 s"
 _NO_POSITION: Final = ("stood still", "position was lost", "Position: ", "Its clock: ")
 _DOUBLED: Final = ("Two vehicles speak", "Its system id: ")
 _MOVED: Final = "Standing still: "
-_NO_GAINS: Final = ("did not confirm", "could not be verified", "it holds", "failsafe", "Motors off: ")
+_NO_GAINS: Final = ("did not confirm", "could not be verified", "it holds", "failsafe", "Motors off: ", "Gains: ")
 _BY_HAND: Final = (
     "took the vehicle over by hand",
     "may have flown",

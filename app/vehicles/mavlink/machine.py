@@ -148,8 +148,8 @@ def _arm(trial: Trial, event: Event) -> Step:
     trial = _with_ground(replace(trial, watch=watch), now_s)
     if finding := _left_ground(trial) or _disagreement(trial, now_s):
         return fail(trial, finding, now_s)
-    trial = replace(trial, watch=replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S))
-    trial = replace(trial, commanded_s=now_s, commanded_boot_s=last.time_boot_s)
+    mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
+    trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=last.time_boot_s, commanded_in=mode)
     return enter(trial, State.TAKEOFF, now_s), (PerformAction(Action.TAKE_OFF),)
 
 
@@ -356,7 +356,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     if airborne and not trial.stopped:
         why = "It was found in the air while its motors were to be stopped."
-        return abort(note(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why)), now_s)
+        return abort(replace(trial, doubt=trial.doubt or why), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
         return quarantine(trial, _why_not_stopped(trial, now_s), now_s)
     may_stop = trial.stopped or watching.may_stop_motors(trial.watch, now_s)
@@ -447,9 +447,11 @@ def _changed(trial: Trial) -> Finding | None:
 
 
 def _modes(trial: Trial) -> frozenset[str]:
-    """The modes that the vehicle may be in; any (empty) until a heartbeat that has certainly seen the command."""
-    limits = trial.plan.limits
-    if trial.commanded_s is None or trial.watch.heartbeat_s - trial.commanded_s < _MODE_KNOWN_S:
+    """The modes that the vehicle may be in; any (empty) until a heartbeat that has certainly seen the command, and for
+    one that has not followed it: it stands in its mode from before."""
+    limits, watch = trial.plan.limits, trial.watch
+    has_stayed = not watch.lifted and watch.mode == trial.commanded_in
+    if trial.commanded_s is None or watch.heartbeat_s - trial.commanded_s < _MODE_KNOWN_S or has_stayed:
         return frozenset()
     return limits.flying_modes | limits.landing_modes
 

@@ -47,7 +47,8 @@ class Plan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command;
+    """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command,
+    `commanded_in` the mode that it was in then;
     `failure` is the first that happened; `stopped`: a person has asked for its motors to be stopped, `answered`: it
     has answered an order to stop them. `ground_samples`: its positions between arming and the command;
     `ground_shift_m`: by how much its altitude on the ground grew meanwhile. `doubt`: why it is quarantined in the end,
@@ -63,6 +64,7 @@ class Trial:
     armed_s: float | None = None
     commanded_s: float | None = None
     commanded_boot_s: float | None = None
+    commanded_in: str = ""
     ground_samples: tuple[Position, ...] = ()
     ground_shift_m: float = 0.0
     unsent: tuple[Setting, ...] = ()

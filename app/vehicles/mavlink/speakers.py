@@ -28,8 +28,10 @@ _OF_A_ROUND: Final = 0.9
 
 @dataclass(slots=True)
 class _Used:
+    """When a number was used, and how many numbers had passed by then."""
+
     at_s: float
-    count: int
+    passed: int
     frame: bytes
 
 
@@ -39,8 +41,8 @@ class DuplicateDetector:
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
         self._rate = _Rate()
-        self._count = 0
-        self._latest = -1
+        self._passed = 0
+        self._latest: int | None = None
         self._clocks: dict[int, tuple[float, float]] = {}
         self._clock = 0
         self._doubled_numbers: deque[float] = deque(maxlen=PIECES)
@@ -67,19 +69,19 @@ class DuplicateDetector:
 
     def _hear_number(self, frame: bytes, number: int, now_s: float) -> bool:
         """Whether the packet came in its turn: not once more, nor later than others that were sent after it."""
-        self._count += 1
         used = self._used.get(number)
         is_taken = used is not None and self._is_of_this_round(used, now_s)
         if used is not None and is_taken and used.frame == frame:
             return False
-        ahead = (number - self._latest) % NUMBERS
+        ahead = 0 if self._latest is None else (number - self._latest) % NUMBERS
         if ahead < NUMBERS // 2:
             self._latest = number
+            self._passed += ahead
             self._rate.pass_on(ahead, now_s)
         behind = NUMBERS - ahead
         is_late = behind <= _LATE and not is_taken
         late = behind if is_late else 0
-        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late, frame)
+        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._passed - late, frame)
         if is_taken:
             self._doubled_numbers.append(now_s)
         return not is_late
@@ -87,7 +89,7 @@ class DuplicateDetector:
     def _is_of_this_round(self, used: _Used, now_s: float) -> bool:
         """Whether the numbers cannot have come round since it was used."""
         round_s = _OF_A_ROUND * NUMBERS / self._rate.number_hz
-        return self._count - used.count < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
+        return self._passed - used.passed < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
 
     def _hear_clock(self, offset_s: float, now_s: float) -> None:
         """Evidence is a return: from another clock to one that was heard a moment ago."""

@@ -236,6 +236,19 @@ def test_the_mode_from_before_the_command_and_one_heartbeat_after_it_are_no_pilo
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
 
 
+def test_a_vehicle_that_stays_on_the_ground_in_its_mode_from_before_did_not_lift_off() -> None:
+    """Seen: one that was deaf to its command, and arms in a mode of a pilot, was taken for flown by hand."""
+    walk = TrialDriver(mode="64", plan=replace(PLAN, lift_off_s=4.0)).arm().pass_s(4.1)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
+
+
+def test_a_pilot_who_takes_a_vehicle_on_the_ground_has_it() -> None:
+    walk = TrialDriver(plan=replace(PLAN, lift_off_s=4.0)).arm()
+    walk.mode = "64"
+    walk.pass_s(2.6)
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
+
+
 def test_a_vehicle_whose_second_source_is_off_before_the_command_is_not_told_to_climb() -> None:
     walk = TrialDriver()
     walk.give(ActionDone(Action.ARM, walk.now_s))
