@@ -1,4 +1,4 @@
-"""The one recommended next action, beside the strategy's proposal."""
+"""The recommended next action, shown beside the strategy's proposal."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _MANUAL_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Advice:
-    """What to do next, with which gains, and why. Kind `baseline` is the first flight, or its gains once more."""
+    """What to do next, with which gains, and why. Kind `baseline` is the first flight, or a repeat with its gains."""
 
     kind: AdviceKind
     gains: dict[str, float]
@@ -31,9 +31,13 @@ def advise(
     proposal: Proposal,
     said: StopVerdict,
 ) -> Advice:
-    """Under the rule `noise` the proposal holds the advice already; under the others it is a recommendation only, and a
-    step that flights cannot tell from noise is advised against. Only gains inside the bounds are advised, except to
-    stop with what the flights found best."""
+    """Recommend the next action.
+
+    Under the stop rule `noise` the proposal already contains the recommendation. Under the other rules the advice is
+    only a recommendation: it advises against a step whose effect flights cannot distinguish from noise. Only gains
+    within the bounds are recommended, except when one of the other rules stops the campaign: that advice names the best
+    of all flights.
+    """
     tells_noise = definition.stop.kind == "noise"
     now = (compare_winner if said.stop and not tells_noise else standing_within_bounds)(definition, experiment, flights)
     if said.stop:

@@ -1,7 +1,7 @@
-"""Two sources of one altitude, each by a clock of its own: the time between them, and how far they are apart.
+"""Time alignment of two altitude sources with separate clocks, and the difference between them.
 
-What is correlated is how much each altitude changes within 0.2 s, not the altitude itself: a slow drift between the
-two, or an error of scale, would otherwise pass for a delay.
+The correlation uses the change of each altitude within 0.2 s, not the altitude itself. Otherwise a slow drift between
+the two sources, or a scale error, would look like a delay.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.trajectory import Samples
 
 RANGE_S: Final = 1.0
-"""The longest delay that is looked for, either way."""
+"""Largest delay searched for, in either direction."""
 STEP_S: Final = 0.005
 
 _REACH: Final = 20
-"""Steps on either side of an instant, between which the altitude's change is taken."""
+"""Half width of the interval over which the change of altitude is taken, in steps."""
 _LEAST_MOTION_M: Final = 0.3
 _LEAST_CORRELATION: Final = 0.8
 _SHORTEST_S: Final = 1.0
@@ -26,7 +26,10 @@ _SHORTEST_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alignment:
-    """`delay_s`: how much later the other source shows the same motion. `datum_m`: how much higher it reads at rest."""
+    """Delay and offset of the other source.
+
+    `delay_s` is how much later the other source shows the same motion; `datum_m` is how much higher it reads at rest.
+    """
 
     delay_s: float
     datum_m: float
@@ -34,7 +37,7 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disagreement:
-    """How far two aligned sources are apart: the largest difference, when it was, and the root mean square."""
+    """Difference between two aligned sources: the largest, when it occurred, and the root mean square."""
 
     largest_m: float
     at_s: float
@@ -42,10 +45,10 @@ class Disagreement:
 
 
 def find_delay(time_s: Samples, altitude_m: Samples, other_time_s: Samples, other_m: Samples) -> float:
-    """How much later the other source shows the same motion, s, to a fraction of 5 ms, within ±1 s.
+    """Return the delay of the other source, s, to a fraction of 5 ms, within ±1 s; positive when it lags.
 
-    Times, shapes (n,) and (k,), rise strictly; both clocks must already agree within 1 s. Raises TrajectoryError when
-    the two have too little time in common, moved too little in it, or do not move alike.
+    Times, shapes (n,) and (k,), must increase strictly; the clocks must already agree within 1 s. Raises
+    TrajectoryError when the records overlap too little, contain too little motion, or are not correlated.
     """
     start_s = max(time_s[0], other_time_s[0] + RANGE_S) if len(time_s) and len(other_time_s) else 0.0
     end_s = min(time_s[-1], other_time_s[-1] - RANGE_S) if len(time_s) and len(other_time_s) else 0.0
@@ -69,8 +72,10 @@ def find_delay(time_s: Samples, altitude_m: Samples, other_time_s: Samples, othe
 def align(
     time_s: Samples, altitude_m: Samples, other_time_s: Samples, other_m: Samples, *, rest_until_s: float
 ) -> Alignment:
-    """The delay, and the difference while both rested, before `rest_until_s`. Raises TrajectoryError as `find_delay`
-    does, and when the record has no such time."""
+    """Return the delay, and the offset while both were at rest, before `rest_until_s`.
+
+    Raises TrajectoryError as `find_delay` does, and when the record has no samples before `rest_until_s`.
+    """
     delay_s = find_delay(time_s, altitude_m, other_time_s, other_m)
     apart_m = np.interp(time_s + delay_s, other_time_s, other_m) - altitude_m
     rested = time_s < rest_until_s
@@ -80,13 +85,15 @@ def align(
 
 
 def resample(time_s: Samples, other_time_s: Samples, other_m: Samples, alignment: Alignment) -> Samples:
-    """The other source on the times of the first, in its datum, shape (n,); before it begins and after it ends, its
-    first and last value."""
+    """Resample the other source at the times of the first, with the offset removed: shape (n,).
+
+    Before its first and after its last sample, the nearest value holds.
+    """
     return np.interp(time_s + alignment.delay_s, other_time_s, other_m) - alignment.datum_m
 
 
 def compare(time_s: Samples, altitude_m: Samples, other_m: Samples) -> Disagreement:
-    """Two channels of one record, each of shape (n,), n > 0."""
+    """Compare two channels of one record, each of shape (n,), n > 0."""
     apart_m = np.abs(other_m - altitude_m)
     worst = int(np.argmax(apart_m))
     rms_m = float(np.sqrt(np.mean(apart_m**2)))
@@ -94,13 +101,16 @@ def compare(time_s: Samples, altitude_m: Samples, other_m: Samples) -> Disagreem
 
 
 def _changes(altitude_m: Samples) -> Samples:
-    """Within 0.2 s around each step, shape (n − 40,)."""
+    """Change of altitude within 0.2 s around each step, shape (n − 40,)."""
     return altitude_m[2 * _REACH :] - altitude_m[: -2 * _REACH]
 
 
 def _correlations(first: Samples, wide: Samples) -> Samples:
-    """Pearson's, of `first`, shape (n,), with each stretch of its length in `wide`, shape (n + m,): shape (m + 1,).
-    A stretch without any motion has none: 0."""
+    """Pearson correlation of `first`, shape (n,), with every window of its length in `wide`, shape (n + m,): shape (m +
+    1,).
+
+    0 for a window without motion.
+    """
     stretches = sliding_window_view(wide, len(first))
     centred = first - first.mean()
     spread = np.sqrt((centred**2).sum()) * np.sqrt(len(first)) * stretches.std(axis=1)
@@ -110,7 +120,7 @@ def _correlations(first: Samples, wide: Samples) -> Samples:
 
 
 def _vertex(before: float, top: float, after: float) -> float:
-    """Where the parabola through three values, one step apart, is highest, in steps from the middle one."""
+    """Maximum of the parabola through three values one step apart, in steps from the middle one."""
     curvature = before - 2.0 * top + after
     return 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
 

@@ -1,16 +1,16 @@
-"""The model as the flights have it: least squares on their trajectories, with what was known before as priors.
+"""Calibration of the model: least squares on the trajectories of flights, with prior knowledge of the parameters.
 
-Minimised over the parameters p and what is each flight's own, δ (in standard deviations `flight_sd`):
+The fit minimises, over the parameters p and each flight's own deviations δ (in standard deviations `flight_sd`),
 
     Σ_flights |W·(y − ŷ(gains; p + δ))|² + Σ ((p − expected)/prior_sd)² + Σ δ²,
 
-y and ŷ ten times a second. Deviations of a flight hang together in time (a gust swings for seconds), so W whitens
-them: an autoregression of fourth order, fitted to what the first pass leaves over, takes out what the samples before
-foretold, and the second pass minimises what is new in each. That makes the standard errors honest, and a short event
-that no gust could make, the lift-off above all, counts for more than a long swing.
+with y and ŷ sampled at 10 Hz. The deviations of a flight are correlated in time (a gust acts for seconds), so W whitens
+them: a fourth-order autoregression, fitted to the residuals of the first pass, removes what the previous samples
+predict, and the second pass minimises the innovations. This makes the standard errors realistic, and gives a short
+event that no gust can cause, above all the lift-off, more weight than a long oscillation.
 
-Results are rounded to six digits of their standard errors, so that the last bits of a machine's linear algebra decide
-nothing that follows.
+Results are rounded to six digits of their standard errors, so that differences between machines in the last bits of
+linear algebra do not affect later results.
 """
 
 from collections.abc import Sequence
@@ -27,34 +27,39 @@ from app.core.spread import ParameterDistribution, prior_distribution
 from app.core.trajectory import Samples
 
 EXPERIMENTS: Final = frozenset({"takeoff"})
-"""Those whose model parameters can be told from one flight."""
+"""Experiments whose model parameters can be identified from one flight."""
 MAX_FLIGHTS: Final = 4
-"""The best and the latest of the valid flights are fitted, so many in all: enough, and the time stays bounded."""
+"""Number of flights fitted: the best and the latest valid ones. That is enough, and it bounds the computing time."""
 
 _RATE_HZ: Final = 10.0
 _ORDER: Final = 4
 _FIRST_SCALE: Final = 3.0
 _NOISE_FLOOR: Final = 0.4
-"""Standard deviation of what the first pass takes for noise, and the least that is always assumed: both in units of the
-experiment's scatter."""
+"""Noise standard deviation assumed by the first pass (`_FIRST_SCALE`), and the minimum that is always assumed
+(`_NOISE_FLOOR`): both in units of the experiment's scatter."""
 _DIFFERENCE: Final = 0.1
-"""Steps of the difference quotients, in prior standard deviations: well above the steps of the loop's integers."""
+"""Step of the difference quotients, in prior standard deviations: well above the quantisation of the loop's
+integers."""
 _STARTS: Final = 32
 _WIDEST_OWN: Final = 4.0
 _MAX_STEPS: Final = 20
 _LEAST_GAIN: Final = 0.2
-"""A step that promises to lower half the sum of squares by less ends the search: it goes under a standard deviation."""
+"""The search ends when a step is predicted to reduce half the sum of squares by less than this: such a step moves the
+solution by less than a standard deviation."""
 _DAMPING: Final = 1.0
-"""The first that a failed step brings, in units of the priors."""
+"""Damping after the first failed step, in units of the priors."""
 _MODEL_ERROR_SD: Final = 0.05
-"""What no fit can rule out, in prior standard deviations."""
+"""Model error that no fit can exclude, in prior standard deviations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """The fitted model, shape (m,), its covariance (m, m), and the standard deviation of what is left over (`noise`, in
-    the output's unit). `own_models` are the flights' own, (k, m), in the order of `numbers`; `residual` is what the
-    best flight did beyond its own, on the grid."""
+    """Result of a fit.
+
+    `model` is the fitted parameter vector, shape (m,), with its `covariance` (m, m); `noise` is the standard deviation
+    of the residuals, in the output's unit. `own_models` holds the parameters of each flight, (k, m), in the order of
+    `numbers`; `residual` is the deviation of the best flight from its own model, on the grid.
+    """
 
     experiment: ModelledExperiment
     model: Vector
@@ -65,7 +70,7 @@ class Calibration:
     residual: Samples
 
     def spread(self) -> ParameterDistribution:
-        """What is known of the vehicle now, as a distribution."""
+        """Distribution of the vehicle's parameters after the fit, including the model error."""
         known = np.diag(self.covariance) + (_MODEL_ERROR_SD * _prior_sd(self.experiment)) ** 2
         covariance = self.covariance + np.diag(known - np.diag(self.covariance))
         flights = f"{len(self.numbers)} flight{'s' if len(self.numbers) > 1 else ''}"
@@ -76,9 +81,12 @@ class Calibration:
         )
 
     def plausible(self, *, runs: int, width: float = 1.0, next_flight: bool = False) -> Matrix:
-        """So many models (a power of two), `width` standard deviations about the fitted one in orthogonal directions:
-        shape (runs, m). With fewer runs than parameters + 1 the last parameters stay as fitted. `next_flight`: with
-        what differs between flights."""
+        """Return `runs` models (a power of two), `width` standard deviations from the fitted one in orthogonal
+        directions.
+
+        Shape (runs, m). With fewer runs than parameters + 1, the last parameters keep their fitted values.
+        `next_flight` includes the differences between flights.
+        """
         from scipy.linalg import hadamard
 
         covariance = self.covariance
@@ -96,7 +104,10 @@ class Calibration:
 
 
 def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Calibration:
-    """The model by the best and the latest valid flights, of which there must be one; the others are passed over."""
+    """Fit the model to the best and the latest valid flights, `MAX_FLIGHTS` at most.
+
+    At least one flight must be valid; all others are ignored.
+    """
     valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
     best = min(valid, key=lambda flight: (flight.error, flight.number))
     fitted = [flight for flight in valid[-MAX_FLIGHTS:] if flight is not best][1 - MAX_FLIGHTS :]
@@ -127,8 +138,11 @@ def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Cali
 
 
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
-    """What is known of the vehicle: the data sheet's spread before the first valid flight, the calibrated one after it;
-    always the data sheet's for experiments without a calibration, and nothing for those without a model."""
+    """Distribution of the vehicle's parameters: from the data sheet before the first valid flight, from the calibration
+    afterwards.
+
+    Experiments without a calibration always use the data sheet; for those without a model the distribution is empty.
+    """
     modelled = experiment.modelled
     if modelled is None or modelled.name not in EXPERIMENTS or all(flight.error is None for flight in flights):
         return prior_distribution(experiment)
@@ -156,8 +170,11 @@ def _clipped(experiment: ModelledExperiment, models: Matrix) -> Matrix:
 
 
 class _Fit:
-    """The residuals of k flights and their derivatives, in unknowns of shape (m + k·q,): the parameters, then what is
-    each flight's own of the q that differ between flights."""
+    """Residuals of k flights and their derivatives.
+
+    The unknowns have shape (m + k·q,): the parameters, then each flight's deviations in the q parameters that differ
+    between flights.
+    """
 
     def __init__(self, experiment: ModelledExperiment, flights: Sequence[Flight]) -> None:
         parameters = experiment.model_parameters
@@ -175,14 +192,14 @@ class _Fit:
         self.noise = np.full(2, _FIRST_SCALE * experiment.scatter.sd)
 
     def models(self, unknowns: Vector) -> Matrix:
-        """Each flight's own model: (k, m)."""
+        """Parameters of each flight: (k, m)."""
         models = np.tile(unknowns[: len(self.mean)], (len(self.gains), 1))
         deviations = unknowns[len(self.mean) :].reshape(len(self.gains), len(self.own))
         models[:, self.own] += deviations * self.flight_sd[self.own]
         return np.asarray(np.clip(models, self.lower, self.upper))
 
     def start(self) -> Vector:
-        """The best of a few likely models by the first flight."""
+        """Starting point: the sampled model that fits the first flight best."""
         prior = ParameterDistribution(
             mean=tuple(self.mean.tolist()),
             covariance=tuple(tuple(row) for row in np.diag(self.sd**2).tolist()),
@@ -194,7 +211,8 @@ class _Fit:
         return np.concatenate((likely[np.argmin(cost)], np.zeros(len(self.gains) * len(self.own))))
 
     def minimum(self, start: Vector) -> Vector:
-        """Gauss–Newton within the bounds, damped (Levenberg–Marquardt) where the misses do not fall as foretold."""
+        """Gauss–Newton within the bounds, damped (Levenberg–Marquardt) where the residuals decrease less than
+        predicted."""
         others = len(start) - len(self.mean)
         lower = np.concatenate((self.lower, np.full(others, -_WIDEST_OWN)))
         upper = np.concatenate((self.upper, np.full(others, _WIDEST_OWN)))
@@ -215,14 +233,14 @@ class _Fit:
         return at
 
     def _flown(self, unknowns: Vector) -> tuple[Matrix, Vector]:
-        """The models' outputs, shape (k, s), and the misses: their whitened deviations from the flights, then those of
-        the unknowns from what was known."""
+        """Outputs of the models, shape (k, s), and the residuals: the whitened deviations from the flights, then the
+        deviations of the unknowns from their priors."""
         outputs, m = self.outputs(unknowns), len(self.mean)
         deviations = self._whitened(outputs - self.measured).ravel()
         return outputs, np.concatenate((deviations, (unknowns[:m] - self.mean) / self.sd, unknowns[m:]))
 
     def slopes(self, unknowns: Vector, outputs: Matrix) -> Matrix:
-        """∂misses/∂unknowns where the models fly `outputs`, by one-sided differences, all in one call."""
+        """∂residuals/∂unknowns at the models with these `outputs`, by one-sided differences, all in one call."""
         models = self.models(unknowns)
         k, m = models.shape
         step = np.where(models + _DIFFERENCE * self.sd > self.upper, -_DIFFERENCE, _DIFFERENCE) * self.sd
@@ -239,7 +257,7 @@ class _Fit:
         return slopes
 
     def learn_noise(self, unknowns: Vector) -> None:
-        """Fit the autoregression to what is left over (Yule–Walker), white noise of the assumed floor added."""
+        """Fit the autoregression to the residuals (Yule–Walker), with white noise at the assumed floor added."""
         from scipy.linalg import solve_toeplitz
 
         left = self.outputs(unknowns) - self.measured
@@ -250,14 +268,15 @@ class _Fit:
         self.noise = np.sqrt([lags[0], lags[0] - float(self.memory @ lags[1:])])
 
     def outputs(self, unknowns: Vector) -> Matrix:
-        """What each flight's own model flies, ten times a second: (k, s)."""
+        """Output of each flight's own model, at 10 Hz: (k, s)."""
         return self._outputs(self.gains, self.models(unknowns))
 
     def _outputs(self, gains: Matrix, models: Matrix) -> Matrix:
         return self.experiment.outputs(gains, models)[:, :: self.every]
 
     def _whitened(self, deviations: Samples) -> Samples:
-        """What is new in each sample, in its own standard deviations; the first few are taken as they are."""
+        """Innovation of each sample, in its standard deviations; the first few samples are not predicted from earlier
+        ones."""
         order = len(self.memory)
         new = deviations.copy()
         for lag, share in enumerate(self.memory, start=1):
@@ -270,8 +289,10 @@ class _Fit:
 def _bounded_step(
     slopes: Matrix, misses: Vector, at: Vector, lower: Vector, upper: Vector, damping: Vector
 ) -> tuple[Vector, float]:
-    """Where the linearised misses are smallest within the bounds, each change held back by its `damping`, all of shape
-    (n,); and by how much half their sum of squares is less there."""
+    """Minimise the linearised residuals within the bounds, with each change damped by `damping`; vectors of shape (n,).
+
+    Returns the new point, and the predicted decrease of half the sum of squares.
+    """
     from scipy.optimize import lsq_linear
 
     q, r = np.linalg.qr(np.vstack((slopes, np.diag(damping))))

@@ -1,4 +1,4 @@
-"""Whether a campaign's definition can be used, before it is frozen."""
+"""Validation of a campaign's definition, before it is frozen."""
 
 import math
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ def check_definition(definition: Definition) -> None:
 
 
 def problems_of(definition: Definition) -> tuple[Problem, ...]:
-    """Every reason against the definition, each with its field (`stop.max_flights`, `bounds.kp`, …)."""
+    """All problems of the definition, each with its field (`stop.max_flights`, `bounds.kp`, …)."""
     return (
         *_names(definition),
         *_options(definition),

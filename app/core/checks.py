@@ -1,4 +1,4 @@
-"""One check of a policy before its flight, and its answer."""
+"""One check of a policy before its flight, and its result."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,10 +8,10 @@ from app.core.policy import Gains
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One check: its worst number, in the same measure as the limit it is held against, and the gain that has it.
+    """Result of one check: the worst value, in the same measure as the limit, and the gain that caused it.
 
-    `case` names what was simulated when the worst number came about; `offer` holds the nearest value of each refused
-    gain that would pass, where there is one; in the gate's answer one that passes all checks with such a limit.
+    `case` names the simulated case of the worst value. `offer` holds the nearest value of each refused gain that would
+    pass, if there is one; in the gate's result, a value that passes all checks with such a limit.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """What a model run may do: rise to `ceiling_m` (m), and be aborted at any instant to `safe_gains`."""
+    """Limits of a model run: it may rise to `ceiling_m` (m), and may be aborted to `safe_gains` at any instant."""
 
     ceiling_m: float
     safe_gains: Gains

@@ -1,4 +1,4 @@
-"""Time as whoever waits is given it: of a vehicle, whose simulation may run faster than life, or of this computer."""
+"""Clocks for waiting: vehicle time, which may run faster than real time in simulation, and this computer's time."""
 
 import math
 import time
@@ -8,23 +8,23 @@ from app.core.errors import InputError, Problem
 
 
 class Clock(Protocol):
-    """Seconds that need not be those on the wall: every wait and every time-out is in seconds of one of these."""
+    """A source of time whose seconds need not be wall-clock seconds. All waits and time-outs are in its seconds."""
 
     def now_s(self) -> float:
         """Monotonic seconds from an arbitrary origin."""
         ...
 
     def wait_s(self, seconds: float) -> None:
-        """Return once `seconds` have passed; at once when they are not above 0."""
+        """Return after `seconds`; at once when they are not above 0."""
         ...
 
     def wall_s(self, seconds: float) -> float:
-        """How long `seconds` take on the wall, for waiting on sockets and locks."""
+        """Convert `seconds` to wall-clock seconds, for waiting on sockets and locks."""
         ...
 
 
 class ScaledClock:
-    """Vehicle time that runs `speed` times as fast as the wall clock; 1.0 is a real vehicle's."""
+    """Vehicle time at `speed` times the wall clock; 1.0 for a real vehicle."""
 
     def __init__(self, speed: float = 1.0) -> None:
         """Raises InputError unless `speed` is positive and finite."""
@@ -48,4 +48,4 @@ class ScaledClock:
 
 
 REAL_TIME: Final = ScaledClock()
-"""This computer's own."""
+"""This computer's clock."""

@@ -1,9 +1,10 @@
-"""Is there anything left that flights could tell from noise, and is the winner really better than the first gains?
+"""Decides whether further steps can be distinguished from noise, and whether the winner is better than the first gains.
 
-Two phases. *Steps* are worth flying while the proposal promises more than the flights that are left could tell from
-noise. After that the winner and the baseline (the first flight's gains) are flown again in turn, until the difference
-is decided; the confidence allows for the number of policies among which the winner was found, and for every look. Gains
-outside the campaign's bounds, flown over a refusal, would be refused again and take no part.
+There are two phases. *Steps* are worth flying while the predicted improvement is at least what the remaining flights
+could distinguish from noise. After that, the winner and the baseline (the first flight's gains) are flown again in turn
+until the difference is decided. The confidence allows for the number of policies from which the winner was chosen, and
+for every repeated comparison. Gains outside the campaign's bounds, flown by overruling a refusal, would be refused
+again and are left out.
 """
 
 from collections.abc import Sequence
@@ -32,13 +33,16 @@ SCATTER_NOT_KNOWN: Final = (
 )
 
 _CONFIRMATION_FLIGHTS: Final = 2
-"""Flights kept back for flying the winner and the baseline again."""
+"""Flights reserved for repeating the winner and the baseline."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparisonState:
-    """What the flights say at present; at least one is valid. `baseline` holds the first valid flight, `winner` is the
-    best policy; `comparison` of the two is None while they are the same."""
+    """Comparison of the flights so far; at least one is valid.
+
+    `baseline` is the group of the first valid flight, `winner` the best policy; `comparison` of the two is None while
+    they are the same.
+    """
 
     groups: tuple[Group, ...]
     scatter: PooledScatter
@@ -48,7 +52,7 @@ class ComparisonState:
 
     @property
     def looks(self) -> int:
-        """How often the two have been compared since both were flown again; 0 before."""
+        """Number of comparisons since both policies were repeated; 0 before."""
         if min(self.winner.size, self.baseline.size) < 2:
             return 0
         return self.winner.size + self.baseline.size - 3
@@ -63,8 +67,11 @@ class Confirmation:
 
 
 def compare_winner(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> ComparisonState | None:
-    """Groups, scatter and winner; None before the first valid flight. Under the rule `noise` the comparison allows for
-    its repetition, under the others, which do not decide by it, for the choice among the policies only."""
+    """Groups, scatter and winner of the flights; None before the first valid flight.
+
+    Under the stop rule `noise` the confidence allows for repeated comparisons; under the other rules, which do not
+    decide by it, only for the choice among the policies.
+    """
     groups = groups_of(flights)
     if not groups:
         return None
@@ -87,16 +94,16 @@ def compare_winner(definition: Definition, experiment: Experiment, flights: Sequ
 def standing_within_bounds(
     definition: Definition, experiment: Experiment, flights: Sequence[Flight]
 ) -> ComparisonState | None:
-    """The standing among the gains that may be flown again: those inside the bounds. None while there are none."""
+    """The comparison among gains inside the bounds, which may be flown again. None if there are none."""
     return compare_winner(definition, experiment, _inside(definition, experiment, flights))
 
 
 def confirm(
     definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
 ) -> Confirmation:
-    """The next flight as far as noise is concerned. At least one valid flight must lie inside the bounds.
+    """Choose the next flight under the stop rule `noise`. At least one valid flight must lie inside the bounds.
 
-    A proposal of kind `manual` promises nothing and is the operator's own business until the flights run short.
+    A proposal of kind `manual` predicts no improvement and counts as worth a flight until the flights run short.
     """
     inside = _inside(definition, experiment, flights)
     now = compare_winner(definition, experiment, inside)
@@ -136,7 +143,7 @@ def _next(
 
 
 def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
-    """The winner against the first gains, in a sentence."""
+    """The winner compared with the first gains, in a sentence."""
     if now.comparison is None:
         return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
     unit, said = experiment.error_unit, now.comparison

@@ -1,5 +1,7 @@
-"""Characters that are not seen and change how others are: in a name they can rewrite a terminal's lines, or turn text
-around so that one name looks like another."""
+"""Invisible characters that change how text is displayed.
+
+In a name they can rewrite a terminal's lines, or reverse text so that one name looks like another.
+"""
 
 import unicodedata
 from typing import Final
@@ -10,12 +12,12 @@ _LINE_ENDS: Final = frozenset("\u2028\u2029")
 
 
 def is_control(character: str) -> bool:
-    """Whether it is one of C0, C1 (the escape character among them), DEL, a bidirectional control or a line's end."""
+    """Whether the character is in C0 or C1 (escape included), DEL, a bidirectional control or a line separator."""
     return unicodedata.category(character) == "Cc" or character in _BIDIRECTIONAL or character in _LINE_ENDS
 
 
 def find_control_characters(text: str) -> tuple[str, ...]:
-    """Those that a text holds, as `U+001B`, each once and in the order of their numbers."""
+    """Control characters in a text, as `U+001B`, each once and in code point order."""
     return tuple(f"U+{ord(each):04X}" for each in sorted(set(filter(is_control, text))))
 
 

@@ -1,4 +1,4 @@
-"""The frozen definition of a campaign, as the mathematics needs it."""
+"""The frozen definition of a campaign: the fields that computations need."""
 
 import hashlib
 import json
@@ -15,7 +15,7 @@ OptionValue = bool | int | float | str
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Donor:
-    """The flight of another campaign that a warm start comes from: its best, with the checksum of its record."""
+    """The flight of another campaign that a warm start uses: its best, with the checksum of its record."""
 
     campaign_id: int
     trial_number: int
@@ -24,8 +24,11 @@ class Donor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Where the first flight's gains come from; `gains` only with kinds `given` and `campaign`, `donor` only with
-    `campaign`: the best of another campaign, copied when this one was defined."""
+    """Source of the first flight's gains.
+
+    `gains` is set only with the kinds `given` and `campaign`. `donor` is set only with `campaign`: the gains are then
+    the best of another campaign, copied when this one was defined.
+    """
 
     kind: Literal["default", "simplex", "given", "campaign"] = "default"
     gains: dict[str, float] | None = None
@@ -34,11 +37,15 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopRule:
-    """`paper`: two flights in a row without `improvement` (a fraction of the best) on the best so far, or the budget;
-    `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
-    the baseline; `budget`: only the number of flights ends the campaign.
+    """When a campaign ends.
 
-    With every kind a flight that ends below `min_battery_v` (V) ends the campaign.
+    - `paper`: after two flights in a row that do not improve on the best so far by `improvement` (a fraction of the
+      best), or when the budget is used up.
+    - `noise`: when no further step can be distinguished from noise with `confidence`, and the winner was flown again
+      and compared with the baseline.
+    - `budget`: only the number of flights ends the campaign.
+
+    With every kind, `max_flights` or a flight that ends below `min_battery_v` (V) ends the campaign.
     """
 
     kind: Literal["paper", "noise", "budget"] = "paper"
@@ -50,10 +57,13 @@ class StopRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Definition:
-    """Everything a proposal depends on, beside the flights. `bounds` narrow the experiment's own;
-    `first_step_fraction` and `step_fraction` limit a gain's change as shares of its range, before and after the first
-    valid flight; `ceiling_m` is the highest altitude that the gate lets a model run reach. `safe_gains` are what an
-    abort flies, where the vehicle's are not the experiment's default gains."""
+    """Everything a proposal depends on, besides the flights.
+
+    `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change, as shares of
+    its range, before and after the first valid flight. `ceiling_m` is the highest altitude that the gate lets a model
+    run reach. `safe_gains` are the gains flown after an abort, if the vehicle's differ from the experiment's default
+    gains.
+    """
 
     experiment: str = "takeoff"
     experiment_options: dict[str, OptionValue] = field(default_factory=dict)
@@ -69,7 +79,7 @@ class Definition:
     safe_gains: dict[str, float] | None = None
 
     def digest(self) -> str:
-        """SHA-256 of the canonical JSON, hex; safe gains stand in it only where the vehicle has its own."""
+        """SHA-256 of the canonical JSON, hex; safe gains are included only if the vehicle has its own."""
         fields = asdict(self)
         if self.safe_gains is None:
             del fields["safe_gains"]
@@ -78,7 +88,7 @@ class Definition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """What was expected of a flight before it: its error, and the 90 % interval where there was one."""
+    """Predicted error of a flight, and its 90 % interval if there is one."""
 
     error: float
     lower: float | None = None
@@ -89,9 +99,9 @@ class Prediction:
 class Flight:
     """A finished trial as a strategy sees it: single-precision trajectory, error in the experiment's unit.
 
-    `outcome` is `valid` or `aborted`; invalid and lost flights are not history. An aborted flight has no error; it is
-    `against_gains` unless it was a person who broke it off, and not because the vehicle behaved badly. `predicted` is
-    None for gains that no proposal had.
+    `outcome` is `valid` or `aborted`; invalid and lost flights are left out. An aborted flight has no error.
+    `against_gains` is false if a person aborted the flight for another reason than the vehicle's behaviour. `predicted`
+    is None for gains that no proposal contained.
     """
 
     number: int
@@ -104,5 +114,5 @@ class Flight:
 
 
 def flight_seed(seed: int, number: int) -> int:
-    """The seed of a campaign's flight `number` (from 1): 32 bits, unrelated between flights and between campaigns."""
+    """Random seed of a campaign's flight `number` (from 1): 32 bits, independent between flights and campaigns."""
     return int(np.random.SeedSequence((seed, number)).generate_state(1)[0])

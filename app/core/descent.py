@@ -1,4 +1,4 @@
-"""Nelder–Mead within a box, the first steps leading into it."""
+"""Nelder–Mead within a box, with first steps towards its interior."""
 
 from collections.abc import Callable
 
@@ -17,8 +17,11 @@ def minimise_in_box(
     evaluations: int,
     tolerance: float,
 ) -> Vector:
-    """Where the search ends, shape (n,): from `start`, its first steps of `steps` (positive) away from the nearer side,
-    until the simplex is `tolerance` wide and differs by 1e-6 in its errors, or `evaluations` are spent."""
+    """Minimise `error` within the box and return the final point, shape (n,).
+
+    The initial simplex is `start` and its `steps` (positive) away from the nearer bound. The search ends when the
+    simplex is `tolerance` wide and its errors differ by 1e-6, or after `evaluations`.
+    """
     from scipy.optimize import minimize
 
     inward = np.where(start > (low + high) / 2.0, -steps, steps)

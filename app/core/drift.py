@@ -1,11 +1,11 @@
-"""Whether a vehicle is still the one that it was tuned as: wear shows as drift of the fitted model.
+"""Detection of wear: drift of a vehicle's fitted model since it was tuned.
 
-Two calibrations from different flights give a parameter as p₁ ± s₁ and p₂ ± s₂ (standard errors). It has drifted where
+Two calibrations from different flights give a parameter as p₁ ± s₁ and p₂ ± s₂ (standard errors). It has drifted if
 
     |p₂ − p₁| > z · √(s₁² + s₂²),    z = Φ⁻¹(1 − 0.05/(2 m)),
 
-m being the number of parameters compared: so all of them together raise a false alarm in at most one of twenty cases
-(Bonferroni). A re-tune is due once any of them has.
+where m is the number of parameters compared. Together they raise a false alarm in at most one of twenty cases
+(Bonferroni). A re-tune is due once any parameter has drifted.
 """
 
 from collections.abc import Mapping
@@ -23,12 +23,12 @@ MONITORED_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
         "drag_1_s": "frame",
     }
 )
-"""What shows wear, and where to look for its cause."""
+"""Parameters that show wear, and where to look for its cause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fitted:
-    """A parameter as the flights have it, with its standard error, in its unit."""
+    """A fitted parameter with its standard error, in its unit."""
 
     title: str
     unit: str
@@ -46,7 +46,8 @@ class Drift:
 
 
 def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
-    """`before` is the fit with which the vehicle was tuned last, `now` the newest, both by the parameters' names."""
+    """Compare two fits: `before` from when the vehicle was last tuned, `now` the newest, both keyed by parameter
+    name."""
     from scipy.special import ndtri
 
     names = [name for name in MONITORED_PARAMETERS if name in before and name in now]
@@ -74,7 +75,7 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
 
 
 def _measured(fitted: Fitted) -> str:
-    """`0.6000 ± 0.0030`: as many digits as make two of the standard error."""
+    """`0.6000 ± 0.0030`: with two significant digits of the standard error."""
     if fitted.standard_error <= 0.0:
         return f"{fitted.value:.3g}"
     digits = max(0, 1 - floor(log10(fitted.standard_error)))

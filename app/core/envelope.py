@@ -1,4 +1,4 @@
-"""What a campaign lets its vehicle do: the same to a strategy and to the gate."""
+"""Limits of a campaign's vehicle, shared by strategies and the gate."""
 
 from app.core.checks import Envelope
 from app.core.definition import Definition
@@ -6,7 +6,7 @@ from app.core.experiments.base import Experiment
 
 
 def envelope_of(definition: Definition, experiment: Experiment) -> Envelope:
-    """The campaign's ceiling, and the vehicle's own safe gains, else the experiment's default ones."""
+    """The campaign's ceiling and safe gains: the vehicle's own, or else the experiment's default gains."""
     own = definition.safe_gains
     safe_gains = experiment.space.mapping(experiment.space.default) if own is None else own
     return Envelope(ceiling_m=definition.ceiling_m, safe_gains=safe_gains)

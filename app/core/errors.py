@@ -1,7 +1,7 @@
-"""Errors of the numerical core; the application's own tree in `app.errors` grows from the same root.
+"""Errors of the numerical core; the application's own tree in `app.errors` has the same root.
 
 GainlineError
-└── InputError            something that came in is not usable
+└── InputError            unusable input
     ├── GainsError        a gain vector that may not be flown
     └── TrajectoryError   a recorded flight that cannot be scored
 """
@@ -13,8 +13,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One refused field: its name as the caller wrote it (dotted, `gains.kp`), and why it was refused; `offer` holds
-    values of gains that would pass, by name, where any are known."""
+    """One refused field.
+
+    `field` is its name as the caller wrote it (dotted, `gains.kp`), `reason` why it was refused; `offer` holds gains
+    that would pass, by name, if any are known.
+    """
 
     field: str
     reason: str
@@ -22,7 +25,7 @@ class Problem:
 
 
 class GainlineError(Exception):
-    """What happened and what it means (`message`), and what to do about it (`hint`)."""
+    """An error with a `message` (what happened and what it means) and a `hint` (what to do about it)."""
 
     def __init__(self, message: str, *, hint: str, problems: tuple[Problem, ...] = ()) -> None:
         super().__init__(message)
@@ -36,7 +39,7 @@ class GainlineError(Exception):
         )
 
     def __reduce__(self) -> tuple[object, ...]:
-        """For the way between processes: an exception's own is to be made of its message alone."""
+        """Support pickling between processes: the default rebuilds an exception from its message alone."""
         return _made_again, (type(self), self.args, self.__dict__)
 
 
@@ -47,7 +50,7 @@ def _made_again(kind: type[GainlineError], args: tuple[object, ...], state: dict
 
 
 class InputError(GainlineError):
-    """Something that came in from outside cannot be used; `problems` names the fields."""
+    """External input that cannot be used; `problems` names the fields."""
 
 
 class GainsError(InputError):

@@ -1,9 +1,9 @@
-"""What a record cannot have seen: jumps that no vehicle flies, frozen samples, gaps, two sources that disagree.
+"""Glitch detection: jumps that no vehicle can fly, frozen samples, gaps, and disagreement between two sources.
 
-Only the scored output is looked at, from the command to the end of what is scored. The raw record is never altered:
-`repaired` gives another one. Resting on the ground is not frozen, whatever the samples say there; and samples that do
-not move are frozen only when something else says that the vehicle did: its climb rate, the jump at their end, or
-another channel that does not move either, which in the air none does.
+Only the scored output is checked, from the command to the end of the scored window. The raw record is never altered:
+`repaired` returns a copy. Constant samples on the ground are not frozen. Constant samples in the air count as frozen
+only with further evidence: the climb rate shows that the vehicle moved, the output jumps at their end, or the climb
+rate is constant too, which never happens in flight.
 """
 
 from collections.abc import Iterator, Mapping
@@ -23,7 +23,7 @@ Kind = Literal["acceleration", "frozen", "gap", "disagreement"]
 
 @dataclass(frozen=True, slots=True)
 class Glitch:
-    """`start_s` is the time of the last good sample before it, `end_s` of the first one after."""
+    """`start_s` is the time of the last good sample before the glitch, `end_s` of the first good one after it."""
 
     kind: Kind
     start_s: float
@@ -33,8 +33,11 @@ class Glitch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Physics:
-    """What is known of an output, in its unit: the largest acceleration, the smallest jump that is told from noise,
-    how far from where it started it is in the air, its rate's channel, and a second source of the same."""
+    """Physical limits of an output, in its unit.
+
+    The largest acceleration, the smallest jump distinguishable from noise, the deviation from the start that means the
+    vehicle is airborne, the channel of its rate, and a second source of the same quantity.
+    """
 
     largest_acceleration: float
     smallest_jump: float
@@ -56,28 +59,30 @@ _PHYSICS: Final[Mapping[str, _Physics]] = MappingProxyType(
         )
     }
 )
-"""30 m/s² up is four times the weight in thrust; down, gravity alone is a third of it. Outputs without an entry, as a
-pitch error, are looked at for gaps only."""
+"""30 m/s² upward takes a thrust of four times the weight; downward, gravity alone gives a third of it. Outputs without
+an entry, such as a pitch error, are checked for gaps only."""
 
 _FROZEN_S: Final = 0.3
 _AROUND_S: Final = 0.15
-"""How far around a sample its speed is measured."""
+"""Half width of the window in which the speed around a sample is measured."""
 _SD_OF_MEDIAN: Final = 1.4826
-"""Standard deviation of a normal distribution over its median distance from the mean."""
+"""Ratio of a normal distribution's standard deviation to its median absolute deviation."""
 _OUT_OF_NOISE: Final = 7.0
 _LONGEST_EXCURSION_S: Final = 1.5
-"""Two jumps that cancel each other within so long are one glitch, everything between them."""
+"""Two jumps that cancel each other within this time are one glitch, with everything between them."""
 _DISAGREEMENT: Final = 0.25
 _DISAGREEMENT_S: Final = 0.1
 _STAMP_RESOLUTION_S: Final = 1e-5
 
 Marks = list[tuple[int, int]]
-"""Glitches as pairs of samples: the last good one before, and the first good one after."""
+"""Glitches as pairs of sample indices: the last good one before, and the first good one after."""
 
 
 def find_glitches(experiment: Experiment, trajectory: Trajectory) -> tuple[Glitch, ...]:
-    """In the order of their times. A record without the scored output, or with times that do not rise, has none:
-    scoring says what is wrong with it."""
+    """Find the glitches of a record, ordered by time.
+
+    A record without the scored output, or whose times do not increase, has none: scoring reports what is wrong with it.
+    """
     if experiment.output not in trajectory.channels or not _sound(trajectory, experiment.output):
         return ()
     scored = (trajectory.time_s >= 0.0) & (trajectory.time_s <= experiment.grid_s[-1] + MAX_GAP_S)
@@ -100,8 +105,8 @@ def find_glitches(experiment: Experiment, trajectory: Trajectory) -> tuple[Glitc
 
 
 def repaired(experiment: Experiment, trajectory: Trajectory, glitches: tuple[Glitch, ...]) -> Trajectory:
-    """Another record whose scored output runs in a straight line from the last good sample before each glitch to the
-    first one after it."""
+    """A copy of the record with the scored output interpolated linearly across each glitch, from the last good sample
+    before it to the first one after it."""
     values = trajectory[experiment.output].copy()
     time_s = trajectory.time_s
     for glitch in glitches:
@@ -151,10 +156,11 @@ def _jumped(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int
 
 
 def _excess(time_s: Samples, values: Samples, physics: _Physics) -> Samples:
-    """How far each step goes beyond what the speed around it explains, shape (n − 1,); zero where it may.
+    """How far each step exceeds what the speed around it explains, shape (n − 1,); zero within the allowed range.
 
-    The speed is the median of the steps within 0.15 s (of two on either side, where samples are rarer), and may change
-    by the largest acceleration meanwhile. In a noisy record a jump has to stand out of the noise of the steps.
+    The speed is the median of the steps within 0.15 s (of two on either side, where samples are sparser), and may
+    change by the largest acceleration over that window. In a noisy record a jump must also exceed the noise of the
+    steps.
     """
     from scipy.ndimage import median_filter
 
@@ -168,7 +174,7 @@ def _excess(time_s: Samples, values: Samples, physics: _Physics) -> Samples:
 
 
 def _jumps(time_s: Samples, excess: Samples) -> Marks:
-    """Jumps, each from the sample before to the one after; those that cancel each other as one."""
+    """Jumps, each from the sample before to the one after; jumps that cancel each other are merged into one."""
     steps = np.flatnonzero(excess).tolist()
     marks: Marks = []
     while steps:
@@ -186,7 +192,7 @@ def _jumps(time_s: Samples, excess: Samples) -> Marks:
 
 
 def _frozen(time_s: Samples, values: Samples, rate: Samples | None, excess: Samples, physics: _Physics) -> Marks:
-    """Runs of one and the same value, in the air, through which the vehicle moved."""
+    """Runs of one constant value in the air during which the vehicle moved."""
     marks: Marks = []
     for first, last in _runs(np.diff(values) == 0.0):
         held_s = time_s[last] - time_s[first]
@@ -203,7 +209,7 @@ def _frozen(time_s: Samples, values: Samples, rate: Samples | None, excess: Samp
 
 
 def _disagreements(time_s: Samples, values: Samples, second: Samples, physics: _Physics) -> Iterator[Glitch]:
-    """Where two sources part, beyond the distance that they have throughout, their datums'."""
+    """Intervals in which two sources differ by more than their usual offset (that of their datums)."""
     apart = values - second
     apart = np.abs(apart - np.median(apart))
     for first, last in _runs((apart > _DISAGREEMENT)[1:]):
@@ -218,6 +224,6 @@ def _disagreements(time_s: Samples, values: Samples, second: Samples, physics: _
 
 
 def _runs(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First and past-last place of each unbroken row of true flags, shape (n,)."""
+    """First and past-the-end index of each run of true flags; the flags have shape (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return ((int(first), int(last)) for first, last in edges.reshape(-1, 2))

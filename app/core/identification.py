@@ -1,17 +1,17 @@
-"""The linear model of an aircraft, identified again from flights that recorded its states and commands.
+"""Identification of an aircraft's linear model from flights that recorded its states and commands.
 
-Unknown are the logarithms m of what the elements of A and B are to be multiplied by, normal around the model's own with
-the priors of the experiment. Two fits minimise
+The unknowns m are the logarithms of factors on the elements of A and B, with a normal prior around the model's own
+values from the experiment. Two fits minimise
 
     Σ (r/σ)² + Σ ((m − m₀)/s)²
 
-by Gauss–Newton with a damped step, the noise σ of each state estimated from the residuals as they shrink:
+by Gauss–Newton with a limited step; the noise σ of each state is re-estimated from the residuals in every iteration:
 
-- `least-squares`: r is what the next recorded state is beyond one step from the recorded one. Exact for clean records;
-  noise on the states biases it, for it stands on both sides.
-- `map` (maximum a posteriori): r is what the recorded states of a window of one second are beyond the model's, driven
-  by the recorded commands from the initial state that suits the window best (linear, so solved exactly). Noise on the
-  states is noise on r alone.
+- `least-squares`: r is the difference between the next recorded state and one model step from the recorded one. Exact
+  for clean records; noise on the states biases it, because it enters both sides.
+- `map` (maximum a posteriori): r is the difference between the recorded states of a one-second window and the model's,
+  driven by the recorded commands from the initial state that fits the window best (linear, so solved exactly). Noise on
+  the states affects r alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,7 +37,8 @@ _ROUNDS: Final = 40
 _DIFFERENCE: Final = 1e-5
 _LARGEST_STEP: Final = 0.5
 _SETTLED: Final = 0.01
-"""The fit has converged once a step is this small a share of the standard errors, and the noise changes as little."""
+"""The fit has converged once a step is below this share of the standard errors and the noise changes by less than
+it."""
 _SINGLE_PRECISION: Final = 6e-8
 _SMALLEST: Final = 1e-12
 _MIN_RECORD: Final = WINDOW_STEPS + 1
@@ -45,8 +46,8 @@ _MIN_RECORD: Final = WINDOW_STEPS + 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identified:
-    """The parameters as the flights have them, shape (19,), their covariance (19, 19), and the noise of each recorded
-    state (5,), in the source's units; `flights` are the numbers of those that were used."""
+    """Identified parameters, shape (19,), their covariance (19, 19), and the noise of each recorded state (5,), in the
+    source's units; `flights` are the numbers of the flights used."""
 
     model: Vector
     covariance: Matrix
@@ -59,7 +60,8 @@ class Identified:
 
 
 def identify(experiment: PitchTracking, flights: Sequence[Flight], fit: Fit) -> Identified | None:
-    """Fit the model to every flight with a record of its states and commands, aborted ones included; None without one.
+    """Fit the model to every flight that recorded its states and commands, aborted ones included; None if there is
+    none.
 
     Pure and deterministic; uses trajectories as they are stored.
     """
@@ -76,7 +78,7 @@ def identify(experiment: PitchTracking, flights: Sequence[Flight], fit: Fit) -> 
 
 
 def _record(experiment: PitchTracking, flight: Flight) -> Matrix | None:
-    """[x | u] of the flight up to its end or its divergence, shape (n, 7); None where it holds less than a window."""
+    """[x | u] of the flight up to its end or its divergence, shape (n, 7); None if shorter than a window."""
     trajectory = flight.trajectory.as_stored()
     if not len(trajectory):
         return None
@@ -91,7 +93,7 @@ def _record(experiment: PitchTracking, flight: Flight) -> Matrix | None:
 
 
 def _windows(record: Matrix) -> Cube:
-    """Windows of a second that share their ends: (k, 51, 7)."""
+    """One-second windows; neighbours share their end samples: (k, 51, 7)."""
     count = (len(record) - 1) // WINDOW_STEPS
     return np.stack([record[k * WINDOW_STEPS : (k + 1) * WINDOW_STEPS + 1] for k in range(count)])
 
@@ -132,12 +134,12 @@ def _responses(moves: Cube, windows: Cube) -> tuple[Cube, Cube]:
 
 
 def _rms(values: Cube) -> Vector:
-    """Over all but the last axis."""
+    """Root mean square over all but the last axis."""
     return np.asarray(np.sqrt((values.reshape(-1, STATES) ** 2).mean(axis=0)))
 
 
 def _fit(experiment: PitchTracking, windows: Cube, residuals: Residuals) -> tuple[Vector, Matrix]:
-    """Gauss–Newton from the model's own parameters; the noise follows the residuals down to what storage leaves."""
+    """Gauss–Newton from the model's own parameters; the noise follows the residuals down to the storage precision."""
     nominal = experiment.nominal_model
     precision = 1.0 / np.array([parameter.prior_sd for parameter in experiment.model_parameters]) ** 2
     lower = np.array([parameter.lower for parameter in experiment.model_parameters])
@@ -151,7 +153,7 @@ def _fit(experiment: PitchTracking, windows: Cube, residuals: Residuals) -> tupl
         left = residuals(experiment, shifted, windows, noise).reshape(len(shifted), -1, STATES) / noise
         now, *others = left.reshape(len(shifted), -1)
         slopes = (np.stack(others) - now) / _DIFFERENCE
-        # einsum: a product of this shape would set every thread of the linear algebra spinning for a millisecond's work
+        # einsum: a matrix product of this shape would wake every linear algebra thread for a millisecond's work
         covariance = np.linalg.inv(np.einsum("ik,jk->ij", slopes, slopes) + np.diag(precision))
         step = -covariance @ (slopes @ now + precision * (model - nominal))
         step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max()))

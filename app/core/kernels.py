@@ -1,7 +1,7 @@
-"""How the inner loops are compiled, and where the machine code is kept.
+"""Compilation of the inner loops, and the cache of their machine code.
 
-numba is imported when the first kernel is called: a process that computes nothing, such as the one that answers
-browsers, never loads it.
+numba is imported when the first kernel is called, so a process that computes nothing, such as the web server, never
+loads it.
 """
 
 import hashlib
@@ -18,10 +18,10 @@ _HERE: Final = Path(__file__).parent
 
 
 def _cache_folder(chosen: str) -> Path:
-    """A folder of its own for each state of all kernels, below the one that is `chosen`, if any.
+    """A separate folder for each version of the kernels' source, below `chosen` if given.
 
-    numba judges a kept kernel by the file it stands in; ours call each other across files, so a change in one would
-    leave its callers with the old machine code.
+    numba invalidates a cached kernel only when its own file changes. Our kernels call each other across files, so a
+    change in one file would leave its callers with stale machine code.
     """
     digest = hashlib.sha256()
     for source in sorted((*_HERE.glob("control/*.py"), *_HERE.glob("plants/*.py"), Path(__file__))):
@@ -32,7 +32,7 @@ def _cache_folder(chosen: str) -> Path:
 
 @cache
 def _use_cache() -> bool:
-    """Point numba to the folder; False where nothing can be kept, and every process compiles for itself."""
+    """Point numba to the folder; False if it is not writable, and every process then compiles for itself."""
     from numba import config
 
     settings = vars(config)  # numba fills this module at run time
@@ -46,7 +46,7 @@ def _use_cache() -> bool:
 
 
 class _Kernel:
-    """A function that is compiled when it is first called, from Python or by another kernel as that is compiled."""
+    """A function that is compiled on its first call, from Python or when another kernel that calls it is compiled."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
@@ -62,23 +62,23 @@ class _Kernel:
 
     @property
     def _numba_type_(self) -> object:
-        """What numba takes it for where another kernel calls it (numba's own attribute)."""
+        """The type numba sees where another kernel calls this one (an attribute defined by numba)."""
         from numba import types
 
         dispatcher: Any = self._compiled
         return types.Dispatcher(dispatcher)
 
     def __call__(self, *args: object, **kwargs: object) -> object:
-        """The first call; the compiled function then takes this method's place, which leaves nothing between."""
+        """The first call. The compiled function then replaces this method, so later calls have no overhead."""
         return self._compiled(*args, **kwargs)
 
 
 def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile on first use, keep the machine code, and run without the interpreter's lock.
+    """Compile on first use, cache the machine code, and run without the interpreter's lock.
 
-    The types seen by callers stay those of the Python function. With `NUMBA_DISABLE_JIT=1` it is that very function
-    that runs, so kernels must mean the same thing both ways: no reliance on machine integers that wrap by themselves.
+    Callers see the types of the Python function. With `NUMBA_DISABLE_JIT=1` the Python function itself runs, so kernels
+    must behave the same both ways: they must not rely on machine integers wrapping around.
     """
-    own_type = type(function.__name__, (_Kernel,), {})  # whose `__call__` is replaced for this kernel alone
+    own_type = type(function.__name__, (_Kernel,), {})  # a class per kernel: its `__call__` is replaced
     compiled_later: Callable[_P, _R] = own_type(function)
     return compiled_later

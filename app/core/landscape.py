@@ -1,13 +1,13 @@
-"""The model's error over the gains, two of them at a time.
+"""The predicted error as a function of the gains, two of them at a time.
 
 A slice through a gain set g₀ varies the gains i and j and holds the others:
 
     E_ij(x, y) = E(g₀ with gᵢ = x, gⱼ = y),
 
-E being the error that the strategy's own model, corrected or calibrated as it was for the proposal, predicts
-(`Strategy.foresee`; before the first valid flight the nominal model, or the donor's flight). Of more than three gains
-those are varied whose share of the gradient, |∂E/∂gᵢ|·scaleᵢ, is largest: the change of the error over the step that
-matters for a gain.
+where E is the error predicted by the strategy's own model, corrected or calibrated as for the proposal
+(`Strategy.predict_errors`; before the first valid flight, the nominal model or the one corrected by the donor's
+flight). With more than three gains, those with the largest share of the gradient, |∂E/∂gᵢ|·scaleᵢ, are varied: the
+change of the error over one scale of the gain.
 """
 
 from collections.abc import Sequence
@@ -28,18 +28,22 @@ from app.core.strategies.bias import correct_by_bias, uncorrected_model
 from app.core.transfer import transfer
 
 POINTS: Final = 17
-"""Values of a gain in a slice, at most: whole counts may leave fewer."""
+"""Largest number of values of a gain in a slice; integer gains may have fewer."""
 MAX_SLICES: Final = 3
 _MARGIN: Final = 0.35
 _LEAST_WIDTH: Final = 1.5
-"""A slice goes beyond what it has to hold by this share of its width, and is at least so many scales wide."""
+"""`_MARGIN`: a slice extends beyond its marks by this share of their range on either side. `_LEAST_WIDTH`: its minimum
+width in scales of the gain."""
 _DIFFERENCE: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slice:
-    """Predicted errors over the gains named `x` and `y`: `errors[i][j]` belongs to `y_values[i]` and `x_values[j]`, in
-    the error's unit; None where the model has no finite one."""
+    """Predicted errors over the gains named `x` and `y`.
+
+    `errors[i][j]` belongs to `y_values[i]` and `x_values[j]`, in the error's unit; None where the model gives no finite
+    error.
+    """
 
     x: str
     y: str
@@ -50,7 +54,7 @@ class Slice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landscape:
-    """The slices through `centre`; `still` names the gains that none of them varies."""
+    """The slices through `centre`; `still` names the gains that no slice varies."""
 
     centre: dict[str, float]
     slices: tuple[Slice, ...]
@@ -59,7 +63,8 @@ class Landscape:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandscapePlan:
-    """What is to be computed: through which gains, and which gain sets the slices have to hold."""
+    """What to compute: the gains through which the slices go (`centre`), and the gain sets that they must contain
+    (`marks`)."""
 
     definition: Definition
     flights: tuple[Flight, ...]
@@ -70,8 +75,8 @@ class LandscapePlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandscapeGrid:
-    """What it takes to compute the slices, a few points at a time: the model, the gains through which they go, shape
-    (n,), the pairs that are varied, and each gain's values."""
+    """Inputs for computing the slices in chunks: the model, the gains through which they go, shape (n,), the pairs of
+    gains that are varied, and the values of each gain."""
 
     space: PolicySpace
     predict_errors: ErrorsOf
@@ -84,7 +89,7 @@ class LandscapeGrid:
         return np.concatenate([self._points(pair) for pair in self.pairs])
 
     def landscape(self, errors: Vector) -> Landscape:
-        """The slices, from the errors of `points`, shape (p,)."""
+        """Assemble the slices from the errors at `points`, shape (p,)."""
         sizes = [len(self.values[x]) * len(self.values[y]) for x, y in self.pairs]
         parts = np.split(errors, np.cumsum(sizes)[:-1])
         shown = {place for pair in self.pairs for place in pair}
@@ -113,8 +118,10 @@ class LandscapeGrid:
 
 
 def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
-    """The model and the points. Pure; a calibration takes up to a second. None without a model, and where fewer than
-    two gains are free."""
+    """Return the model and the grid; None without a model, or with fewer than two free gains.
+
+    Pure; a calibration takes up to a second.
+    """
     foresee, space = _error_model(plan.definition, plan.flights, plan.donor), space_of(plan.definition)
     if foresee is None or free_gains(space) < 2:
         return None
@@ -130,22 +137,22 @@ def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
 
 
 def predict_points(foresee: ErrorsOf, gains: Matrix) -> Vector:
-    """Predicted errors of some points, (c, n) → (c,): what a process of its own is asked for. Pure."""
+    """Predicted errors at a chunk of points, (c, n) → (c,): the work of a separate process. Pure."""
     return foresee(gains)
 
 
 def space_of(definition: Definition) -> PolicySpace:
-    """The gains that the campaign may choose from."""
+    """The policy space of a campaign, within its bounds."""
     return experiment_of(definition).space.narrowed(definition.bounds)
 
 
 def free_gains(space: PolicySpace) -> int:
-    """How many gains are not pinned by their bounds."""
+    """Number of gains that are not pinned by their bounds."""
     return sum(gain.span > 0.0 for gain in space.gains)
 
 
 def _error_model(definition: Definition, flights: Sequence[Flight], donor: Flight | None) -> ErrorsOf | None:
-    """The model that `next_proposal` judges gains by, for the same history; None where there is none."""
+    """The model that `next_proposal` uses for the same history; None if there is none."""
     experiment = experiment_of(definition).modelled
     if experiment is None:
         return None
@@ -157,7 +164,7 @@ def _error_model(definition: Definition, flights: Sequence[Flight], donor: Fligh
 
 
 def _pairs(space: PolicySpace, centre: Vector, foresee: ErrorsOf) -> list[tuple[int, int]]:
-    """The pairs of free gains, the largest shares of the gradient first, each pair in the gains' own order."""
+    """Pairs of free gains, those with the largest shares of the gradient first; each pair in the order of the gains."""
     free = [place for place, gain in enumerate(space.gains) if gain.span > 0.0]
     pairs = list(combinations(free, 2))
     if len(pairs) <= MAX_SLICES:
@@ -177,7 +184,7 @@ def _shares(space: PolicySpace, centre: Vector, foresee: ErrorsOf) -> Vector:
 
 
 def _values(gain: Gain, marks: Vector) -> Vector:
-    """The values of one gain in its slices, rising, about `marks` (k,), within its bounds."""
+    """Values of one gain in its slices, increasing, around `marks` (k,), within its bounds."""
     low, high = float(marks.min()), float(marks.max())
     reach = max((1.0 + 2.0 * _MARGIN) * (high - low), _LEAST_WIDTH * gain.scale) / 2.0
     middle = (low + high) / 2.0

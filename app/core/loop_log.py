@@ -1,8 +1,8 @@
-"""Checking the replica against a log of the vertical loop that was sent far below its 512 Hz.
+"""Check of the replica against a log of the vertical loop that was sampled far below its 512 Hz.
 
-Two parts. What each sample's commands are computed from stands in the same sample, so they must follow to the last bit,
-give or take one step of 1/512 s between fields that were gathered around a step. What goes on between samples, the
-reference and the integrator, is simulated again from the command on and compared within stated tolerances.
+The check has two parts. A sample contains the inputs of its own commands, so the commands must follow exactly, apart
+from one step of 1/512 s between fields that were collected around a step boundary. The reference and the integrator
+evolve between samples; they are simulated from the command on and compared within the stated tolerances.
 """
 
 from collections.abc import Mapping
@@ -32,11 +32,11 @@ TIME_TOLERANCE_S: Final = 0.02
 TOLERANCES: Final[Mapping[str, float]] = MappingProxyType(
     {"z_ref": 0.01, "zd_ref": 0.02, "zdd_ref": 0.1, "z_sum_err": 0.02}
 )
-"""Largest differences beyond what 20 ms of uncertain time explain, in m, m/s and m/s², and as a share of the largest
-value of the integrator."""
+"""Largest differences beyond those explained by 20 ms of time uncertainty, in m, m/s and m/s²; for the integrator as a
+share of its largest value."""
 
 UNITS: Final[Mapping[str, float]] = MappingProxyType({"z_ref": 1 / 256, "zd_ref": 1 / 2**19, "zdd_ref": 1 / 2**10})
-"""What a count of a reference is, in m, m/s and m/s²."""
+"""Size of one count of each reference, in m, m/s and m/s²."""
 _FIT_S: Final = 2.0
 _ROUNDING: Final = 1
 _TILT_ROUNDING: Final = 3
@@ -50,8 +50,11 @@ Counts = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class LoopLog:
-    """Samples of the loop: `time_s` of shape (n,), rising; `values` of shape (n, 15) in the order of `FIELDS`, 32-bit
-    integers with the loop's own fractions, z down; n ≥ 1."""
+    """Samples of the loop.
+
+    `time_s` has shape (n,) and increases; `values` has shape (n, 15) in the order of `FIELDS`, 32-bit integers with the
+    loop's own fractions, z down; n ≥ 1.
+    """
 
     time_s: Samples
     values: Counts
@@ -64,15 +67,18 @@ class LoopLog:
 
     @property
     def idle(self) -> NDArray[np.bool_]:
-        """Where the loop only follows the vehicle and commands nothing of its own, shape (n,)."""
+        """Samples in which the loop only tracks the vehicle and commands nothing itself, shape (n,)."""
         idle: NDArray[np.bool_] = (self["z_ref"] == self["z"]) & (self["zd_ref"] == self["zd"]) & (self["zdd_ref"] == 0)
         return idle
 
 
 @dataclass(frozen=True, slots=True)
 class CommandCheck:
-    """How many samples' commands follow from the sample itself: to the last bit (of these, `tilted` ones with a tilt of
-    up to `largest_tilt_deg`), or only with one step between the named fields; and the time of the first that do not.
+    """Result of checking each sample's commands against the sample itself.
+
+    `exact` samples agree to the last bit; `tilted` of these with a tilt of up to `largest_tilt_deg`. `stale` counts the
+    samples that agree only if the named fields are one step old or new. `different` samples have no explanation;
+    `first_different_s` is the time of the first.
     """
 
     rows: int
@@ -90,7 +96,7 @@ class CommandCheck:
 
 @dataclass(frozen=True, slots=True)
 class SimulationCheck:
-    """The largest differences between log and simulation over `duration_s` from the command on, as `TOLERANCES`."""
+    """Largest differences between log and simulation over `duration_s` from the command on, as in `TOLERANCES`."""
 
     command_s: float
     duration_s: float
@@ -104,9 +110,11 @@ class SimulationCheck:
 
 @dataclass(frozen=True, slots=True)
 class Overlay:
-    """What a log recorded and what the replica gives for the same samples, to be drawn: `time_s` of shape (n,),
-    `recorded` and `replica` by the names of the signals, each of shape (n,); `differs` says where no explanation was
-    found."""
+    """Recorded and replicated signals of the same samples, for plotting.
+
+    `time_s` has shape (n,); `recorded` and `replica` hold each signal by name, shape (n,). `differs` marks the samples
+    without an explanation.
+    """
 
     time_s: Samples
     recorded: Mapping[str, Counts]
@@ -115,12 +123,12 @@ class Overlay:
 
 
 def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
-    """Compare ff_cmd, fb_cmd and thrust of every sample of the working loop with what the sample itself gives."""
+    """Compare ff_cmd, fb_cmd and thrust of every active sample with the values computed from the sample itself."""
     return compare_commands(log, gains)[0]
 
 
 def compare_commands(log: LoopLog, gains: Gains) -> tuple[CommandCheck, Overlay]:
-    """As `check_commands`, with both sides of `COMMANDS` for every sample of the working loop."""
+    """As `check_commands`, and return both sides of `COMMANDS` for every active sample."""
     active = ~log.idle
     sample = LoopLog(log.time_s[active], log.values[active])
     tilt = _tilts_deg(sample)
@@ -149,15 +157,17 @@ def compare_commands(log: LoopLog, gains: Gains) -> tuple[CommandCheck, Overlay]
 
 
 def check_simulation(log: LoopLog) -> SimulationCheck | None:
-    """Simulate the reference and the integrator from the first command on that stays for two seconds. None without any:
-    the loop works from the first sample on, or never, or for a moment only."""
+    """Simulate the reference and the integrator from the first command that lasts two seconds.
+
+    None if there is none: the loop is active from the first sample on, never, or only briefly.
+    """
     found = compare_simulation(log)
     return None if found is None else found[0]
 
 
 def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
-    """As `check_simulation`, with both sides of `SIMULATED` for every sample after the command; NaN where the
-    integrator does not work yet."""
+    """As `check_simulation`, and return both sides of `SIMULATED` for every sample after the command; NaN where the
+    integrator is not active."""
     found = _first_command(log)
     if found is None:
         return None
@@ -188,9 +198,11 @@ def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
 
 
 def infer_gains(log: LoopLog) -> dict[str, float] | None:
-    """The whole gains from which the feedback of more samples follows exactly than from any near them, and of most.
+    """Infer the integer gains from the log: those that reproduce the feedback of more samples than any neighbours, and
+    of most samples.
 
-    Least squares on the three errors come close. None where the flight cannot tell neighbouring gains apart.
+    The search starts near a least squares fit on the three errors. None if the flight cannot distinguish neighbouring
+    gains.
     """
     active = np.flatnonzero(~log.idle)
     if len(active) < _FEWEST_TO_INFER:
@@ -226,7 +238,7 @@ def _feedback(gains: Gains, ez: Counts, ev: Counts, z_sum_err: Counts) -> Counts
 
 
 def _replica_commands(sample: LoopLog, gains: Gains, tilt_deg: Samples) -> dict[str, Counts]:
-    """What the replica commands for every sample, shape (n,) each; under the sample's tilt where one explains it."""
+    """Commands of the replica for every sample, shape (n,) each; at the sample's tilt if a tilt explains it."""
     level = np.array([loop.feed_forward(value, loop.LEVEL) for value in sample["zdd_ref"].tolist()], dtype=np.int64)
     forward = np.where(np.isfinite(tilt_deg), sample["ff_cmd"], level)
     back = _feedback(gains, *_errors(sample), sample["z_sum_err"])
@@ -234,7 +246,7 @@ def _replica_commands(sample: LoopLog, gains: Gains, tilt_deg: Samples) -> dict[
 
 
 def _tilts_deg(sample: LoopLog) -> Samples:
-    """The tilt with which ff_cmd follows from zdd_ref, shape (n,): 0 level, NaN where no tilt below 60° makes it so."""
+    """Tilt with which ff_cmd follows from zdd_ref, shape (n,): 0 for level, NaN if no tilt up to 60° explains it."""
     tilts = np.full(len(sample), np.nan)
     for row, (zdd_ref, ff_cmd) in enumerate(zip(sample["zdd_ref"].tolist(), sample["ff_cmd"].tolist(), strict=True)):
         level = loop.feed_forward(zdd_ref, loop.LEVEL)
@@ -249,10 +261,10 @@ def _tilts_deg(sample: LoopLog) -> Samples:
 
 
 def _stale(sample: LoopLog, gains: Gains, fields: str) -> NDArray[np.bool_]:
-    """Where ff_cmd and fb_cmd follow once these fields are taken one step older or newer, shape (n,).
+    """Samples whose ff_cmd and fb_cmd follow once these fields are taken one step older or newer, shape (n,).
 
-    A step moves a position by its speed, with a count of rounding, a speed by exactly its acceleration, and the
-    integrator by its error.
+    A step changes a position by its speed, rounded to a count, a speed by exactly its acceleration, and the integrator
+    by its error.
     """
     found = np.zeros(len(sample), dtype=np.bool_)
     slack = _feed_forward_change(sample) if fields == "reference" else np.zeros(len(sample), dtype=np.int64)
@@ -278,13 +290,14 @@ def _forward_difference(sample: LoopLog) -> Counts:
 
 
 def _feed_forward_change(sample: LoopLog) -> Counts:
-    """How far ff_cmd moves in one step: 2ζω and ω² are both 3 per s, a count of acceleration is 0.63 of thrust."""
+    """How far ff_cmd moves in one step: 2ζω and ω² are both 3 per s, and one count of acceleration is 0.63 of
+    thrust."""
     change = 3.1 / loop.RATE_HZ * (np.abs(sample["zdd_ref"]) + np.abs(sample["zd_ref"]) / 2**9)
     return np.ceil(0.63 * change).astype(np.int64) + _ROUNDING
 
 
 def _first_command(log: LoopLog) -> tuple[int, int] | None:
-    """The last sample before the reference sets out, and the last one with the same set point."""
+    """Index of the last sample before the reference starts to move, and of the last one with the same set point."""
     idle = log.idle
     for first in np.flatnonzero(idle[:-1] & ~idle[1:]).tolist():
         same = (log["z_sp"] == log["z_sp"][first + 1]) & ~idle
@@ -310,8 +323,11 @@ def _simulated_reference(part: LoopLog) -> Counts:
 
 
 def _aligned(part: LoopLog, reference: Counts) -> tuple[NDArray[np.int64], float]:
-    """The simulated step of each sample after the command, shape (n − 1,), and when after the last sample at rest the
-    command came: where the references agree best over the first two seconds."""
+    """Align the simulation with the log.
+
+    Returns the simulated step of each sample after the command, shape (n − 1,), and the time from the last sample at
+    rest to the command: where the references agree best over the first two seconds.
+    """
     interval = part.time_s[1] - part.time_s[0]
     rest = round((interval + 2 * TIME_TOLERANCE_S) * loop.RATE_HZ)
     since = np.round((part.time_s[1:] - part.time_s[0]) * loop.RATE_HZ).astype(np.int64)
@@ -328,7 +344,7 @@ def _aligned(part: LoopLog, reference: Counts) -> tuple[NDArray[np.int64], float
 
 
 def _outside(logged: Counts, simulated: Counts, steps: NDArray[np.int64]) -> Counts:
-    """How far the samples after the command lie outside what was simulated within 20 ms of them, shape (n − 1,)."""
+    """How far the samples after the command lie outside the simulated range within 20 ms of them, shape (n − 1,)."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     window = 2 * round(TIME_TOLERANCE_S * loop.RATE_HZ) + 1
@@ -339,9 +355,12 @@ def _outside(logged: Counts, simulated: Counts, steps: NDArray[np.int64]) -> Cou
 
 
 def _simulated_integrator(part: LoopLog, z_ref: Counts, steps: NDArray[np.int64]) -> Samples:
-    """The summed error of the samples after the command, shape (n − 1,), from the first one on where it works, NaN
-    before and where it never does; the position between the samples follows from their positions and speeds. Of
-    samples in the same step the first one counts, and the others are NaN."""
+    """Summed error of the samples after the command, shape (n − 1,), from the first one with an active integrator.
+
+    NaN before that sample, and everywhere if the integrator is never active. The position between samples is
+    interpolated from positions and speeds. Of several samples in the same step only the first has a value; the others
+    are NaN.
+    """
     from scipy.interpolate import CubicHermiteSpline
 
     summed = np.full(len(steps), np.nan)

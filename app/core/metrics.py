@@ -18,7 +18,7 @@ SetPoint = Callable[[Samples], Samples]
 def mean_absolute_error(time_s: Samples, values: Samples, set_point: SetPoint, start_s: float, stop_s: float) -> float:
     """Trapezoidal mean of |set point − value| over [start_s, stop_s], on the samples' own time stamps, shape (n,).
 
-    The ends are interpolated; outside the samples the nearest one holds.
+    The ends are interpolated; outside the samples the nearest value holds.
     """
     inside = (time_s > start_s) & (time_s < stop_s)
     instants = np.concatenate(([start_s], time_s[inside], [stop_s]))
@@ -32,8 +32,8 @@ def require_scorable(
 ) -> None:
     """Raise TrajectoryError unless `channel` can be scored over [start_s, stop_s].
 
-    It must be there, finite, with rising time stamps, and nowhere in the window further than 0.25 s from one sample to
-    the next, the ends of the window included; `accept_gaps` lets gaps inside the record pass.
+    The channel must exist and be finite, time stamps must increase, and samples must be at most 0.25 s apart anywhere
+    in the window, ends included; `accept_gaps` allows gaps inside the record.
     """
     problem = _problem(trajectory, channel) or _uncovered(trajectory.time_s, start_s, stop_s)
     if problem is None and not accept_gaps:

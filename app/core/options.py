@@ -1,4 +1,4 @@
-"""Settings that strategies and experiments offer, and whether a chosen value can be one."""
+"""Settings of strategies and experiments, and validation of their values."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Option:
     upper: float | None = None
 
     def refusal(self, value: OptionValue) -> str | None:
-        """Why `value` cannot be this setting, or None when it can."""
+        """Why `value` is not allowed, or None if it is."""
         return self._not_a_choice(value) if self.choices else self._no_number(value)
 
     def _not_a_choice(self, value: OptionValue) -> str | None:
@@ -44,7 +44,7 @@ class Option:
 def problems_of_options(
     chosen: Mapping[str, OptionValue], offered: Sequence[Option], *, field: str, owner: str
 ) -> Iterator[Problem]:
-    """Every setting among `chosen` that `owner` does not offer or that cannot have its value."""
+    """Every setting in `chosen` that `owner` does not have, or whose value is not allowed."""
     known = {option.name: option for option in offered}
     for name, value in chosen.items():
         if name not in known:

@@ -1,4 +1,4 @@
-"""Policies: named gain vectors, and the space of those a campaign may choose from."""
+"""Policies: named gain vectors, and the space from which a campaign may choose them."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ _HINT: Final = "Correct the named gains and send the set again; nothing was chan
 
 
 def is_finite(value: float) -> bool:
-    """Also for whole numbers that no float can hold."""
+    """Whether the value is finite; False also for integers too large for a float."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -26,14 +26,14 @@ def is_finite(value: float) -> bool:
 
 
 def shortened(value: object) -> str:
-    """What was given, in at most 40 characters."""
+    """The value as text, at most 40 characters."""
     text = str(value)
     return text if len(text) <= 40 else f"{text[:37]}…"
 
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """One tunable gain, in the controller's own counts or units; `scale` is the step that matters for it."""
+    """One tunable gain, in the controller's own counts or units; `scale` is a step size with a significant effect."""
 
     name: str
     title: str
@@ -46,11 +46,11 @@ class Gain:
 
     @property
     def span(self) -> float:
-        """Width of the range; zero for a gain that its bounds pin."""
+        """Width of the range; zero for a gain pinned by its bounds."""
         return self.upper - self.lower
 
     def refusal_by_controller(self, value: object) -> str | None:
-        """Why no controller can hold `value` as this gain, whatever the bounds, or None when it can."""
+        """Why no controller can hold `value` as this gain, whatever the bounds; None if one can."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             return "must be a number"
         if not is_finite(value):
@@ -62,7 +62,7 @@ class Gain:
         return None
 
     def refusal_by_bounds(self, value: float) -> str | None:
-        """Why the bounds refuse a number, or None when they do not."""
+        """Why the bounds refuse a number, or None if they do not."""
         if self.lower <= value <= self.upper:
             return None
         return f"must lie in {self.lower:g} … {self.upper:g} {self.unit}, got {value:g}"
@@ -95,7 +95,7 @@ class PolicySpace:
         return np.array([gain.default for gain in self.gains])
 
     def check(self, gains: Mapping[str, object], *, field: str = "gains") -> dict[str, float]:
-        """The same gains, complete and in order.
+        """Validate gains against the bounds and return them complete and in order.
 
         Raises GainsError naming every missing, unknown, non-finite, fractional or out-of-bounds gain.
         """
@@ -110,9 +110,9 @@ class PolicySpace:
         return complete
 
     def complete(self, gains: Mapping[str, object], *, field: str = "gains") -> dict[str, float]:
-        """The same gains in order, inside the bounds or not.
+        """Return the gains in order, without checking the bounds.
 
-        Raises GainsError naming every missing or unknown gain, and every one that no controller can hold.
+        Raises GainsError naming every missing or unknown gain, and every value that no controller can hold.
         """
         unknown = [
             Problem(f"{field}.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
@@ -130,11 +130,11 @@ class PolicySpace:
         return self.mapping(np.array([gains[name] for name in self.names], dtype=np.float64))
 
     def vector(self, gains: Gains) -> Vector:
-        """Shape (n,), in the order of `names`."""
+        """The gains as a vector, shape (n,), in the order of `names`."""
         return np.array([gains[name] for name in self.names], dtype=np.float64)
 
     def mapping(self, vector: Vector) -> dict[str, float]:
-        """Named gains; integer gains come out as int."""
+        """Named gains; integer gains are returned as int."""
         return {
             gain.name: int(value) if gain.integer else float(value)
             for gain, value in zip(self.gains, vector, strict=True)
@@ -146,8 +146,10 @@ class PolicySpace:
         return np.clip(rounded, self.lower, self.upper)
 
     def reachable(self, base: Vector, fraction: float) -> tuple[Vector, Vector]:
-        """Lowest and highest flyable vectors within `fraction` of each range around `base`, inside the bounds; around
-        the nearest point inside them where `base` lies outside."""
+        """Lowest and highest flyable vectors within `fraction` of each range around `base`, inside the bounds.
+
+        If `base` lies outside the bounds, they are taken around the nearest point inside.
+        """
         base = np.clip(base, self.lower, self.upper)
         reach = fraction * (self.upper - self.lower) + _ROUNDING
         integer = [gain.integer for gain in self.gains]
@@ -156,14 +158,15 @@ class PolicySpace:
         return np.maximum(low, self.lower), np.minimum(high, self.upper)
 
     def change(self, one: Gains, other: Gains) -> dict[str, float]:
-        """How far apart two sets are, each gain as a share of its range (of its value, where its bounds pin it)."""
+        """Difference of two gain sets, each gain as a share of its range (of its upper bound's magnitude, at least 1,
+        if its bounds pin it)."""
         return {
             gain.name: abs(one[gain.name] - other[gain.name]) / (gain.span or max(abs(gain.upper), 1.0))
             for gain in self.gains
         }
 
     def narrowed(self, bounds: Mapping[str, tuple[float, float]]) -> "PolicySpace":
-        """The same space inside tighter bounds. Raises InputError when they are reversed or reach outside."""
+        """The same space with tighter bounds. Raises InputError if they are reversed or extend outside."""
         problems = [
             Problem(f"bounds.{name}", f"is not a gain of this experiment ({', '.join(self.names)})")
             for name in bounds

@@ -1,15 +1,15 @@
-"""How far a prediction can be off: its interval and band before the flight, its record after it.
+"""Uncertainty of a prediction: its interval and band before the flight, and the track record afterwards.
 
-A bias-corrected model ŷ = model(gains; p) + (measured − model(flown gains; p)) is run for a few likely parameter sets
-p (the priors that a fit takes), each with its own bias; mean and standard deviation of their errors are what the model
-knows and does not know. With the flight-to-flight scatter σ (`app.core.statistics`), which the new flight has and the n
-flights of the base have too,
+A bias-corrected model ŷ = model(gains; p) + (measured − model(flown gains; p)) is run for a sample of likely parameter
+sets p (from the priors of a fit), each with its own bias. The mean and standard deviation of their errors represent the
+model uncertainty. With the flight-to-flight scatter σ (`app.core.statistics`), which affects both the new flight and
+the n flights of the base,
 
-    interval = mean ± t(ν) · f · √(σ² (1 + 1/n) + sd²),    widened to hold the predicted error itself,
+    interval = mean ± t(ν) · f · √(σ² (1 + 1/n) + sd²),    widened to contain the predicted error itself.
 
-and the band is the same at every instant, σ taken as an offset of the output that costs σ. f is experience:
-f² = (ν₀ + Σ z²)/(ν₀ + k), z being the k earlier misses in units of their own intervals, ν₀ = 4. A model that nothing
-corrects (first flight, simplex) has no base: the term 1/n and the bias fall away.
+The band has the same form at every instant, with σ converted to the output offset that costs σ. The factor f adapts to
+experience: f² = (ν₀ + Σ z²)/(ν₀ + k), where z are the k earlier prediction errors in units of their own intervals and
+ν₀ = 4. An uncorrected model (first flight, simplex) has no base: the term 1/n and the bias are omitted.
 """
 
 from collections.abc import Sequence
@@ -36,8 +36,11 @@ _TINY: Final = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackRecord:
-    """How well earlier predictions held: `inside` of `of` flights lay in their interval; of the flights that were to
-    change the error, `agreeing` did so in the predicted direction and `disagreeing` in the other."""
+    """How well earlier predictions held.
+
+    `inside` of `of` flights lay in their interval. Of the flights that were predicted to change the error, `agreeing`
+    changed it in the predicted direction and `disagreeing` in the other.
+    """
 
     inside: int
     of: int
@@ -48,16 +51,16 @@ class TrackRecord:
 
     @property
     def share(self) -> float | None:
-        """Of the flights inside; None before the first interval was put to the test."""
+        """Share of flights inside their interval; None before the first flight with an interval."""
         return self.inside / self.of if self.of else None
 
 
 def track_record(flights: Sequence[Flight]) -> TrackRecord:
-    """The record of the predictions that the flights carry.
+    """Compute the track record of the predictions that the flights carry.
 
-    The direction counts where new gains were to change the best error before them; flights of gains flown before
-    predict none. The predictions are not trustworthy once at least three flights went the other way and fewer went
-    theirs.
+    The direction counts where new gains were predicted to change the best error before them; repeated gains predict no
+    change. The predictions are not trustworthy once at least three flights went in the other direction, and more than
+    went in the predicted one.
     """
     inside = of = agreeing = disagreeing = 0
     best: float | None = None
@@ -87,7 +90,7 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
 
 
 def prediction_of(proposal: Proposal) -> Prediction | None:
-    """What a flight of the proposal carries with it, to be held against."""
+    """The prediction stored with a flight of the proposal, for later comparison."""
     if proposal.predicted_error is None:
         return None
     interval = proposal.interval
@@ -107,9 +110,9 @@ def with_interval(
     *,
     base: Flight | None,
 ) -> Proposal:
-    """The proposal with its interval and band; one that has an interval, or predicts nothing, as it is.
+    """Add the interval and band to a proposal; one that has an interval, or predicts nothing, is returned unmodified.
 
-    `base` is the flight whose bias the prediction carries, None for the bare model.
+    `base` is the flight whose bias corrects the prediction, None for the uncorrected model.
     """
     from scipy.special import stdtrit
 
@@ -141,8 +144,8 @@ def repeat_proposal(
     kind: Kind,
     why: Explanation,
 ) -> Proposal:
-    """The proposal to fly a policy again: the mean of its flights is expected, with the scatter around it as far as
-    that is known."""
+    """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval if the scatter is
+    known."""
     measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
     curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
     bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
@@ -160,7 +163,8 @@ def repeat_proposal(
 
 
 def interval_scale(flights: Sequence[Flight]) -> float:
-    """f: above 1 where earlier flights missed their predictions by more than their intervals, below where by less."""
+    """The factor f: above 1 if earlier flights missed their predictions by more than their intervals, below 1 if by
+    less."""
     from scipy.special import ndtri
 
     half_width = float(ndtri(0.5 + CONFIDENCE / 2))
@@ -176,18 +180,18 @@ def interval_scale(flights: Sequence[Flight]) -> float:
 
 
 def _with_band(curve: Trajectory, output: str, lower: Samples, upper: Samples) -> Trajectory:
-    """A predicted curve with the two edges of its band as further channels."""
+    """A predicted curve with the two edges of its band added as channels."""
     edges = dict(zip(band_channels(output), (lower, upper), strict=True))
     return replace(curve, channels={**curve.channels, **edges})
 
 
 def _interval(lower: float, upper: float) -> Interval:
-    """An error is never below zero."""
+    """The interval, cut off at zero: an error is never negative."""
     return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
 
 
 def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
-    """Outputs of these gains on a few likely models, shape (k, n), each with its own bias where there is a base."""
+    """Outputs of these gains on the sampled models, shape (k, n), each with its own bias if there is a base."""
     parameters = experiment.model_parameters
     prior = ParameterDistribution(
         mean=tuple(parameter.prior_mean for parameter in parameters),
@@ -203,7 +207,7 @@ def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: V
 
 
 def offset_sensitivity(experiment: Experiment) -> float:
-    """What a constant offset of one unit of the output costs in the error: 1 for a mean, the window for an integral."""
+    """Error caused by a constant offset of one unit of the output: 1 for a mean, the window for an integral."""
     return float(experiment.errors(experiment.set_point(experiment.grid_s)[np.newaxis] + 1.0)[0])
 
 

@@ -1,4 +1,4 @@
-"""From a campaign's frozen definition and its flights to the next gain set: a pure function."""
+"""Computes the next gain set from a campaign's frozen definition and its flights: a pure function."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,15 +30,16 @@ _ORIGIN = {
 
 
 def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flight | None = None) -> Proposal:
-    """The same definition and flights give the same proposal, bit for bit on one machine.
+    """Compute the next proposal. The same definition and flights give the same proposal, bit for bit on one machine.
 
-    `definition` must be free of problems (`app.core.checking`). Flights are the valid and aborted ones, in their order;
-    their trajectories count as stored, in single precision. Without a valid flight the start gains are proposed.
-    `donor` is the flight that `definition.start.donor` names; only with start kind `campaign`, and then needed.
+    `definition` must be free of problems (`app.core.checking`). `flights` are the valid and aborted ones, in order;
+    their trajectories are used as stored, in single precision. Without a valid flight the start gains are proposed.
+    `donor` is the flight named by `definition.start.donor`: required with start kind `campaign`, and not allowed with
+    others.
 
-    Every proposal that predicts an error has an interval and a band; without a model none predicts any. Under the stop
-    rule `noise` it may be a flight of the winner or of the first gains again, or kind `none`, once nothing is left to
-    be told from noise.
+    Every proposal that predicts an error has an interval and a band; without a model there is no prediction. Under the
+    stop rule `noise` the proposal may repeat the winner or the first gains, or be of kind `none` once no further step
+    can be distinguished from noise.
     """
     chosen = experiment_of(definition)
     space = chosen.space.narrowed(definition.bounds)
@@ -66,7 +67,7 @@ def _has_flown(flights: Sequence[Flight]) -> bool:
 def _manual_proposal(
     definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """Without a model: the start gains, then the operator's own; nothing is predicted."""
+    """Without a model: propose the start gains, then the operator's own; nothing is predicted."""
     if _has_flown(flights):
         proposal = by_hand(definition, experiment, space, flights)
         return _confirmed(definition, experiment, space, flights, proposal)
@@ -109,8 +110,11 @@ def _start(
 def _confirmed(
     definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], proposal: Proposal
 ) -> Proposal:
-    """The strategy's proposal; under the rule `noise` only where a step is still worth a flight, else the flight that
-    the noise asks for, and nothing more where the gate refuses that one."""
+    """Apply the stop rule `noise` to the strategy's proposal.
+
+    The proposal is kept if a step is still worth a flight. Otherwise it is replaced by the flight that the confirmation
+    requires, or by kind `none` if the gate refuses that flight.
+    """
     now = standing_within_bounds(definition, experiment, flights) if definition.stop.kind == "noise" else None
     if now is None:
         return proposal

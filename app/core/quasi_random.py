@@ -1,4 +1,4 @@
-"""Points that fill a box evenly, the same every time."""
+"""Deterministic points that fill a box evenly."""
 
 from itertools import count as numbers_from
 from itertools import islice
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 def halton(dimensions: int, count: int) -> NDArray[np.float64]:
     """The first points of the Halton sequence in the unit cube, shape (count, dimensions).
 
-    Coordinate d of point i holds the digits of i in base p, the d-th prime, in reverse order behind the point (Halton,
-    1960). The same numbers as `scipy.stats.qmc.Halton(dimensions, scramble=False)`, whose package takes longer to
-    import than a proposal takes to compute.
+    Coordinate d of point i is the radical inverse of i in base p, the d-th prime: its digits reversed behind the point
+    (Halton, 1960). The same numbers as `scipy.stats.qmc.Halton(dimensions, scramble=False)`, a package that takes
+    longer to import than a proposal takes to compute.
     """
     points = np.zeros((count, dimensions))
     for dimension, base in enumerate(_primes(dimensions)):

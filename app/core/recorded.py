@@ -1,4 +1,4 @@
-"""What was recorded of a flight, where the model has its own."""
+"""Recorded outputs, resampled to the model's time grid."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from app.core.trajectory import Samples
 
 
 def resample_to_grid(experiment: Experiment, flight: Flight) -> Samples:
-    """The flight's scored output at the instants of a model run, taken as the database keeps it.
+    """The flight's scored output on the grid of a model run, from the trajectory as stored.
 
-    Beyond the flight's samples its nearest one holds.
+    Outside the recorded time, the nearest sample holds.
     """
     measured = flight.trajectory.as_stored()
     return np.interp(experiment.grid_s, measured.time_s, measured[experiment.output])

@@ -1,4 +1,4 @@
-"""What is known of a model's parameters: the likely values, and how far the truth may lie from them."""
+"""Probability distribution of a model's parameters."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -8,33 +8,36 @@ import numpy as np
 from app.core.policy import Vector
 from app.core.quasi_random import halton
 
-if TYPE_CHECKING:  # experiments tell their hazards over a spread
+if TYPE_CHECKING:  # experiments compute their hazards over a distribution
     from app.core.experiments.base import Experiment, Matrix, ModelledExperiment
 
 WIDEST_SD: Final = 2.0
-"""Samples stay within so many standard deviations of the mean."""
+"""Truncation of the samples, in standard deviations from the mean."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterDistribution:
-    """A normal distribution over the model's parameters, in the order of `model_parameters`, cut off at two standard
-    deviations along its principal axes and at the parameters' own limits. `origin` says where it comes from."""
+    """A normal distribution over the model's parameters, in the order of `model_parameters`.
+
+    Truncated at two standard deviations along its principal axes, and at the parameters' own limits. `origin` names its
+    source.
+    """
 
     mean: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
     origin: str
 
     def sample(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
-        """The mean, then `count` − 1 quasi-random models, shape (count, m); the same every time."""
+        """The mean, then `count` − 1 quasi-random models, shape (count, m); deterministic."""
         unit = halton(len(self.mean), count)[1:]
         return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
 
     def draw_random(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
-        """Random models of the same distribution, shape (count, m)."""
+        """Random models from the same distribution, shape (count, m)."""
         return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
 
     def _models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
-        """Models from numbers evenly spread over 0 … 1, shape (k, m)."""
+        """Models from uniformly distributed numbers in 0 … 1, shape (k, m)."""
         from scipy.special import ndtri
 
         variances, axes = np.linalg.eigh(np.array(self.covariance))
@@ -53,8 +56,8 @@ NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="not
 
 
 def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
-    """What the data sheet leaves open: each parameter within `known_within` of its nominal value. Nothing is known
-    without a model."""
+    """Distribution given by the data sheet: each parameter within `known_within` of its nominal value; empty without a
+    model."""
     modelled = experiment.modelled
     if modelled is None:
         return NO_PARAMETERS

@@ -7,8 +7,8 @@ from app.core.strategies.simplex import model_optimum
 
 
 def start_gains(definition: Definition, experiment: Experiment, space: PolicySpace) -> dict[str, float]:
-    """The experiment's default gains, those of the definition (given, or the best of another campaign), or the nominal
-    model's optimum searched from the default, where there is a model."""
+    """The experiment's default gains, the gains in the definition (given, or the best of another campaign), or the
+    optimum of the nominal model searched from the default, if there is a model."""
     modelled = experiment.modelled
     if definition.start.gains is not None:
         return space.check(definition.start.gains, field="start.gains")

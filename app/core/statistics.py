@@ -1,16 +1,16 @@
-"""What repeated flights say: means with standard errors, comparisons that own up to the scatter, drift, trends.
+"""Statistics of repeated flights: means with standard errors, comparisons, drift, trends.
 
-Errors of one policy are taken as normal around its true error with a scatter σ that all policies share. σ² has the
-experiment's prior scatter s₀ worth ν₀ degrees of freedom (a scaled inverse χ², Gelman et al., Bayesian Data Analysis,
-3rd ed., sections 2.6 and 3.3), so that with the repeats of all groups
+The errors of one policy are assumed normal around its true error, with a scatter σ common to all policies. The
+experiment's prior scatter s₀ counts as ν₀ degrees of freedom (a scaled inverse χ², Gelman et al., Bayesian Data
+Analysis, 3rd ed., sections 2.6 and 3.3). With the repeats of all groups
 
     σ̂² = (ν₀ s₀² + Σ (e − ē)²) / ν,    ν = ν₀ + Σ (n − 1),
 
 and the difference of two means is t-distributed with ν degrees of freedom around the observed one, with the standard
-error σ̂ √(1/n₁ + 1/n₂): the pooled t test where ν₀ = 0.
+error σ̂ √(1/n₁ + 1/n₂): the pooled t test if ν₀ = 0.
 
-A prior that was not measured on such a vehicle does not enter: σ̂ is then that of the repeats alone, and without any the
-scatter is not known yet, so that no difference is told from noise.
+A prior that was not measured on such a vehicle is left out: σ̂ is then estimated from the repeats alone. Without
+repeats the scatter is not known yet, and no difference can be distinguished from noise.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Gains, Vector
 
 Verdict = Literal["better", "worse", "unresolved", "not known yet"]
-"""`unresolved`: the flights could not tell; `not known yet`: nobody knows how much they scatter."""
+"""`unresolved`: the flights do not decide the comparison; `not known yet`: the scatter is unknown."""
 
 MAX_FURTHER_FLIGHTS: Final = 100
 _OPTIMISM_POINTS: Final = 2001
@@ -35,15 +35,17 @@ _OPTIMISM_REACH: Final = 8.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledScatter:
-    """The flight-to-flight scatter: a standard deviation in the error's unit, and how well it is known. One that is not
-    `known` is an order of magnitude: good enough to rank by, and told to nobody."""
+    """Flight-to-flight scatter: a standard deviation in the error's unit, and its degrees of freedom.
+
+    A scatter that is not `known` is an order of magnitude: it may be used to rank policies, but is never reported.
+    """
 
     sigma: float
     degrees_of_freedom: float
     known: bool = True
 
     def half_width(self, variance: float, confidence: float) -> float:
-        """Half of the two-sided interval of a number whose variance is `variance`·σ²."""
+        """Half width of the two-sided interval of a quantity with variance `variance`·σ²."""
         from scipy.special import stdtrit
 
         return float(stdtrit(self.degrees_of_freedom, 0.5 + confidence / 2)) * self.sigma * float(np.sqrt(variance))
@@ -51,7 +53,7 @@ class PooledScatter:
 
 @dataclass(frozen=True)
 class Group:
-    """The valid flights of one policy, in their order."""
+    """The valid flights of one policy, in order."""
 
     gains: Gains
     numbers: tuple[int, ...]
@@ -76,13 +78,13 @@ class Group:
         return scatter.sigma / sqrt(self.size)
 
     def known_error(self, scatter: PooledScatter) -> float | None:
-        """The same; None while the scatter is not known."""
+        """The standard error; None while the scatter is not known."""
         return self.standard_error(scatter) if scatter.known else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightsToDecide:
-    """Further flights of each of two policies after which the difference, if it stays, is no longer unresolved."""
+    """Further flights of each of two policies that decide the comparison, if the difference stays the same."""
 
     first: int
     second: int
@@ -94,12 +96,12 @@ class FlightsToDecide:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Whether the first of two policies is better (its error lower) than the second.
+    """Whether the first of two policies is better (has a lower error) than the second.
 
-    `difference` is first − second. `confidence` is that of the likelier of the two directions, with the allowance for
-    having chosen and for having looked before; `further` is None for a decided comparison, and for one that
-    100 flights would not decide, or where nobody asked. While the scatter is not known there is neither confidence nor
-    standard error, and every further flight of gains flown before makes it known.
+    `difference` is first − second. `confidence` is that of the likelier direction, corrected for the choice among
+    policies and for earlier comparisons. `further` is None for a decided comparison, for one that 100 flights would not
+    decide, and if it was not requested. While the scatter is not known, there is neither a confidence nor a standard
+    error; any repeat of gains already flown makes it known.
     """
 
     verdict: Verdict
@@ -111,7 +113,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """The last flight of a policy against its first: `confidence` that the error has changed at all."""
+    """The last flight of a policy compared with its first: `confidence` that the error has changed at all."""
 
     first_number: int
     last_number: int
@@ -122,7 +124,7 @@ class Drift:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trend:
-    """error = level + slope·x, least squares; `lower` … `upper` is the slope's interval with `confidence`."""
+    """A least squares line, error = level + slope·x; `lower` … `upper` is the slope's interval with `confidence`."""
 
     slope: float
     standard_error: float
@@ -132,12 +134,12 @@ class Trend:
 
     @property
     def is_resolved(self) -> bool:
-        """Whether the interval leaves out zero."""
+        """Whether the interval excludes zero."""
         return self.lower > 0.0 or self.upper < 0.0
 
 
 def groups_of(flights: Sequence[Flight]) -> tuple[Group, ...]:
-    """The valid flights by their gains, in the order of each policy's first flight."""
+    """Group the valid flights by their gains, in the order of each policy's first flight."""
     found: dict[tuple[tuple[str, float], ...], list[Flight]] = {}
     for flight in flights:
         if flight.outcome == "valid" and flight.error is not None:
@@ -153,7 +155,7 @@ def groups_of(flights: Sequence[Flight]) -> tuple[Group, ...]:
 
 
 def pool_scatter(groups: Sequence[Group], prior: Scatter) -> PooledScatter:
-    """σ̂ and ν as above. `prior.degrees_of_freedom` must be above zero, or a policy have been repeated."""
+    """σ̂ and ν as above. Either `prior.degrees_of_freedom` must be above zero or a policy must have been repeated."""
     repeats = sum(group.size - 1 for group in groups)
     if not prior.measured and not repeats:
         return PooledScatter(sigma=prior.sd, degrees_of_freedom=prior.degrees_of_freedom, known=False)
@@ -164,8 +166,11 @@ def pool_scatter(groups: Sequence[Group], prior: Scatter) -> PooledScatter:
 
 
 def select_winner(groups: Sequence[Group], scatter: PooledScatter) -> Group:
-    """The policy with the lowest mean plus one standard error, the earliest of equals: a single lucky flight does not
-    overtake a policy that has shown the same twice. There must be a group."""
+    """The policy with the lowest mean plus one standard error, the earliest of equals.
+
+    A single lucky flight thus does not overtake a policy that has repeated the same error. There must be at least one
+    group.
+    """
     return min(groups, key=lambda group: (group.mean + group.standard_error(scatter), group.numbers[0]))
 
 
@@ -179,13 +184,13 @@ def compare(
     looks: int = 0,
     foresee: bool = True,
 ) -> Comparison:
-    """Judge the difference of two means by Student's t.
+    """Compare two means by Student's t test.
 
-    `candidates`: among how many policies `first` was chosen for its low error; the chance of a mistake counts that many
-    times (Bonferroni), so that the best of N gets no credit for having been chosen. `looks`: at the k-th of several
-    looks at growing data the chance of a mistake counts k(k + 1) times; as Σ 1/(k(k + 1)) = 1, however often one looks
-    the chance of ever being misled stays below 1 − confidence. `foresee`: say too how many `further` flights would
-    decide, which takes most of the time.
+    `candidates` is the number of policies from which `first` was chosen for its low error; the error probability is
+    multiplied by it (Bonferroni), so that the best of N gets no credit for having been chosen. `looks` is the number of
+    comparisons of growing data so far; at the k-th the error probability is multiplied by k(k + 1). As Σ 1/(k(k + 1)) =
+    1, the probability of ever reaching a wrong verdict stays below 1 − confidence. `foresee` also computes how many
+    `further` flights would decide, which takes most of the time.
     """
     allowance = candidates * max(looks * (looks + 1), 1)
     difference = first.mean - second.mean
@@ -207,11 +212,11 @@ def compare(
 
 
 def optimism(means: Sequence[float], standard_errors: Sequence[float]) -> float:
-    """By how much the best of several noisy means is expected to look better than it is: E[true − observed] of the
-    lowest, were the observed means the true ones and were they observed again with these (positive) standard errors.
+    """Expected selection bias of the best of several noisy means.
 
-    For N equal means it is the expected minimum of N normal errors, 0.56 σ for two and 1.16 σ for five; means far above
-    the lowest add nothing. Numerical integral, to 1e-6 of the largest standard error.
+    E[true − observed] of the lowest, if the observed means were the true ones and were observed again with these
+    (positive) standard errors. For N equal means it is the expected minimum of N normal errors, 0.56 σ for two and 1.16
+    σ for five; means far above the lowest add nothing. Numerical integral, to 1e-6 of the largest standard error.
     """
     from scipy.integrate import trapezoid
     from scipy.special import ndtr
@@ -230,7 +235,8 @@ def optimism(means: Sequence[float], standard_errors: Sequence[float]) -> float:
 
 
 def _products_of_others(factors: Matrix) -> Matrix:
-    """Row i holds the product of all rows of `factors` but the i-th, both (n, k); no division, for some are 0."""
+    """Row i holds the product of all rows of `factors` except the i-th, both (n, k); without division, because some are
+    0."""
     before, after = np.ones_like(factors), np.ones_like(factors)
     np.cumprod(factors[:-1], axis=0, out=before[1:])
     np.cumprod(factors[:0:-1], axis=0, out=after[-2::-1])
@@ -238,7 +244,7 @@ def _products_of_others(factors: Matrix) -> Matrix:
 
 
 def drift_of(group: Group, scatter: PooledScatter) -> Drift | None:
-    """The last against the first flight of a policy; None unless it was repeated. Two-sided."""
+    """Compare the last with the first flight of a policy, two-sided; None unless it was repeated."""
     if group.size < 2:
         return None
     difference = group.errors[-1] - group.errors[0]
@@ -252,8 +258,11 @@ def drift_of(group: Group, scatter: PooledScatter) -> Drift | None:
 
 
 def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.9) -> Trend | None:
-    """Least squares line through at least three points with the t interval of its slope, n − 2 degrees of freedom (the
-    paper's Fig. 12: error against battery voltage). None when there are fewer, or x does not vary."""
+    """Least squares line through at least three points, with the t interval of its slope, n − 2 degrees of freedom (the
+    paper's Fig. 12: error against battery voltage).
+
+    None if there are fewer points, or x does not vary.
+    """
     from scipy.special import stdtrit
 
     along, measured = np.array(x, dtype=np.float64), np.array(errors, dtype=np.float64)
@@ -272,8 +281,11 @@ def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.
 
 
 def smallest_difference(scatter: PooledScatter, flown: int, left: int, confidence: float) -> float:
-    """The least difference that `left` flights, split at best between a policy flown `flown` times already and a new
-    one, tell from noise with `confidence`. Infinite without a flight left."""
+    """Smallest difference that `left` flights can distinguish from noise with `confidence`.
+
+    The flights are split optimally between a policy flown `flown` times already and a new one. Infinite without a
+    flight left.
+    """
     from scipy.special import stdtrit
 
     freedom = scatter.degrees_of_freedom + max(left - 1, 0)
@@ -286,7 +298,7 @@ def _standard_error(scatter: PooledScatter, sizes: tuple[int, int]) -> float:
 
 
 def _certainty(difference: float, scatter: PooledScatter, sizes: tuple[int, int], allowance: float) -> float:
-    """1 − allowance·P(t ≥ |difference|/standard error), not below zero."""
+    """1 − allowance·P(t ≥ |difference|/standard error), at least zero."""
     from scipy.special import stdtr
 
     standard_error = _standard_error(scatter, sizes)
@@ -299,7 +311,8 @@ def _certainty(difference: float, scatter: PooledScatter, sizes: tuple[int, int]
 def _further(
     first: Group, second: Group, scatter: PooledScatter, confidence: float, candidates: int, looks: int
 ) -> FlightsToDecide | None:
-    """Always the policy with fewer flights next, the first of equals, until the same difference would decide."""
+    """Add flights, always to the policy with fewer (the first of equals), until the same difference would be
+    decided."""
     sizes = [first.size, second.size]
     for count in range(1, MAX_FURTHER_FLIGHTS + 1):
         sizes[0 if sizes[0] <= sizes[1] else 1] += 1

@@ -1,4 +1,4 @@
-"""When a campaign ends by itself."""
+"""Stop rules: when a campaign ends automatically."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,8 +16,11 @@ FAILURES_ALLOWED: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopVerdict:
-    """Whether to stop and why. `why` is a sentence in both cases; `failures` counts the scored flights in a row, up to
-    the last, without enough improvement; `threshold` is the error the next flight must stay below to count as one."""
+    """Whether to stop, and why.
+
+    `why` is a sentence in both cases. `failures` counts the scored flights in a row, up to the last, without enough
+    improvement; `threshold` is the error that the next flight must stay below to count as an improvement.
+    """
 
     stop: bool
     reason: Reason | None
@@ -29,9 +32,9 @@ class StopVerdict:
 def evaluate_stop_rule(
     definition: Definition, flights: Sequence[Flight], proposal: Proposal, *, battery_v: float | None = None
 ) -> StopVerdict:
-    """The campaign's own rule on its flights and on the proposal computed from them.
+    """Apply the campaign's stop rule to its flights and the proposal computed from them.
 
-    `battery_v` is the voltage, V, at which the last flight ended, whatever that flight is worth: a low battery is low.
+    `battery_v` is the voltage, V, at which the last flight ended, whether or not that flight counts.
     """
     return decide_stop(
         definition.stop,
@@ -43,12 +46,12 @@ def evaluate_stop_rule(
 
 
 def landing_battery_v(record: Trajectory) -> float | None:
-    """The battery's voltage at the end of a flight, V; None where it was not recorded."""
+    """Battery voltage at the end of a flight, V; None if not recorded."""
     return _battery_v(record, -1)
 
 
 def starting_battery_v(record: Trajectory) -> float | None:
-    """The battery's voltage at the start of a flight, V; None where it was not recorded."""
+    """Battery voltage at the start of a flight, V; None if not recorded."""
     return _battery_v(record, 0)
 
 
@@ -65,13 +68,16 @@ def decide_stop(
     battery_v: float | None = None,
     because: str = "",
 ) -> StopVerdict:
-    """Judge the flights so far, in their order; None stands for a flight without an error (aborted): it uses up
-    budget, and says nothing about improvement. `battery_v` is the voltage at which the last one ended.
+    """Apply a stop rule to the errors of the flights so far, in order.
 
-    The paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the best so
-    far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error improves on
-    nothing and fails nothing. `noise` never stops on errors: the proposals do the flying that decides, and kind `none`
-    ends it, `because` of what its explanation says. `budget` counts flights only.
+    None stands for a flight without an error (aborted): it counts towards the budget, but not as an improvement or a
+    failure. `battery_v` is the voltage at which the last flight ended.
+
+    `paper` is the paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the
+    best so far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error is
+    neither an improvement on anything nor a failure. `noise` never stops on errors: the proposals schedule the flights
+    that decide, and kind `none` ends the campaign, with `because` (its explanation) as the reason. `budget` counts
+    flights only.
     """
     best: float | None = None
     failures = 0

@@ -1,5 +1,8 @@
-"""Fewer samples that look the same: of a record so many that keep its peaks and its shape (MinMaxLTTB, Van Der Donckt
-et al., 2023), of a smooth curve those at which it bends (Ramer, 1972; Douglas and Peucker, 1973)."""
+"""Reduction of samples for plotting.
+
+Records keep their peaks and shape (MinMaxLTTB, Van Der Donckt et al., 2023); smooth curves keep the samples at which
+they bend (Ramer, 1972; Douglas and Peucker, 1973).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,7 @@ Indices = NDArray[np.uint64]
 
 
 def select_samples(time_s: Samples, values: Samples, points: int) -> Indices:
-    """Indices of at most `points` samples, shape (k,), in their order, the first and the last among them."""
+    """Indices of at most `points` samples, shape (k,), in order, including the first and the last."""
     if len(time_s) <= points:
         return np.arange(len(time_s), dtype=np.uint64)
     from tsdownsample import MinMaxLTTBDownsampler
@@ -21,8 +24,10 @@ def select_samples(time_s: Samples, values: Samples, points: int) -> Indices:
 
 
 def select_bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
-    """Indices of samples, shape (k,), in their order, whose polyline passes every other sample within `tolerance`, in
-    the unit of the values; the first and the last among them. The times ascend."""
+    """Indices of samples, shape (k,), in order, whose polyline passes every other sample within `tolerance`.
+
+    `tolerance` is in the unit of the values. The first and the last sample are included. The times must increase.
+    """
     if len(time_s) < 3:
         return np.arange(len(time_s), dtype=np.uint64)
     needed = {0, len(time_s) - 1}

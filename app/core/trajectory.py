@@ -1,4 +1,4 @@
-"""Trajectories: what a flight or a model run leaves behind."""
+"""Trajectories: the samples of a flight or a model run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -36,18 +36,19 @@ CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
         "elevator_rad": "rad",
     }
 )
-"""Known channels. Thrust and its two parts are shares of full command (the autopilot's 9600 counts).
-Those of an aircraft in flight (angle of attack, altitude and speed change, pitch, thrust change, elevator) are
-deviations from its trimmed flight."""
+"""Known channels and their units.
+
+Thrust and its two parts are shares of full command (the autopilot's 9600 counts). Those of an aircraft in flight (angle
+of attack, altitude and speed change, pitch, thrust change, elevator) are deviations from trimmed flight.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
     """Samples of one flight, altitude up, time in seconds since the command (earlier samples are negative).
 
-    `time_s` has shape (n,) and rises strictly; every channel has shape (n,).
-    `source` says what measured it (`jsbsim`, `twin`, `csv`, …), `clock` whose time it carries
-    (`simulation`, `vehicle`, `ground`).
+    `time_s` has shape (n,) and increases strictly; every channel has shape (n,). `source` names what measured it
+    (`jsbsim`, `twin`, `csv`, …), `clock` the origin of the time stamps (`simulation`, `vehicle`, `ground`).
     """
 
     time_s: Samples
@@ -62,7 +63,7 @@ class Trajectory:
         return len(self.time_s)
 
     def as_stored(self) -> "Trajectory":
-        """The trajectory as the database gives it back: every number rounded to single precision."""
+        """The trajectory as the database returns it: every number rounded to single precision."""
         return Trajectory(
             _single(self.time_s),
             {name: _single(values) for name, values in self.channels.items()},

@@ -1,13 +1,14 @@
-"""Warm start: what another vehicle's campaign is worth to this one.
+"""Warm start: transfer of another vehicle's campaign to this one.
 
-Vehicle A's best gains are flown first. Both flights then have a bias, b(t) = measured(t) − nominal model(t; flown
-gains). What A knows is worth something where A's bias explains B's, with as much of the difference as repeated flights
-of one vehicle show put down to scatter:
+The best gains of vehicle A are flown first on vehicle B. Each of the two flights then has a bias, b(t) = measured(t) −
+nominal model(t; flown gains). A's model is useful if A's bias explains B's, apart from the scatter found between
+repeated flights of one vehicle:
 
-    agreement = 1 − max(⟨(b_B − b_A)²⟩ − 2 s², 0) / ⟨b_B²⟩,  held within 0 … 1,
+    agreement = 1 − max(⟨(b_B − b_A)²⟩ − 2 s², 0) / ⟨b_B²⟩,  limited to 0 … 1,
 
-⟨·⟩ being the mean over the window and s the scatter as an offset of the output. From one half on A's fitted model takes
-the data sheet's place, the wider the less the two agree, and the first step is shortened to that share.
+where ⟨·⟩ is the mean over the window and s the scatter as an offset of the output. From an agreement of one half on,
+A's fitted model replaces the data sheet, with standard deviations that grow as the agreement falls, and the first step
+is shortened to that share.
 """
 
 from collections.abc import Sequence
@@ -33,8 +34,11 @@ _TAKEN: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transfer:
-    """`agreement` is None until this vehicle has flown; `experiment` and `step_fraction` are what a strategy is to work
-    with."""
+    """Result of a transfer.
+
+    `agreement` is None until this vehicle has flown; `experiment` and `step_fraction` are those the strategy has to
+    use.
+    """
 
     experiment: ModelledExperiment
     step_fraction: float
@@ -45,7 +49,8 @@ class Transfer:
 def transfer(
     definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight
 ) -> Transfer:
-    """Judged by the first valid flight, for the whole campaign; the step is shortened for the flight after it only."""
+    """Compute the transfer from the first valid flight, for the whole campaign; only the step after that flight is
+    shortened."""
     valid = [flight for flight in flights if flight.outcome == "valid"]
     plain = Transfer(experiment=experiment, step_fraction=definition.step_fraction, agreement=None, sentence="")
     if not valid:
@@ -80,8 +85,10 @@ def _agreement(experiment: ModelledExperiment, donor: Flight, own: Flight) -> tu
 
 
 def _informed(experiment: ModelledExperiment, donor: Flight, agreed: float) -> ModelledExperiment:
-    """The donor's fit as the nominal model, each standard deviation widened by what the two vehicles disagree in; the
-    experiment itself where no fit is made."""
+    """The donor's fit as the nominal model, each standard deviation widened by the disagreement of the two vehicles.
+
+    The experiment itself if there is no calibration for it.
+    """
     if experiment.name not in calibration.EXPERIMENTS:
         return experiment
     fitted = calibration.calibrate(experiment, (donor,))

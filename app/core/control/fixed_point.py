@@ -1,4 +1,4 @@
-"""Integer arithmetic of a 32-bit autopilot, the same compiled and interpreted."""
+"""Integer arithmetic of a 32-bit autopilot, identical in compiled and interpreted code."""
 
 import math
 from typing import Final
@@ -17,23 +17,24 @@ def wrap32(value: int) -> int:
 
 @kernel
 def divide(dividend: int, divisor: int) -> int:
-    """Quotient truncated toward zero, as C divides. Exact for 32-bit operands, whose quotients a double can tell apart
-    (two different ones lie at least 2⁻³¹ of their size apart, a double resolves 2⁻⁵³)."""
+    """Quotient truncated toward zero, as in C. Exact for 32-bit operands, because a double resolves their quotients
+    (two different ones differ by at least 2⁻³¹ of their size, a double resolves 2⁻⁵³)."""
     return int(dividend / divisor)
 
 
 @kernel
 def limit(value: int, low: int, high: int) -> int:
-    """`value`, held within `low` … `high`."""
+    """`value` limited to `low` … `high`."""
     return low if value < low else min(value, high)
 
 
 def fix(value: float, fraction_bits: int) -> int:
-    """`value`·2ⁿ truncated toward zero: how a constant enters the loop. Not for kernels: it is called on import."""
+    """`value`·2ⁿ truncated toward zero, as the firmware converts constants. Not for use in kernels: it is called on
+    import."""
     return int(value * (1 << fraction_bits))
 
 
 @kernel
 def measured(value: float, fraction_bits: int) -> int:
-    """`value`·2ⁿ to the nearest integer: how a continuous quantity enters the loop without a bias."""
+    """`value`·2ⁿ rounded to the nearest integer: converts a continuous quantity for the loop without a bias."""
     return math.floor(value * (1 << fraction_bits) + 0.5)

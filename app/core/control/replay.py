@@ -1,4 +1,4 @@
-"""Replaying a recorded run of the autopilot's vertical loop through the replica."""
+"""Replay of a recorded run of the autopilot's vertical loop through the replica."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ OUTPUTS: Final = ("z_ref", "zd_ref", "zdd_ref", "z_sum_err", "ff_cmd", "fb_cmd",
 
 @dataclass(frozen=True, slots=True)
 class LoopTrace:
-    """What went into the loop and what came out, one row a step, all 32-bit integers.
+    """Recorded inputs and outputs of the loop, one row per step, all 32-bit integers.
 
     `inputs` has shape (n, 9) in the order of `INPUTS`, modes as in `vertical_loop.MODES`; `outputs` has shape (n, 7) in
     the order of `OUTPUTS`; n ≥ 1.
@@ -30,7 +30,8 @@ class LoopTrace:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """How far the replica is from a trace: rows replayed, and the largest |difference| of each output column."""
+    """Result of comparing the replica with a trace: rows replayed, and the largest |difference| of each output
+    column."""
 
     rows: int
     largest_difference: Mapping[str, int]
@@ -42,7 +43,7 @@ class Replay:
 
 
 def replayed(trace: LoopTrace) -> NDArray[np.int64]:
-    """The replica's own outputs, shape (n, 7): started at the first row's z and zd, stepped once per row."""
+    """The replica's own outputs, shape (n, 7), started at the first row's z and zd and stepped once per row."""
     loop = VerticalLoop()
     computed = np.empty_like(trace.outputs)
     rows = trace.inputs.tolist()
@@ -59,7 +60,7 @@ def replay_trace(trace: LoopTrace) -> Replay:
 
 
 def compared(trace: LoopTrace, computed: NDArray[np.int64]) -> Replay:
-    """How far `computed`, shape (n, 7), is from what the trace recorded."""
+    """Compare `computed`, shape (n, 7), with the recorded outputs."""
     difference = np.abs(computed - trace.outputs)
     different = np.flatnonzero(difference.any(axis=1))
     return Replay(

@@ -1,9 +1,9 @@
-"""Paparazzi's rotorcraft vertical guidance of mid-2015, integer for integer.
+"""Paparazzi's rotorcraft vertical guidance of mid-2015, replicated integer for integer.
 
-One step is taken 512 times a second. z points down; fractions are binary: positions 8 bits, speeds 19, accelerations
-10, the cosine of the tilt (r33) 14. Every operation is 32-bit two's complement and wraps; only the reference altitude
-is 64-bit. `step` is the kernel, on a state array that compiled rollouts own; `VerticalLoop` is the same loop for
-callers in Python.
+The loop runs at 512 Hz. z points down; fractions are binary: positions 8 bits, speeds 19, accelerations 10, the cosine
+of the tilt (r33) 14. Every operation is 32-bit two's complement and wraps; only the reference altitude is 64-bit.
+`step` is the kernel, on a state array that compiled rollouts own; `VerticalLoop` is the same loop for callers in
+Python.
 """
 
 from typing import Final
@@ -44,14 +44,14 @@ _TAU_INVERSE: Final = fix(4.0, 16)
 _WEIGHT: Final = fix(_GRAVITY, 18)
 _INVERSE_MASS: Final = fix(_GRAVITY / (float(np.float32(NOMINAL_HOVER_THROTTLE)) * FULL_THRUST), 18)
 _CLIMB_LEASH: Final = fix(2.0, 26)
-_R33_MIN: Final = fix(30.0 * np.pi / 180.0, R33_BITS)  # the firmware limits a cosine by an angle; so does the replica
+_R33_MIN: Final = fix(30.0 * np.pi / 180.0, R33_BITS)  # an angle as limit of a cosine, as in the firmware
 _FEED_FORWARD_MAX: Final = 8640
 
 POSITION_ERROR_MAX: Final = fix(10.0, POSITION_BITS)
 SPEED_ERROR_MAX: Final = fix(10.0, SPEED_BITS)
 ERROR_SUM_MAX: Final = 2_000_000
 
-# Places in the state array.
+# Indices in the state array.
 P: Final = 0
 V: Final = 1
 A: Final = 2
@@ -83,9 +83,9 @@ def start(state: State, z: int, zd: int) -> None:
 
 @kernel
 def detect_flight(state: State, thrust: int) -> bool:
-    """Whether the vehicle counts as flying, to be asked once before each step with the thrust of the step before.
+    """Whether the vehicle counts as flying; call once before each step, with the thrust of the previous step.
 
-    True for good once the thrust has been above 500 in 20 consecutive checks made at 20 Hz.
+    Latches once the thrust has been above 500 in 20 consecutive checks made at 20 Hz.
     """
     if state[CHECKS_PASSED] < _CHECKS_NEEDED:
         if state[CHECK_PHASE] >= RATE_HZ:
@@ -118,14 +118,14 @@ def _advance_reference(state: State, mode: int, target: int, z: int) -> None:
 
 @kernel
 def feed_forward(zdd_ref: int, r33: int) -> int:
-    """The thrust that the reference acceleration takes at this tilt, 0 … 8640."""
+    """Thrust for the reference acceleration at this tilt, 0 … 8640."""
     force = divide(wrap32(_WEIGHT - wrap32(zdd_ref << 8)), _INVERSE_MASS)
     return limit(divide(wrap32(force << R33_BITS), max(r33, _R33_MIN)), 0, _FEED_FORWARD_MAX)
 
 
 @kernel
 def _feedback(state: State, kp: int, ki: int, kd: int, ez: int, ev: int) -> int:
-    """PID on limited errors; each product wraps at 32 bits, and the largest one before wrapping is remembered."""
+    """PID on limited errors; each product wraps at 32 bits, and the largest one before wrapping is stored."""
     proportional = -kp * ez
     damping = -kd * ev
     integral = -ki * state[Z_SUM_ERR]
@@ -170,13 +170,13 @@ class VerticalLoop:
         self._thrust = 0
 
     def detect_flight(self) -> bool:
-        """Whether the vehicle counts as flying; to be asked exactly once before each step."""
+        """Whether the vehicle counts as flying; call exactly once before each step."""
         return detect_flight(self._state, self._thrust)
 
     def step(
         self, mode: int, target: int, kp: int, ki: int, kd: int, z: int, zd: int, r33: int, in_flight: bool
     ) -> int:
-        """One step of 1/512 s in one of `MODES`; returns the thrust command, 0 … 9600."""
+        """Take one step of 1/512 s in one of `MODES`; returns the thrust command, 0 … 9600."""
         self._thrust = step(self._state, mode, target, kp, ki, kd, z, zd, r33, in_flight)
         return self._thrust
 

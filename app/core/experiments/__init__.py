@@ -1,4 +1,4 @@
-"""The experiments there are."""
+"""Registry of experiments."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -17,7 +17,7 @@ EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType({experiment.name
 
 
 def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) -> Experiment:
-    """The experiment with its settings, which must be free of problems. Raises InputError for an unknown name."""
+    """Return an experiment with its settings, which must be free of problems. Raises InputError for an unknown name."""
     if name not in EXPERIMENTS:
         raise InputError(
             "There is no such experiment.",
@@ -28,5 +28,5 @@ def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) 
 
 
 def experiment_of(definition: Definition) -> Experiment:
-    """The experiment of a definition, as it is configured there."""
+    """Return the experiment of a definition, configured as defined there."""
     return get_experiment(definition.experiment, definition.experiment_options)

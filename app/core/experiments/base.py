@@ -1,4 +1,5 @@
-"""What an experiment offers to strategies, figures and pages. A new one is one file and one line in the registry."""
+"""Interface of an experiment for strategies, figures and pages. A new one needs one file and one line in the
+registry."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,11 +20,12 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ModelParameter:
-    """One number of the simple model that a fit may move: its nominal value, and the standard deviation of the truth
-    around it, as a fit takes it; `known_within` is how far the gate lets it be off before a flight has shown more.
+    """One parameter of the simple model that a fit may change.
 
-    `expected` is where a fit takes the truth to lie, where the data sheet's figure is the edge of what is possible (no
-    motor is without lag); `flight_sd` how much it differs from one flight to the next.
+    `nominal` is its value in the nominal model, `prior_sd` the prior standard deviation in a fit; `known_within` is the
+    error that the gate allows for until flights have shown more. `expected` is the prior mean of a fit where it differs
+    from the nominal value, because the data sheet gives the edge of the possible range (no motor has zero lag).
+    `flight_sd` is the standard deviation between flights.
     """
 
     name: str
@@ -44,8 +46,7 @@ class ModelParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedParameter:
-    """A number of the model as the flights have it, with its standard error; `nominal` and `prior_sd` are what was
-    known before them."""
+    """A fitted parameter with its standard error; `nominal` and `prior_sd` are its prior."""
 
     name: str
     title: str
@@ -59,7 +60,7 @@ class FittedParameter:
 def fitted_parameters(
     parameters: Sequence[ModelParameter], values: Vector, covariance: Matrix
 ) -> tuple[FittedParameter, ...]:
-    """Values of shape (m,) with their standard errors from a covariance (m, m), beside what was known before."""
+    """Values of shape (m,) with their standard errors from a covariance (m, m), together with their priors."""
     errors = np.sqrt(np.diag(covariance))
     return tuple(
         FittedParameter(
@@ -76,7 +77,7 @@ def fitted_parameters(
 
 
 def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: Vector) -> tuple[ModelParameter, ...]:
-    """The same parameters known better: `mean` and `sd`, shape (m,), take the place of the data sheet."""
+    """The parameters with `mean` and `sd`, shape (m,), in place of the data sheet's values."""
     return tuple(
         replace(
             parameter, nominal=float(value), prior_sd=float(spread), known_within=2.0 * float(spread), expected=None
@@ -87,9 +88,11 @@ def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """How much errors of repeated flights scatter, as known before any: a standard deviation in the error's unit, worth
-    as much as `degrees_of_freedom` repeats. One that is not `measured`, but taken over from another autopilot, gives an
-    order of magnitude and decides nothing."""
+    """Prior scatter of the errors of repeated flights: a standard deviation in the error's unit, counted as
+    `degrees_of_freedom` repeats.
+
+    If it is not `measured`, but taken from another autopilot, it gives an order of magnitude only and decides nothing.
+    """
 
     sd: float
     degrees_of_freedom: float
@@ -98,9 +101,12 @@ class Scatter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimplexSearch:
-    """How Nelder–Mead searches this experiment's model: the first step of a gain is `of_gain` of its value plus
-    `of_scale` of its scale plus `constant`; it ends after so many evaluations of the model, or iterations. Without
-    `bounded` the simplex may leave the bounds, and only the gains of each run are held inside."""
+    """Settings of the Nelder–Mead search on this experiment's model.
+
+    The first step of a gain is `of_gain` of its value plus `of_scale` of its scale plus `constant`. The search ends
+    after this many evaluations of the model, or iterations. Without `bounded` the simplex may leave the bounds, and
+    only the gains of each run are limited to them.
+    """
 
     of_gain: float = 0.0
     of_scale: float = 0.0
@@ -119,7 +125,7 @@ class Experiment(Protocol):
     def title(self) -> str: ...
     @property
     def options(self) -> tuple[Option, ...]:
-        """Settings of the experiment itself, of its model for instance."""
+        """Settings of the experiment itself, for example of its model."""
         ...
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
@@ -128,7 +134,7 @@ class Experiment(Protocol):
 
     @property
     def modelled(self) -> "ModelledExperiment | None":
-        """The same with its simple model; None where there is none, so that nothing can be foretold."""
+        """The same experiment with its simple model; None if there is none, and nothing can then be predicted."""
         ...
 
     @property
@@ -137,7 +143,7 @@ class Experiment(Protocol):
     def scatter(self) -> Scatter: ...
     @property
     def output(self) -> str:
-        """The channel that is scored, e.g. `altitude_m`."""
+        """The scored channel, e.g. `altitude_m`."""
         ...
 
     @property
@@ -149,11 +155,11 @@ class Experiment(Protocol):
     def error_unit(self) -> str: ...
     @property
     def grid_s(self) -> Samples:
-        """Shape (n,): the instants of a model run, from the command on."""
+        """Times of a model run from the command on, shape (n,)."""
         ...
 
     def set_point(self, time_s: Samples) -> Samples:
-        """What the output is scored against, shape of `time_s`; zero before the command."""
+        """Set point of the scored output, same shape as `time_s`; zero before the command."""
         ...
 
     def errors(self, outputs: Matrix) -> Vector:
@@ -161,9 +167,9 @@ class Experiment(Protocol):
         ...
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """Performance of a recorded flight on its own time stamps. Raises TrajectoryError when it cannot be scored.
+        """Performance of a recorded flight on its own time stamps. Raises TrajectoryError if it cannot be scored.
 
-        `accept_gaps`: somebody has looked at the gaps inside the record and counts the flight all the same.
+        `accept_gaps`: a person has reviewed the gaps in the record and counts the flight.
         """
         ...
 
@@ -172,42 +178,49 @@ class ModelledExperiment(Experiment, Protocol):
     """An experiment with a simple model of its vehicle."""
 
     def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model as its nominal one: both of shape (m,)."""
+        """The experiment with another vehicle's fitted model as its nominal one: mean and standard deviation, shape
+        (m,)."""
         ...
 
     @property
     def model_parameters(self) -> tuple[ModelParameter, ...]: ...
     @property
     def nominal_model(self) -> Vector:
-        """Shape (m,), in the order of `model_parameters`."""
+        """Nominal parameters, shape (m,), in the order of `model_parameters`."""
         ...
 
     @property
     def search(self) -> SimplexSearch: ...
     @property
     def difference(self) -> float:
-        """Step of the gradient's differences, as a share of each gain's scale."""
+        """Step of the finite differences of the gradient, as a share of each gain's scale."""
         ...
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
-        """One model run with every channel the model knows."""
+        """One model run with every channel of the model."""
         ...
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
-        """Scored output of many policies, each on its own model or all on one: gains (k, g), model (k, m) or (m,)
-        → (k, n) on `grid_s`, one compiled call."""
+        """Scored outputs of many policies in one compiled call, each on its own model or all on one.
+
+        gains (k, g), model (k, m) or (m,) → (k, n) on `grid_s`.
+        """
         ...
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
-        """What the state did in every recorded step beyond the model's step from the recorded state and command, in the
-        experiment's own layout for `disturbed_outputs`. None where the record does not hold what it takes."""
+        """Difference between each recorded step and the model's step from the same state and command.
+
+        In the experiment's own layout for `disturbed_outputs`. None if the record lacks the required channels.
+        """
         ...
 
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
-        """`outputs` of the model with these added to its state at the same instants, inside the control loop."""
+        """`outputs` with the disturbances added to the model's state at the same times, inside the control loop."""
         ...
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
-        """What could go wrong in a flight with these gains, inside the bounds or not, on vehicles as `spread` has them:
-        the checks of the gate that only the experiment can make. Pure; a tenth of a second at most."""
+        """Hazards of a flight with these gains, inside the bounds or not, on vehicles distributed as `spread`.
+
+        These are the gate's checks that are specific to the experiment. Pure; at most a tenth of a second.
+        """
         ...

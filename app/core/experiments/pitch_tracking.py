@@ -1,4 +1,5 @@
-"""The paper's F-16: tracking a sine in pitch for a minute on a model whose every number is off, scored by its error."""
+"""The paper's F-16 experiment: track a sine in pitch for a minute, on a model with errors in every element of A and
+B."""
 
 from collections.abc import Mapping
 from typing import Final, Self
@@ -49,7 +50,7 @@ DETAIL_CHANNELS: Final[Mapping[str, tuple[int, float]]] = {
     "thrust_change_n": (THRUST, _N_PER_LB),
     "elevator_rad": (ELEVATOR, np.pi / 180.0),
 }
-"""Channels of a record beside the output: the column of a run's detail, and its unit in SI. Deviations from trim."""
+"""Channels of a record besides the output: the column of a run's detail, and its unit in SI. Deviations from trim."""
 
 _ROWS: Final = ("h", "Θ", "V", "α", "q")
 _COLUMNS: Final = (*_ROWS, "F_T", "δ")
@@ -76,8 +77,11 @@ def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
 
 
 class PitchTracking:
-    """The model is the truth with every element of A and B off by up to `perturbation`, drawn by `model_seed`; its
-    parameters are the logarithms of what these elements are to be multiplied by."""
+    """Pitch tracking on an inaccurate model.
+
+    The model is the true system with every element of A and B off by up to `perturbation`, drawn with `model_seed`; its
+    parameters are the logarithms of factors on these elements.
+    """
 
     name: Final = "pitch-tracking"
     title: Final = "Pitch tracking of an F-16"
@@ -125,11 +129,11 @@ class PitchTracking:
         self._kept: tuple[bytes, Matrix] | None = None
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
-        """The experiment with another inaccurate model; what is not among `options` has its default."""
+        """The experiment with another inaccurate model; settings missing in `options` have their defaults."""
         return type(self)(options)
 
     def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment whose model is known as another aircraft's fit has it: both of shape (19,)."""
+        """The experiment with another aircraft's fitted model: mean and standard deviation, shape (19,)."""
         return type(self)(self._options, informed_parameters(self.model_parameters, mean, sd))
 
     @property
@@ -139,7 +143,7 @@ class PitchTracking:
 
     @property
     def nominal_model(self) -> Vector:
-        """Shape (19,): nothing is multiplied, until another aircraft's fit says more."""
+        """Shape (19,): zeros (all factors 1), unless another aircraft's fit is used."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
 
     @property
@@ -148,7 +152,7 @@ class PitchTracking:
         return np.arange(_SAMPLES, dtype=np.float64) * STEP_S
 
     def set_point(self, time_s: Samples) -> Samples:
-        """No error at any time."""
+        """Zero error at any time."""
         return np.zeros_like(time_s)
 
     def systems(self, model: Matrix | Vector) -> Matrix:
@@ -159,8 +163,10 @@ class PitchTracking:
         return np.asarray(self._system * np.exp(multipliers))
 
     def _moves(self, model: Matrix | Vector) -> Matrix:
-        """Motion over one step, shape (k, 5, 7). A search asks for the same model hundreds of times: the last one that
-        came alone is kept."""
+        """Transition matrices of one step, shape (k, 5, 7).
+
+        A search evaluates the same model hundreds of times, so the last single model is cached.
+        """
         if model.ndim > 1:
             return transitions(self.systems(model))
         key, kept = model.tobytes(), self._kept
@@ -178,8 +184,8 @@ class PitchTracking:
         return track_batch(gains, self._moves(model), _SAMPLES)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
-        """What every recorded step did beyond the model's, shape (3000, 5) in the source's units; zero once the run
-        has diverged. None where the record lacks a state or a command."""
+        """Difference of every recorded step from the model's, shape (3000, 5) plus a row of zeros, in the source's
+        units; zero once the run has diverged. None if the record lacks a state or a command."""
         flown = states_and_commands(trajectory, self.grid_s)
         if flown is None:
             return None
@@ -193,7 +199,7 @@ class PitchTracking:
         return track_batch(gains, self._moves(model), _SAMPLES, disturbances)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:  # noqa: ARG002
-        """None that is known beside its bounds: it is flown in simulation only."""
+        """No hazards beyond the bounds: this experiment is flown in simulation only."""
         return ()
 
     def errors(self, outputs: Matrix) -> Vector:
@@ -201,20 +207,20 @@ class PitchTracking:
         return np.asarray(np.trapezoid(_counted(outputs), dx=STEP_S, axis=-1), dtype=np.float64)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same of a recorded flight. Raises TrajectoryError when it has gaps or does not cover the minute."""
+        """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the minute."""
         require_scorable(trajectory, OUTPUT, 0.0, WINDOW_S, accept_gaps=accept_gaps)
         counted = _counted(trajectory[OUTPUT])
         return WINDOW_S * mean_absolute_error(trajectory.time_s, counted, self.set_point, 0.0, WINDOW_S)
 
 
 def named_channels(errors: Samples, detail: Samples) -> dict[str, Samples]:
-    """The channels of a run: pitch errors (n,) and its detail (n, 8), in SI."""
+    """Channels of a run by name, in SI: pitch errors (n,) and detail (n, 8)."""
     named = {name: np.ascontiguousarray(detail[:, i]) * unit for name, (i, unit) in DETAIL_CHANNELS.items()}
     return {OUTPUT: errors} | named
 
 
 def states_and_commands(trajectory: Trajectory, grid_s: Samples) -> Matrix | None:
-    """[x | u] at the instants of `grid_s`, shape (n, 7), in the source's units; None where a channel is missing."""
+    """[x | u] at the times `grid_s`, shape (n, 7), in the source's units; None if a channel is missing."""
     wanted = [(name, unit) for name, (i, unit) in DETAIL_CHANNELS.items() if i != REFERENCE]
     if any(name not in trajectory.channels for name, _ in wanted):
         return None
@@ -222,7 +228,7 @@ def states_and_commands(trajectory: Trajectory, grid_s: Samples) -> Matrix | Non
 
 
 def _counted(errors: Matrix) -> Matrix:
-    """Absolute errors; one that has reached the largest counts as that from there on."""
+    """Absolute errors; from the first that reaches the limit on, all count as the limit."""
     size = np.abs(errors)
     is_largest = size >= LARGEST_ERROR_RAD
     if not is_largest.any():

@@ -1,4 +1,4 @@
-"""The paper's takeoff: from the ground to 3 m under the autopilot's vertical loop, scored by its altitude error."""
+"""The paper's takeoff: from the ground to 3 m under the autopilot's vertical loop, scored by the altitude error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ TARGET_M: Final = 3.0
 WINDOW_S: Final = 32.6
 
 SETTLED_S: Final = 5.0
-"""From then on a takeoff should be near its target."""
+"""A takeoff should be near its target from this time on."""
 
 _SKETCH_EVERY: Final = 4
 _SKETCH_END_S: Final = 2.0
@@ -67,14 +67,17 @@ MODEL_PARAMETERS: Final = (
     _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
     _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
 )
-"""The data sheet has mass and thrust only: every other nominal value is zero. What is expected of the rest is what
-small multicopters have; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
+"""The data sheet gives mass and thrust only: every other nominal value is zero. The expected values of the others are
+typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sketches:
-    """Takeoffs of c policies on k models, cut short; all of shape (c, k). The error takes what the last two seconds
-    deviate for what the rest of the flight would; `lowest_m` is from 5 s after the command on."""
+    """Shortened takeoffs of c policies on k models; all of shape (c, k).
+
+    The error extrapolates the mean deviation of the last two seconds over the rest of the flight; `lowest_m` is taken
+    from 5 s after the command on.
+    """
 
     errors: Matrix
     highest_m: Matrix
@@ -82,7 +85,8 @@ class Sketches:
 
 
 class Takeoff:
-    """Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits."""
+    """Takeoff with the paper's autopilot. Gains are the loop's integers; above 1073 for ki and 409 for kd a product can
+    wrap at 32 bits."""
 
     name: Final = "takeoff"
     title: Final = "Takeoff to 3 m"
@@ -109,7 +113,7 @@ class Takeoff:
         return self
 
     def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The takeoff whose model is known as another vehicle's fit has it: both of shape (m,)."""
+        """The takeoff with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
         return type(self)(informed_parameters(self.model_parameters, mean, sd))
 
     @property
@@ -119,7 +123,7 @@ class Takeoff:
 
     @property
     def nominal_model(self) -> Vector:
-        """What is known before the first flight; from the data sheet, mass and thrust and nothing of the rest."""
+        """Parameters before the first flight. From the data sheet, only mass and thrust are known."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
 
     @property
@@ -132,7 +136,7 @@ class Takeoff:
         return np.where(time_s >= 0.0, TARGET_M, 0.0)
 
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
-        """One run of the simple model, for any whole gains, inside the bounds or not."""
+        """One run of the simple model, for any integer gains, inside the bounds or not."""
         parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
         channels, _ = fly(_counts(gains), parameters, _TARGET, _SAMPLES)
         time_s = self.grid_s
@@ -144,8 +148,10 @@ class Takeoff:
         return fly_batch(_counts(gains), self._models(model, len(gains)), _TARGET, _SAMPLES)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
-        """What altitude and climb rate did beyond the model in every step of a flight, shape (16693, 3). None where the
-        record lacks the climb rate or the thrust command."""
+        """Difference of altitude and climb rate from the model's in every step of a flight, shape (16693, 3).
+
+        The third column marks when the loop is entered. None if the record lacks the climb rate or the thrust command.
+        """
         if any(name not in trajectory.channels for name in _STATE_AND_COMMAND):
             return None
         altitude, climb_rate, thrust = (
@@ -158,9 +164,10 @@ class Takeoff:
         return fly_disturbed(_counts(gains), self._models(model, len(gains)), _TARGET, disturbances)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
-        """Products that can wrap, exactly; altitude, divergence, oscillation and aborts of simulated takeoffs.
+        """Check products that can wrap, exactly, and altitude, divergence, oscillation and aborts of simulated
+        takeoffs.
 
-        Takes a tenth of a second, and nothing for a question asked before.
+        Takes a tenth of a second; repeated questions are answered from a cache.
         """
         safe_gains = self.space.vector(envelope.safe_gains)
         return _hazards(
@@ -168,7 +175,8 @@ class Takeoff:
         )
 
     def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
-        """Every policy on every model, flown only until `until_s`, past 5 s: gains (c, 3), models (k, m)."""
+        """Simulate every policy on every model until `until_s` only, which must exceed 5 s: gains (c, 3), models (k,
+        m)."""
         samples = round(until_s * RATE_HZ)
         runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
         altitude = fly_batch(*runs, _TARGET, samples)[:, ::_SKETCH_EVERY]
@@ -187,7 +195,7 @@ class Takeoff:
         return np.array([mean_absolute_error(time_s, row, self.set_point, 0.0, WINDOW_S) for row in outputs])
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same of a recorded flight. Raises TrajectoryError when it has gaps or does not cover the window."""
+        """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
         require_scorable(trajectory, self.output, 0.0, WINDOW_S, accept_gaps=accept_gaps)
         return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, WINDOW_S)
 

@@ -1,7 +1,7 @@
-"""The same takeoff under ArduCopter or PX4: their own vertical controllers' gains, for which there is no model yet.
+"""The paper's takeoff under ArduCopter or PX4: gains of their own vertical controllers, without a model so far.
 
-Flown and scored as the paper's; every gain set is a person's or a script's. The ranges are those that are written to
-such a vehicle at all: a campaign narrows them to what suits its own.
+Flown and scored like the paper's; a person or a script chooses every gain set. The ranges are those that may be written
+to such a vehicle at all: a campaign narrows them to suit its vehicle.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ ARDUPILOT_GAINS: Final = (
     _gain("PSC_ACCZ_I", "Thrust per integrated acceleration error", "10 %·s/m", 0.0, 4.0, 1.0),
     _gain("PSC_ACCZ_D", "Thrust per change of acceleration error", "10 %·s³/m", 0.0, 0.4, 0.0),
 )
-"""As before release 4.7, with its defaults; from 4.7 on the vehicle has other names, and a tenth for acceleration."""
+"""Names and defaults before release 4.7; from 4.7 on the names differ, and the acceleration gains are a tenth."""
 
 PX4_GAINS: Final = (
     _gain("MPC_Z_P", "Climb rate per altitude error", "1/s", 0.1, 1.5, 1.0),
@@ -39,7 +39,7 @@ PX4_GAINS: Final = (
 
 
 class CopterTakeoff:
-    """The manoeuvre and the score of the paper's takeoff with the gains of another autopilot."""
+    """The paper's takeoff, manoeuvre and score, with the gains of another autopilot."""
 
     options: Final[tuple[Option, ...]] = ()
     modelled: Final = None
@@ -47,7 +47,7 @@ class CopterTakeoff:
     integrates: Final = _PAPER.integrates
     error_unit: Final = _PAPER.error_unit
     scatter: Final = Scatter(sd=_PAPER.scatter.sd, degrees_of_freedom=1.0, measured=False)
-    """The paper's drone's, for want of their own; under PX4 one flight scattered by three times as much."""
+    """The scatter of the paper's drone, as none was measured; under PX4 one flight scattered three times as much."""
 
     def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...]) -> None:
         self.name: Final = name
@@ -60,7 +60,7 @@ class CopterTakeoff:
 
     @property
     def grid_s(self) -> Samples:
-        """The paper's takeoff's."""
+        """The same as the paper's takeoff."""
         return _PAPER.grid_s
 
     def set_point(self, time_s: Samples) -> Samples:
@@ -72,7 +72,7 @@ class CopterTakeoff:
         return _PAPER.errors(outputs)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
-        """The same of a recorded flight. Raises TrajectoryError when it has gaps or does not cover the window."""
+        """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
         return _PAPER.error(trajectory, accept_gaps=accept_gaps)
 
 

@@ -1,7 +1,7 @@
-"""What a policy must pass before it may be flown, on every path: proposals, manual gains, scripts.
+"""The gate: checks that a policy must pass before it may fly, for proposals, manual gains and scripts alike.
 
-`judging` puts the checks together, `bounds` holds the gains against limits, and the experiment itself knows its hazards
-(`app.core.hazards` for the takeoff). `overruling` says what a refusal means, and who may fly in spite of it.
+`judging` combines the checks, `bounds` compares gains with limits, and the experiment checks its own hazards
+(`app.core.hazards` for the takeoff). `overruling` reports refusals and decides who may overrule them.
 """
 
 from app.core.gate.judging import GateResult, check_policy

@@ -1,4 +1,4 @@
-"""Gains against limits: what a controller can hold, the campaign's bounds, and its step limit."""
+"""Limits on gains: what a controller can hold, the campaign's bounds, and its step limit."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,12 @@ from app.core.policy import Gain, Gains, PolicySpace
 from app.core.wording import percent
 
 NUMBERS: Final = "numbers"
-"""The check that nobody can overrule."""
+"""Name of the check that cannot be overruled."""
 
 
 def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
-    """A refusal for each gain that is no finite number, or no whole one of 32 bits where the controller takes those."""
+    """Return a refusal for each gain that is not a finite number, or not a 32-bit integer where the controller needs
+    one."""
     return tuple(
         Check(
             NUMBERS, False, f"{gain.name} {reason}.", worst=_outside(gain, gains[gain.name]), limit=0.0, gain=gain.name
@@ -25,7 +26,7 @@ def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
 
 
 def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
-    """A refusal for each gain out of its bounds, or the one answer that none is."""
+    """Return a refusal for each gain outside its bounds, or one passed check."""
     refused = tuple(
         Check(
             "bounds",
@@ -43,7 +44,8 @@ def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
 
 
 def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
-    """The largest change of a gain from the nearest of `references`, a share of its range, against `fraction`."""
+    """Check the largest change of a gain from the nearest of `references`, as a share of its range, against
+    `fraction`."""
     nearest = min(references, key=lambda reference: max(space.change(gains, reference).values()))
     name, worst = max(space.change(gains, nearest).items(), key=lambda item: item[1])
     base = space.vector(nearest)
@@ -60,9 +62,9 @@ def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fr
 
 
 def jointly_offered(gains: Gains, checks: Sequence[Check]) -> tuple[Check, ...]:
-    """The same checks, each offer replaced by what passes all of them together.
+    """The same checks, with each offer replaced by one that passes all of them together.
 
-    Every offer is the asked value held within a limit; the one furthest from what was asked lies within all of them.
+    Every offer is the requested value clipped to a limit; the one furthest from the request satisfies all limits.
     """
     offers: dict[str, float] = {}
     for name, value in (item for check in checks for item in check.offer.items()):
@@ -71,7 +73,7 @@ def jointly_offered(gains: Gains, checks: Sequence[Check]) -> tuple[Check, ...]:
 
 
 def _outside(gain: Gain, value: float) -> float:
-    """How far beyond its bounds a gain lies, as a share of its range; infinite for one that is pinned or no number."""
+    """How far a gain lies outside its bounds, as a share of its range; infinite if it is pinned or not finite."""
     beyond = max(gain.lower - value, value - gain.upper, 0.0)
     if beyond == 0.0:
         return 0.0

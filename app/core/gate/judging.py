@@ -1,4 +1,4 @@
-"""The gate's word on one policy."""
+"""The gate's verdict on one policy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +16,12 @@ from app.core.starting import start_gains
 from app.core.strategies.history import was_flown
 
 WAIVED_AFTER_VALID_FLIGHT: Final = frozenset({"altitude", "divergence"})
-"""Checks of simulated takeoffs whose refusal does not hold for gains that have flown."""
+"""Checks of simulated takeoffs that do not refuse gains flown before."""
 
 
 @dataclass(frozen=True, slots=True)
 class GateResult:
-    """The verdict on one policy; each check with its worst number and the case that gave it."""
+    """Verdict on one policy; each check has its worst value and the case that caused it."""
 
     checks: tuple[Check, ...]
 
@@ -35,7 +35,7 @@ class GateResult:
 
     @property
     def overrulable(self) -> bool:
-        """Whether a controller could hold these gains at all."""
+        """Whether a controller can hold these gains at all."""
         return not any(check.name == NUMBERS for check in self.checks)
 
 
@@ -49,16 +49,16 @@ def check_policy(
     start: Gains | None = None,
     spread: ParameterDistribution | None = None,
 ) -> GateResult:
-    """Judge a complete set of gains (every name of `space`): its numbers, the campaign's bounds, its step limit, and
-    the experiment's hazards, where it has a model to find them with.
-    What a valid flight of this campaign has flown may fly again although simulated takeoffs go astray: the flight is
-    the better evidence.
-    Pure; a takeoff's takes a tenth of a second.
+    """Check a complete set of gains (every name of `space`).
+
+    Checks the numbers, the campaign's bounds, its step limit, and the experiment's hazards if it has a model. Gains of
+    a valid flight of this campaign may fly again even if simulated takeoffs exceed the altitude or diverge, because the
+    flight is better evidence. Pure; takes a tenth of a second for a takeoff.
 
     `space` is the experiment's, narrowed to the campaign's bounds. Before the first valid flight a gain may change by
-    `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from some valid flight.
-    `start`: the start gains where they are known; searching them on the model takes long. `spread`: what is known of
-    the vehicle, where `flights` come without their records.
+    `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from any valid flight.
+    `start` gives the start gains if they are known, because the search on the model is slow. `spread` gives the
+    vehicle's parameter distribution, for `flights` without their records.
     """
     if numbers := check_numbers(space, gains):
         return GateResult(numbers)
@@ -81,7 +81,7 @@ def _hazards(
 
 
 def _flown_before(check: Check) -> Check:
-    """The check's answer for gains that a valid flight of the campaign has flown."""
+    """The check's result for gains that a valid flight of the campaign has flown."""
     if check.passed or check.name not in WAIVED_AFTER_VALID_FLIGHT:
         return check
     sentence = f"{check.sentence} But a flight of this campaign flew these gains to its end, so they may fly again."

@@ -1,15 +1,15 @@
-"""What a refusal means, and who may fly in spite of it."""
+"""Handling of refusals: how they are reported, and who may overrule them."""
 
 from app.core.errors import GainsError, Problem
 from app.core.gate.judging import GateResult
 
 
 def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = False) -> str:
-    """The reason to record with the flight: `overrule` where it lets refused gains fly, else empty.
+    """Return the reason to record with the flight: `overrule` if it lets refused gains fly, else empty.
 
-    On a simulated vehicle an operator may overrule a refusal with a reason, to fly what the paper flew for instance
-    (ki = 1356 can wrap); on a real one nobody can. Numbers that the controller cannot hold are never overruled. Raises
-    GainsError naming what the gate refuses, each with its gain and, where there is one, a value that would pass.
+    On a simulated vehicle an operator may overrule a refusal with a reason, for example to fly the paper's gains (ki =
+    1356 can wrap); on a real one nobody can. Numbers that the controller cannot hold are never overruled. Raises
+    GainsError naming every refusal with its gain and, if there is one, a value that would pass.
     """
     if overrule and is_real:
         raise GainsError(
@@ -23,7 +23,7 @@ def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = Fal
 
 
 def problems_of_gate(gate: GateResult) -> tuple[Problem, ...]:
-    """Every refusal by its field, `gains.ki`, or `gains` where no single gain is to blame."""
+    """Every refusal with its field: `gains.ki`, or `gains` if no single gain is the cause."""
     return tuple(
         Problem(f"gains.{check.gain}" if check.gain else "gains", check.sentence, check.offer)
         for check in gate.refusals

@@ -1,1 +1,1 @@
-"""What can go wrong in a takeoff: products that wrap (`wrapping`), and flights that go astray (`flights`)."""
+"""Hazards of a takeoff: products that wrap (`wrapping`), and simulated flights that go wrong (`flights`)."""

@@ -1,10 +1,10 @@
-"""Takeoffs with a gain set, on the exact replica, over what is known of the vehicle, with an abort at any instant.
+"""Simulated takeoffs with a gain set, on the exact replica, over the vehicle's parameter distribution, with aborts.
 
-What is known is a spread of the model's parameters. Mass has no parameter of its own: it changes the ratio of thrust to
-weight, and so does the hover throttle, whose spread stands for both.
+Mass has no parameter of its own: it changes the ratio of thrust to weight, as the hover throttle does, whose
+distribution covers both.
 
-A late release from the ground is no case here: it overshoots with any integrating gains, and the vehicle's own check of
-a lift-off in time is the guard against it.
+A late release from the ground is not simulated: it overshoots with any integrating gains, and the vehicle's own check
+for a timely lift-off protects against it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,20 +31,20 @@ from app.core.plants.vertical import START_LATENCY_S, Counts
 from app.core.policy import Vector
 from app.core.trajectory import Samples
 
-if TYPE_CHECKING:  # experiments are what calls this
+if TYPE_CHECKING:  # experiments import this module
     from app.core.experiments.base import Matrix, ModelParameter
 
 MODELS: Final = 32
-"""The likely vehicle, and so many quasi-random ones about it (less one)."""
+"""Number of simulated vehicles: the likely one, and quasi-random ones around it."""
 
 ABORTS_BETWEEN_S: Final = (0.3, 1.0, 1.7, 2.6, 4.0, 8.0, 32.0)
-"""Every takeoff is aborted once between each two of these, at another instant on every vehicle."""
+"""Every takeoff is aborted once in each of these intervals, at a different time on every vehicle."""
 
 LARGEST_TOUCH_DOWN_M_S: Final = 2.5
 SMALLEST_SWING_M_S: Final = 0.1
-"""A climb rate that swings by less is at rest."""
+"""A climb rate that swings by less counts as at rest."""
 UNDAMPED: Final = 0.95
-"""An oscillation has to lose more than 5 % from the middle third of the flight to the last."""
+"""An oscillation must decay by more than 5 % from the middle third of the flight to the last."""
 
 _GOLDEN: Final = 0.6180339887498949
 
@@ -60,14 +60,16 @@ class Runs:
 
 
 def abort_steps(models: int) -> Counts:
-    """Shape (models, 6), rising in each row: instants that fill each interval evenly as the models go on."""
+    """Abort times in steps, shape (models, 6), increasing in each row; over the models they fill each interval
+    evenly."""
     edges = np.array(ABORTS_BETWEEN_S)
     shares = (np.arange(models)[:, np.newaxis] + 1.0) * _GOLDEN % 1.0
     return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
 
 
 def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, target: int, steps: int) -> Runs:
-    """One takeoff to `target` (8 fractional bits) on each model, each aborted to `safe_gains` at its own instants."""
+    """Simulate a takeoff to `target` (8 fractional bits) on each model, each aborted to `safe_gains` at its own
+    times."""
     reports = np.empty((len(models), REPORT_SIZE))
     aborts = np.empty((*aborts_at.shape, 2))
     scratch, curves = np.empty((2, STATE_SIZE), dtype=np.int64), np.empty((4, steps))
@@ -85,10 +87,10 @@ def check_flights(
     target: int,
     steps: int,
 ) -> tuple[Check, ...]:
-    """Altitude, divergence, oscillation and aborts of one gain set over `models`, shape (k, m).
+    """Check altitude, divergence, oscillation and aborts of one gain set over `models`, shape (k, m).
 
-    A `baseline` is never refused for its altitude. An abort hands over to the safe gains: what these would do on the
-    same vehicle whatever was flown before is no fault of the gains that are judged.
+    A `baseline` is never refused for its altitude. An abort switches to the safe gains: what these would do by
+    themselves on the same vehicle is not held against the gains under test.
     """
     aborts_at = abort_steps(len(models))
     runs = fly_runs(gains, safe_gains, models, aborts_at, target, steps)
@@ -106,16 +108,20 @@ def check_flights(
 
 
 def divergence_distance(reports: "Matrix", set_point_m: float) -> Vector:
-    """How far from the set point each flight got that fell back to the ground or still moves away at its end; zero for
-    the others: (k, 7) → (k,)."""
+    """Distance from the set point of each flight that fell back to the ground or still moves away at its end.
+
+    Zero for the others: (k, 7) → (k,).
+    """
     middle, last = reports[:, DISTANCE_MIDDLE_M], reports[:, DISTANCE_LAST_M]
     moves_away = (last > middle) & (last > 0.5 * set_point_m)
     return np.where(reports[:, FALLEN_STEP] >= 0.0, set_point_m, np.where(moves_away, last, 0.0))
 
 
 def undamped_swing(reports: "Matrix") -> Vector:
-    """The swing of the climb rate in the last third of each flight, m/s, where it has not decayed since the middle
-    third; zero where it has, or is at rest: (k, 7) → (k,)."""
+    """Swing of the climb rate in the last third of each flight, m/s, if it has not decayed since the middle third.
+
+    Zero if it has, or if the vehicle is at rest: (k, 7) → (k,).
+    """
     middle, last = reports[:, SWING_MIDDLE_M_S], reports[:, SWING_LAST_M_S]
     return np.where((middle > 0.0) & (last >= UNDAMPED * middle), last, 0.0)
 
@@ -168,7 +174,7 @@ def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
 def _abort(
     name: str, unit: str, place: int, runs: Runs, own: Runs, parameters: Sequence["ModelParameter"], limit: float
 ) -> Check:
-    """The abort that goes furthest beyond `limit`, or beyond what the safe gains themselves do on the same vehicle."""
+    """Check the abort that exceeds `limit`, or the safe gains' own result on the same vehicle, the most."""
     of_safe_gains = own.aborts[:, :, place].max(axis=1)
     if place == HIGHEST_M:
         of_safe_gains = np.maximum(of_safe_gains, own.reports[:, HIGHEST_M])
@@ -187,7 +193,7 @@ def _abort(
 
 
 def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
-    """The vehicle in words, and when it happened, counted from the command."""
+    """Description of the vehicle, and the time of the event, counted from the command."""
     return ", ".join(_words(parameters, model, step, event))
 
 

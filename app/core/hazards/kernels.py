@@ -1,6 +1,6 @@
-"""Compiled inner loops of the gate: takeoffs with aborts, and starts that drive products to where they wrap.
+"""Compiled inner loops of the gate: takeoffs with aborts, and runs that drive products to where they wrap.
 
-All in one file: the kept machine code is judged by it.
+They share one file because numba validates its cached machine code by this file.
 """
 
 from typing import Final
@@ -48,7 +48,7 @@ THRUST: Final = 2
 COMMAND: Final = 3
 STEPS_FLOWN: Final = 4
 PLANT_SIZE: Final = 5
-"""Places in the array that holds the vehicle: m, m/s, share of full, counts, steps since the loop's entry."""
+"""Indices in the vehicle's state array: m, m/s, share of full, counts, steps since the loop was entered."""
 
 HIGHEST_M: Final = 0
 HIGHEST_STEP: Final = 1
@@ -58,25 +58,28 @@ DISTANCE_LAST_M: Final = 4
 SWING_MIDDLE_M_S: Final = 5
 SWING_LAST_M_S: Final = 6
 REPORT_SIZE: Final = 7
-"""Places in the report of a flight. Fallen: the step at which it was back on the ground, or −1. Distances from the set
-point, after it was first within half of it, and swings of the climb rate: the largest in the middle and in the last
-third of the flight."""
+"""Indices in the report of a flight.
+
+Fallen: the step at which it was back on the ground, or −1. Distances are from the set point, after the altitude first
+exceeded half of it; swings are of the climb rate. Both are the largest in the middle and in the last third of the
+flight.
+"""
 
 TOUCH_DOWN_M_S: Final = 1
-"""Beside the highest altitude in the report of an abort: the speed at which the ground was met, or 0."""
+"""Second entry of an abort's report, after the highest altitude: the touch-down speed, or 0."""
 
 LOST_M: Final = 200.0
-"""A flight that is so high is not followed any further."""
+"""A flight above this altitude is not simulated any further."""
 
 _DESCENT: Final = fix(-0.5, SPEED_BITS)
 _STANDING_M: Final = 0.02
 _TURN_M_S: Final = 0.02
-"""The climb rate has turned when it has come back by so much."""
+"""Reversal of the climb rate that counts as a turning point."""
 
 
 @kernel
 def _no_past(model: Samples) -> Samples:
-    """Room for the last heights and climb rates, shape (2, d); d = 0 where the loop senses them without delay."""
+    """Buffer for the latest heights and climb rates, shape (2, d); d = 0 if the loop senses them without delay."""
     delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
     return np.zeros((2, int(delay) + 2 if delay > 0.0 else 0))
 
@@ -94,10 +97,11 @@ def fly_leg(
     heights: Samples,
     climbs: Samples,
 ) -> int:
-    """Fly on as `app.core.plants.vertical.rollout` does, writing height and climb rate before each step, shape (n,).
+    """Continue a flight as `app.core.plants.vertical.rollout` does, writing height and climb rate before each step,
+    shape (n,).
 
-    Stops early when it is lost, or when a vehicle that `lands` has met the ground. Returns the steps flown; `state`,
-    `plant` and `past` are then as they are after these.
+    Stops early above `LOST_M`, or when a vehicle that `lands` has touched down. Returns the steps flown; `state`,
+    `plant` and `past` then hold the values after them.
     """
     kp, ki, kd = gains[0], gains[1], gains[2]
     share, hover, lag, drag = model[QUADRATIC_SHARE], model[HOVER_THROTTLE], model[MOTOR_LAG_S], model[DRAG_1_S]
@@ -138,7 +142,7 @@ def _abort(
     climbs: Samples,
     report: Samples,
 ) -> None:
-    """What an abort does: the safe gains, and down at 0.5 m/s until the vehicle stands, half a minute at most."""
+    """Simulate an abort: the safe gains, descending at 0.5 m/s until the vehicle stands, half a minute at most."""
     report[HIGHEST_M], report[TOUCH_DOWN_M_S] = plant[HEIGHT], 0.0
     if plant[HEIGHT] <= _STANDING_M:
         return
@@ -150,7 +154,8 @@ def _abort(
 
 @kernel
 def report_heights(heights: Samples, set_point: float, third: int, report: Samples) -> None:
-    """Highest altitude, return to the ground, and distances from the set point, of a flight of up to 3 thirds."""
+    """Report the highest altitude, the return to the ground, and the distances from the set point; up to 3 thirds of a
+    flight."""
     near = False
     for i in range(len(heights)):
         height = heights[i]
@@ -166,7 +171,7 @@ def report_heights(heights: Samples, set_point: float, third: int, report: Sampl
 
 @kernel
 def report_swings(climbs: Samples, third: int, report: Samples) -> None:
-    """The largest swings of the climb rate, from one turn to the next, by the third in which they end."""
+    """Report the largest swings of the climb rate between turning points, by the third in which they end."""
     turn, extreme, extreme_step, way = 0.0, 0.0, 0, 1.0
     for i in range(len(climbs)):
         climb = climbs[i]
@@ -191,10 +196,11 @@ def fly_with_aborts(
     report: Samples,
     aborts: Samples,
 ) -> None:
-    """Fly one takeoff, and for each of the rising `abort_steps`, shape (a,), what an abort there would lead to.
+    """Simulate one takeoff, and the result of an abort at each of the increasing `abort_steps`, shape (a,).
 
     Writes `report`, shape (REPORT_SIZE,), and `aborts`, shape (a, 2). Steps count from the loop's entry. `scratch` has
-    shape (2, STATE_SIZE), `curves` shape (4, n): its first rows are left with heights and climb rates of the n steps.
+    shape (2, STATE_SIZE), `curves` shape (4, n): its first two rows hold heights and climb rates of the n steps
+    afterwards.
     """
     state, aborted = scratch[0], scratch[1]
     heights, climbs, steps = curves[0], curves[1], curves.shape[1]
@@ -240,10 +246,10 @@ def fly_all_with_aborts(
 def find_wraps(
     gains: Counts, model: Samples, target: int, frozen_step: int, steps: int, state: State, found: Counts
 ) -> None:
-    """Take off, from `frozen_step` on with height and climb rate as they then stood, and look for products that wrap.
-    The vehicle senses without delay here, as `model` must say.
+    """Take off, freeze height and climb rate at `frozen_step`, and find the products that wrap.
 
-    Writes step and product of the first of each gain to `found`, shape (3, 2); step −1 when there is none.
+    The vehicle senses without delay here; `model` must say so. Writes step and product of the first wrap of each gain
+    to `found`, shape (3, 2); step −1 if there is none.
     """
     plant, past = np.zeros(PLANT_SIZE), _no_past(model)
     heights, climbs, errors = np.zeros(1), np.zeros(1), np.zeros(3, dtype=np.int64)

@@ -1,12 +1,12 @@
-"""Whether a product of the vertical loop can wrap at 32 bits, judged exactly.
+"""Exact check whether a product of the vertical loop can wrap at 32 bits.
 
-The loop multiplies each gain with an error that a limiter holds: kp with the position error (±10 m), kd with the speed
-error (±10 m/s), ki with the sum of position errors (±2 000 000). A gain is safe when its product with the limit fits
-into 32 signed bits. Nothing after the products can wrap: shifted down, three products of 32 bits come to less than
-2²⁴ + 2¹⁶, and the feed-forward adds at most 8640.
+The loop multiplies each gain by a limited error: kp by the position error (±10 m), kd by the speed error (±10 m/s), ki
+by the sum of position errors (±2 000 000). A gain is safe if its product with the limit fits into 32 signed bits.
+Nothing after the products can wrap: after shifting, three 32-bit products sum to less than 2²⁴ + 2¹⁶, and the
+feed-forward adds at most 8640.
 
-A refused gain is flown in the replica from the starts that drive the errors to their limits, until its product wraps:
-stuck on the ground, where the sum grows by 3 m a step, and with the estimate frozen at some instant of the climb.
+A refused gain is simulated on the replica from starts that drive the errors to their limits, until its product wraps:
+stuck on the ground, where the sum grows by 3 m per step, and with the estimate frozen at some time of the climb.
 """
 
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ _STARTS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """A product of the loop: its gain, the error it is multiplied with, and how far that can go."""
+    """A product of the loop: its gain, the error that multiplies it, and the limit of that error."""
 
     gain: str
     error: str
@@ -48,7 +48,7 @@ class Product:
 
     @property
     def largest_safe_gain(self) -> int:
-        """The largest gain, of either sign, whose product cannot wrap."""
+        """Largest absolute gain whose product cannot wrap."""
         return INT32_MAX // self.largest_error
 
 
@@ -61,10 +61,10 @@ PRODUCTS: Final = (
 
 
 def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, ...]:
-    """One refusal for each gain that can wrap, or the one answer that none can.
+    """Return a refusal for each gain that can wrap, or one passed check.
 
-    `counts` are kp, ki, kd; `model` is the likely vehicle, for the starts of the refused; `target` the altitude, 8
-    fractional bits.
+    `counts` are kp, ki, kd; `model` is the likely vehicle, on which refused gains are simulated; `target` is the
+    altitude, 8 fractional bits.
     """
     gains = [int(count) for count in counts]
     refused = [place for place, product in enumerate(PRODUCTS) if abs(gains[place]) > product.largest_safe_gain]
@@ -80,7 +80,7 @@ def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, .
 
 
 def _first_wraps(counts: Counts, model: Vector, target: int) -> Counts:
-    """Step and product at which each gain first wraps in each start, shape (starts, 3, 2); step −1: it does not."""
+    """Step and product at which each gain first wraps in each start, shape (starts, 3, 2); step −1 if it does not."""
     found = np.empty((len(_STARTS), len(PRODUCTS), 2), dtype=np.int64)
     instantly = model.copy()
     instantly[MEASUREMENT_DELAY_S] = 0.0
@@ -107,7 +107,7 @@ def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[C
 
 
 def _case(product: Product, wraps: Counts) -> tuple[str, str]:
-    """The first start in which the product wraps, in short; and in a sentence, with how many of the others join in."""
+    """The first start in which the product wraps, in short; and a sentence that adds in how many others it wraps."""
     wrapped = [
         (name, step, value) for (name, _), (step, value) in zip(_STARTS, wraps.tolist(), strict=True) if step >= 0
     ]

@@ -1,4 +1,4 @@
-"""The longitudinal model of an F-16 that stands for the truth in the paper's first experiment.
+"""Longitudinal model of an F-16, the true system of the paper's first experiment.
 
 Low-fidelity model of Russell's 2003 report (Stevens & Lewis data, centre of gravity at 0.30 of the mean chord),
 linearised at 15 000 ft and 500 ft/s. States and inputs as in `app.core.plants.pitch`.
@@ -32,11 +32,11 @@ for _matrix in (A, B, SYSTEM):
     _matrix.setflags(write=False)
 
 ELEMENTS: Final = np.nonzero(SYSTEM)
-"""Rows and columns of the 19 elements of [A | B] that are not zero by the nature of the motion."""
+"""Rows and columns of the 19 elements of [A | B] that are not structurally zero."""
 
 
 def perturbed(perturbation: float, seed: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """[A | B], shape (5, 7), of the inaccurate model: every element times 1 + U(−p, p), A's first, then B's."""
+    """[A | B], shape (5, 7), of the inaccurate model: every element times 1 + U(−p, p), drawn for A first, then B."""
     random = np.random.default_rng(seed)
     a = A * (1.0 + random.uniform(-perturbation, perturbation, A.shape))
     b = B * (1.0 + random.uniform(-perturbation, perturbation, B.shape))

@@ -1,11 +1,11 @@
-"""An aircraft's longitudinal motion as a linear model, and its pitch tracking under the paper's controller.
+"""Linear model of an aircraft's longitudinal motion, and its pitch tracking under the paper's controller.
 
     ẋ = A·x + B·u,   x = [h ft, Θ rad, V ft/s, α rad, q rad/s],   u = [F_T lb, δ deg]     (the paper's eq. 5)
     F_T = θ1·V + θ2,   δ = θ3·(Θref − Θ) + θ4·α + θ5·q + θ6                              (eq. 6)
 
-all as deviations from trim, with the total thrust and elevator held within their limits. The reference is a sine over
-the distance travelled. Control is held over steps of 0.02 s; the motion over a step is exact to the fourth order.
-Units are those of the source inside this file and its experiment; records carry SI.
+All are deviations from trim; the total thrust and elevator are limited. The reference is a sine over the distance
+travelled. Control is held over steps of 0.02 s; the transition over a step is exact to the fourth order. This file and
+its experiment use the source's units; records use SI.
 """
 
 from typing import Final
@@ -21,7 +21,7 @@ AMPLITUDE_RAD: Final = np.deg2rad(10.0)
 WAVELENGTH_FT: Final = 10_000.0
 AIRSPEED_FT_S: Final = 500.0
 LARGEST_ERROR_RAD: Final = 10.0
-"""A pitch error of this size counts as this from there on; the run ends there."""
+"""The run ends when the pitch error reaches this size; from there on it counts as this."""
 
 ALTITUDE: Final = 0
 PITCH: Final = 1
@@ -32,13 +32,13 @@ STATES: Final = 5
 DISTANCE: Final = 5
 DIVERGED: Final = 6
 MEMORY_SIZE: Final = 7
-"""A run's memory: the five states, the distance travelled (ft), and whether the error has reached its largest."""
+"""Memory of a run: the five states, the distance travelled (ft), and whether the error has reached its limit."""
 
 REFERENCE: Final = 5
 THRUST: Final = 6
 ELEVATOR: Final = 7
 DETAIL: Final = 8
-"""Columns of a run's detail: the five states, the reference (rad), and the two commands as they reach the aircraft."""
+"""Columns of a run's detail: the five states, the reference (rad), and the two limited commands."""
 
 TRIM_THRUST_LB: Final = 2120.6214478152
 TRIM_ELEVATOR_DEG: Final = -2.4606861723
@@ -49,7 +49,7 @@ HIGHEST_ELEVATOR_DEG: Final = 25.0 - TRIM_ELEVATOR_DEG
 
 
 def transitions(systems: Samples) -> Samples:
-    """Motion over one step with the control held: [A | B] → [Ad | Bd], both of shape (…, 5, 7).
+    """Discretise over one step with the control held: [A | B] → [Ad | Bd], both of shape (…, 5, 7).
 
     Ad = Σ_{k≤4}(hA)^k/k!, Bd = h(I + hA/2 + (hA)²/6 + (hA)³/24)B.
     """
@@ -72,8 +72,9 @@ def rollout(
     """Track the reference of `amplitude` (rad) from `memory` on, for as many steps as `errors` has samples.
 
     `gains` holds θ1 … θ6; `transition` has shape (5, 7); `bias`, shape (n, 5) or (0, 5), is added to the state after
-    each step. Writes the pitch error (rad) at the beginning of every step to `errors`, shape (n,), and to `detail`,
-    shape (n, 8) or (0, 8), what else there is to know. `memory` then holds the state after the last step.
+    each step. Writes the pitch error (rad) at the beginning of every step to `errors`, shape (n,), and the other
+    columns to `detail`, shape (n, 8), or nothing if it has shape (0, 8). `memory` then holds the state after the last
+    step.
     """
     moved = np.empty(STATES)
     for i in range(len(errors)):
@@ -110,7 +111,7 @@ def rollouts(gains: Samples, moves: Samples, bias: Samples, errors: Samples, no_
 
 
 def track(gains: Samples, transition: Samples, samples: int) -> tuple[Samples, Samples]:
-    """One run from trim with everything: pitch error (n,), detail (n, 8)."""
+    """One run from trim with all channels: pitch error (n,), detail (n, 8)."""
     errors, detail = np.empty(samples), np.empty((samples, DETAIL))
     rollout(np.zeros(MEMORY_SIZE), gains, transition, AMPLITUDE_RAD, np.empty((0, STATES)), errors, detail)
     return errors, detail

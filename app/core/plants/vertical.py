@@ -4,11 +4,12 @@ Force, mass, gravity (the paper's eq. 7), with refinements that are zero in the 
 
     z̈ = g·(T/W − 1) − drag·ż,   T/W = ((1 − q)·u + q·u²) / ((1 − q)·h + q·h²) · (1 + e·exp(−z/0.4 m)) · (1 − s·t/33 s),
 
-u the share of full thrust commanded, after a first-order lag; h the hover throttle, q the quadratic share of thrust, e
-the ground effect, s the battery's sag; altitude z up from the ground at 0, explicit Euler at 512 Hz. The loop senses
-altitude and climb rate a measurement delay late, which is also what is recorded and scored. It is entered a latency
-after the command, from rest on the ground; until then nothing moves, so a latency shifts the whole run in time. Both
-delays are interpolated to any fraction of a step: the outputs depend on them continuously, as a fit needs.
+where u is the commanded share of full thrust after a first-order lag, h the hover throttle, q the quadratic share of
+thrust, e the ground effect, s the battery sag; altitude z is up from the ground at 0; explicit Euler at 512 Hz. The
+loop senses altitude and climb rate with a measurement delay; the delayed values are also those recorded and scored. The
+loop starts a latency after the command, from rest on the ground; until then nothing moves, so the latency shifts the
+whole run in time. Both delays are interpolated to fractions of a step, so that the outputs depend on them continuously,
+as a fit requires.
 """
 
 from typing import Final
@@ -48,11 +49,11 @@ QUADRATIC_SHARE: Final = 4
 GROUND_EFFECT: Final = 5
 MEASUREMENT_DELAY_S: Final = 6
 BATTERY_SAG: Final = 7
-"""Places in a model vector."""
+"""Indices in a model vector."""
 
 GROUND_EFFECT_HEIGHT_M: Final = 0.4
 BATTERY_SAG_S: Final = 33.0
-"""How long a flight takes to lose the whole sag."""
+"""Time in which a flight reaches the full sag."""
 
 CHANNELS: Final = ("altitude_m", "climb_rate_m_s", "reference_m", "thrust", "feed_forward", "feedback")
 
@@ -61,7 +62,7 @@ Counts = NDArray[np.int64]
 
 @kernel
 def delay_by(signal: Samples, steps: float) -> None:
-    """Shift a signal that was at rest at 0 before its first sample later by a fractional number of steps, in place."""
+    """Delay a signal by a fractional number of steps, in place; before its first sample it was at rest at 0."""
     whole = int(steps)
     part = steps - whole
     for i in range(len(signal) - 1, -1, -1):
@@ -72,8 +73,10 @@ def delay_by(signal: Samples, steps: float) -> None:
 
 @kernel
 def sensed(history: Samples, step: int, delay_steps: float) -> float:
-    """A signal as it was a fractional number of steps before `step`, at rest at 0 before its first; `history` holds its
-    last values in turns."""
+    """Value of a signal a fractional number of steps before `step`; before its first sample it was at rest at 0.
+
+    `history` is a ring buffer of its latest values.
+    """
     whole = int(delay_steps)
     part = delay_steps - whole
     size = len(history)
@@ -84,8 +87,8 @@ def sensed(history: Samples, step: int, delay_steps: float) -> float:
 
 @kernel
 def decay(x: float) -> float:
-    """exp(−x) for x ≥ 0, to 1e-13 of 1: multiplications only, the same on every machine, many at a time where runs go
-    side by side."""
+    """exp(−x) for x ≥ 0, accurate to 1e-13: multiplications only, so identical on every machine and vectorisable over
+    runs."""
     part = max(-x, -64.0) * (1 / 128)
     power = 1.0 + part * (1.0 + part * (1 / 2 + part * (1 / 6 + part * (1 / 24 + part * (1 / 120 + part * (1 / 720))))))
     power *= power
@@ -101,7 +104,8 @@ def decay(x: float) -> float:
 def lift_of(
     thrust: float, altitude: float, seconds: float, share: float, ground: float, sag: float, hover_force: float
 ) -> float:
-    """Acceleration of the rotors in g; `hover_force` is the force of the hover throttle, a share of the full one."""
+    """Thrust of the rotors in units of weight; `hover_force` is the force at hover throttle, as a share of full
+    force."""
     ratio = ((1.0 - share) * thrust + share * thrust * thrust) / hover_force
     if ground > 0.0:
         ratio *= 1.0 + ground * decay(altitude * (1.0 / GROUND_EFFECT_HEIGHT_M))
@@ -138,11 +142,10 @@ def _write_detail(detail: Samples, i: int, climb: float, command: int, state: St
 
 @kernel
 def rollout(gains: Counts, model: Samples, target: int, state: State, altitude: Samples, detail: Samples) -> int:
-    """Fly one takeoff to `target` (8 fractional bits) and return the largest |product| met in the loop.
+    """Fly one takeoff to `target` (8 fractional bits) and return the largest |product| in the loop.
 
     `gains` holds kp, ki, kd; `model` the eight parameters. Writes `altitude`, shape (n,), every 1/512 s from the
-    command on, and the other `CHANNELS` to `detail`, shape (5, n), or (5, 0) when they are not wanted. `state` is
-    scratch.
+    command on, and the other `CHANNELS` to `detail`, shape (5, n), or (5, 0) to omit them. `state` is scratch.
     """
     kp, ki, kd = gains[0], gains[1], gains[2]
     share, hover, lag, latency = (

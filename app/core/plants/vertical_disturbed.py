@@ -1,8 +1,8 @@
-"""A takeoff of the simple vertical model with what a recorded flight did beyond it added inside the control loop.
+"""Takeoff of the simple vertical model with the disturbances of a recorded flight added inside the control loop.
 
 The paper's step 4 (Abbeel et al. 2006): f(s, a) + s_{t+1} − f(s_t, a_t), indexed by time; s is altitude and climb rate,
-a the thrust command, whose lagged value follows from the commands. The loop is entered when the recorded flight's was:
-at its first thrust.
+a the thrust command, whose lagged value follows from the commands. The loop is entered at the first thrust of the
+recorded flight.
 """
 
 from typing import Final
@@ -39,7 +39,7 @@ ALTITUDE: Final = 0
 CLIMB_RATE: Final = 1
 ENTERED: Final = 2
 COLUMNS: Final = 3
-"""Columns of the disturbances: of altitude (m) and climb rate (m/s) in the step that follows, and whether the loop is
+"""Columns of the disturbances: of altitude (m) and climb rate (m/s) in the following step, and whether the loop is
 entered."""
 
 _NEVER: Final = 1 << 30
@@ -98,9 +98,9 @@ def _rollouts(gains: Counts, models: Samples, target: int, state: State, added: 
 
 
 def observe(altitude_m: Samples, climb_rate_m_s: Samples, thrust: Samples, model: Samples) -> Samples:
-    """What a flight recorded at 512 Hz, all of shape (n,), did beyond the model's steps: (n, 3), see `COLUMNS`.
+    """Disturbances of a flight recorded at 512 Hz, channels of shape (n,): (n, 3), see `COLUMNS`.
 
-    The model's latency and measurement delay play no part: what is recorded is taken for the state.
+    The model's latency and measurement delay are ignored: the recorded values are taken as the state.
     """
     found = np.zeros((len(altitude_m), COLUMNS))
     _observe(altitude_m, climb_rate_m_s, thrust, model, found)

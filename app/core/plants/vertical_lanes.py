@@ -1,11 +1,11 @@
-"""Many takeoffs of the simple vertical model side by side: bit for bit what `vertical.rollout` flies, at a third of the
+"""Simultaneous takeoffs of the simple vertical model: bit for bit the same as `vertical.rollout`, in a third of the
 time.
 
-All runs take a step before the next is begun, so that the inner loops go over runs and one machine instruction serves
-several of them. Two things make that possible. The loop's reference and feed-forward depend on the target alone, and
-come from a table. And its integers are held in doubles, whose arithmetic is exact for them as long as nothing wraps at
-32 bits: `are_exact` tells the gains with which no product can, and a run that gets so fast that its climb rate
-would is flown again by `rollout`.
+All runs take a step before the next step begins, so that the inner loops run over the lanes and can be vectorised. Two
+properties make this possible. The loop's reference and feed-forward depend on the target alone, and come from a table.
+And its integers are stored as doubles, whose arithmetic is exact for them as long as nothing wraps at 32 bits:
+`are_exact` selects the gains with which no product can wrap, and a run whose climb rate becomes too large for 32 bits
+is repeated with `rollout`.
 """
 
 from functools import lru_cache
@@ -55,18 +55,18 @@ from app.core.plants.vertical import (
 from app.core.trajectory import Samples
 
 BATCH_WIDTH: Final = 16
-"""So many runs go side by side at most."""
+"""Largest number of simultaneous runs."""
 FASTEST_M_S: Final = 4000.0
-"""Climb rates beyond do not fit into the loop's 32 bits (4096 m/s)."""
+"""Faster climb rates do not fit into the loop's 32 bits (4096 m/s)."""
 PAST: Final = 64
-"""Steps of altitude and climb rate that are remembered: a power of two."""
+"""Length of the altitude and climb rate buffers, in steps: a power of two."""
 
 _POSITION: Final = 0
 _SPEED: Final = 1
 _FEED_FORWARD: Final = 2
 _CHECK: Final = 3
 _GUIDE_SIZE: Final = 4
-"""Rows of the table that guides every run: reference position and speed, feed-forward, whether flight is checked."""
+"""Rows of the table shared by all runs: reference position and speed, feed-forward, whether flight is checked."""
 
 _KP: Final = 0 * BATCH_WIDTH
 _KI: Final = 1 * BATCH_WIDTH
@@ -90,9 +90,12 @@ _CLIMB_BEFORE: Final = 18 * BATCH_WIDTH
 _SENSED: Final = 19 * BATCH_WIDTH
 _FASTEST: Final = 20 * BATCH_WIDTH
 _SIZE: Final = 21 * BATCH_WIDTH
-"""Where in the array of the runs each of their numbers begins. One array at fixed distances, because only then does the
-compiler see that no number of one run is another's. The gains are negative, and scaled as the loop shifts their
-products; `_BEFORE` is what was sensed of height and climb rate a step ago, had the delay been whole."""
+"""Offsets of each quantity in the array of the runs.
+
+One array with fixed offsets lets the compiler see that the quantities of different runs do not overlap. The gains are
+negative, and scaled as the loop shifts their products. `_BEFORE` holds height and climb rate one step earlier, delayed
+by whole steps only.
+"""
 
 _POSITION_UNIT: Final = float(1 << POSITION_BITS)
 _SPEED_UNIT: Final = float(1 << SPEED_BITS)
@@ -102,7 +105,7 @@ _LARGEST_SUM: Final = float(ERROR_SUM_MAX)
 
 
 def are_exact(gains: Counts) -> NDArray[np.bool_]:
-    """The gain sets whose products cannot wrap: (k, 3) → (k,)."""
+    """Which gain sets have products that cannot wrap: (k, 3) → (k,)."""
     largest = np.abs(gains) * np.array([POSITION_ERROR_MAX, ERROR_SUM_MAX, SPEED_ERROR_MAX])
     return np.asarray((largest <= INT32_MAX).all(axis=1))
 
@@ -127,7 +130,7 @@ def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samp
 
 
 def _fly(gains: Counts, models: Samples, guide: Samples) -> tuple[Samples, Samples]:
-    """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs; the last one fills up to a multiple of
+    """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs, padded with the last to a multiple of
     four."""
     k = len(gains)
     filled = np.minimum(np.arange(-(-k // 4) * 4), k - 1)
@@ -145,7 +148,7 @@ def _guide(target: int, samples: int) -> Samples:
 
 @kernel
 def _write_guide(target: int, state: Counts, guide: Samples) -> None:
-    """What the loop does at every step whatever it senses, shape (4, n)."""
+    """The part of the loop that does not depend on what is sensed, for every step, shape (4, n)."""
     start(state, 0, 0)
     for i in range(guide.shape[1]):
         guide[_CHECK, i] = 1.0 if state[CHECK_PHASE] >= RATE_HZ else 0.0
@@ -213,9 +216,9 @@ def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, gui
 
 @kernel
 def _fly_lanes(gains: Counts, models: Samples, guide: Samples, altitude: Samples, fastest_m_s: Samples) -> None:
-    """Fly k runs, of which gains and models may be repeated to fill up: altitude out (j, n), fastest (j,), j ≤ k.
+    """Fly k runs, some of which may be padding: altitude out (j, n), fastest (j,), j ≤ k.
 
-    What is sensed late is written ahead, where it will be due, so that all runs read in the same place.
+    Delayed values are written ahead to where they are due, so that all runs read at the same index.
     """
     lanes, wanted = len(gains), len(altitude)
     runs, whole = np.zeros(_SIZE), np.zeros(BATCH_WIDTH, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The strategies there are."""
+"""Registry of strategies."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

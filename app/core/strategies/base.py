@@ -1,4 +1,4 @@
-"""What a strategy is: a pure function of a campaign's definition and its flights."""
+"""Interface of a strategy: a pure function of a campaign's definition and its flights."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -12,15 +12,18 @@ from app.core.spread import ParameterDistribution
 from app.core.trajectory import Trajectory
 
 ErrorsOf = Callable[[Matrix], Vector]
-"""Gains (k, g) → the errors that a model predicts for them, (k,)."""
+"""Gains (k, g) → the errors a model predicts for them, (k,)."""
 
 Kind = Literal["start", "step", "shorter step", "repeat", "baseline", "manual", "none"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LadderStep:
-    """One step size tried along the search line: length in the strategy's own metric, gains flown on the model, and
-    the predicted error there; `clipped` names the gains that a bound or step limit stopped."""
+    """One step size evaluated along the search line.
+
+    `length` is in the strategy's own metric, `gains` are those simulated; `clipped` names the gains limited by a bound
+    or the step limit.
+    """
 
     length: float
     gains: dict[str, float]
@@ -30,7 +33,7 @@ class LadderStep:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
-    """Where the error is expected, with probability `confidence`."""
+    """Predicted interval of the error, with probability `confidence`."""
 
     lower: float
     upper: float
@@ -42,10 +45,10 @@ class Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """Why these gains: sentences for a person, and the numbers behind them.
+    """Why these gains were chosen: sentences for a person, and the numbers behind them.
 
-    `lesson` says what the flight is expected to teach; `fitted` is empty for strategies that fit nothing;
-    `trust_fraction` is the share of each gain's range that the step was allowed, None without a trust region.
+    `lesson` is what the flight is expected to show; `fitted` is empty for strategies without a fit; `trust_fraction` is
+    the allowed step as a share of each gain's range, None without a trust region.
     """
 
     summary: str
@@ -66,10 +69,9 @@ class Proposal:
     """The next gain set. Kind `none` means that the strategy has nothing better to offer, `manual` that the operator
     chooses; `gains` is then the best flown.
 
-    `spread` is what is known of the vehicle, where the strategy has found it out; it is costly to find again.
-    `predicted` is the corrected model's output for these gains on the experiment's grid; where a band is known, it has
-    two more channels, named by `band_channels`. `interval` is where the flight's error is expected, its scatter
-    included.
+    `predicted` is the corrected model's output for these gains on the experiment's grid; with a band it has two more
+    channels, named by `band_channels`. `interval` is the predicted interval of the flight's error, scatter included.
+    `spread` is the vehicle's parameter distribution if the strategy has computed it, which is expensive.
     """
 
     kind: Kind
@@ -83,12 +85,12 @@ class Proposal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strategy:
-    """A registered strategy: `propose(definition, experiment, space, flights)`, with at least one valid flight.
+    """A registered strategy.
 
-    `foresee(definition, experiment, flights)` is the model that its proposals' errors come from, for many gain sets.
-
-    `experiments` names those it works with; empty: with all. `learns`: whether its predictions are corrected by the
-    flight that its explanation names as the base. `needs_model`: whether it finds gains by flying them on a model.
+    `propose(definition, experiment, space, flights)` requires at least one valid flight. `predict_errors(definition,
+    experiment, flights)` returns the model from which the predicted errors of its proposals come, for many gain sets.
+    `experiments` names those it supports; empty for all. `corrects_model`: whether its predictions are corrected by the
+    flight that its explanation names as the base. `needs_model`: whether it searches for gains on a model.
     """
 
     name: str
@@ -102,11 +104,11 @@ class Strategy:
     needs_model: bool = True
 
     def works_with(self, experiment: Experiment) -> bool:
-        """Whether a campaign may combine the two."""
+        """Whether a campaign may combine this strategy with the experiment."""
         named = not self.experiments or experiment.name in self.experiments
         return named and not (self.needs_model and experiment.modelled is None)
 
 
 def band_channels(output: str) -> tuple[str, str]:
-    """Names of the channels that hold the lower and the upper edge of a predicted output's band."""
+    """Names of the channels with the lower and the upper edge of a predicted output's band."""
     return f"{output}_lower", f"{output}_upper"

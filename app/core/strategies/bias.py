@@ -1,4 +1,4 @@
-"""The simple model, corrected by what one flight showed."""
+"""The simple model, corrected by one flight."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ from app.core.trajectory import Samples, Trajectory
 
 @dataclass(frozen=True, slots=True)
 class CorrectedModel:
-    """Model output plus a bias over time, outside the control loop: ŷ(t; gains) = model(t; gains) + b(t).
+    """Model output plus a time-dependent bias, outside the control loop: ŷ(t; gains) = model(t; gains) + b(t).
 
-    `bias` lies on the experiment's grid, shape (n,).
+    `bias` is given on the experiment's grid, shape (n,).
     """
 
     experiment: ModelledExperiment
@@ -39,8 +39,8 @@ class CorrectedModel:
 
 @dataclass(frozen=True, slots=True)
 class DisturbedModel(CorrectedModel):
-    """The model with what a flight did beyond it in every step added to its state at the same instants, inside the
-    control loop (Abbeel et al. 2006, the paper's step 4); `bias` is zero."""
+    """The model with a flight's disturbances added to its state at the same times, inside the control loop (Abbeel et
+    al. 2006, the paper's step 4); `bias` is zero."""
 
     disturbances: Matrix
 
@@ -50,19 +50,21 @@ class DisturbedModel(CorrectedModel):
 
 
 def uncorrected_model(experiment: ModelledExperiment) -> CorrectedModel:
-    """What is known before the first flight: no correction."""
+    """The nominal model without a correction, used before the first flight."""
     return CorrectedModel(experiment, experiment.nominal_model, np.zeros_like(experiment.grid_s))
 
 
 def correct_by_bias(experiment: ModelledExperiment, flight: Flight) -> CorrectedModel:
-    """b(t) = measured(t) − model(t; flown gains)."""
+    """The nominal model with the bias of a flight: b(t) = measured(t) − model(t; flown gains)."""
     flown = experiment.outputs(experiment.space.vector(flight.gains)[np.newaxis], experiment.nominal_model)[0]
     return CorrectedModel(experiment, experiment.nominal_model, resample_to_grid(experiment, flight) - flown)
 
 
 def correct_in_loop(experiment: ModelledExperiment, flight: Flight) -> DisturbedModel | None:
-    """The nominal model with the flight's disturbances inside the loop, the flight taken as the database keeps it; None
-    where its record lacks a state or the command."""
+    """The nominal model with the flight's disturbances inside the loop, from the trajectory as stored.
+
+    None if its record lacks a state or the command.
+    """
     disturbances = experiment.disturbances(
         flight.trajectory.as_stored(), experiment.space.vector(flight.gains), experiment.nominal_model
     )

@@ -1,7 +1,7 @@
-"""Fit the model to all flights, then choose the gains that fly best on it.
+"""Fit the model to all flights, then choose its optimal gains.
 
-The choice is a hedge over a few plausible models (`hedging`), inside a trust region around the best flight (`trust`).
-What the gate would refuse is not proposed: such a step is halved until it passes.
+The choice is the robust optimum over a few plausible models (`hedging`), inside a trust region around the best flight
+(`trust`). A step that the gate would refuse is halved until it passes.
 """
 
 from collections.abc import Sequence
@@ -26,10 +26,10 @@ from app.core.wording import percent, short
 
 MODELS: Final = 8
 ROBUSTNESS_SD: Final = 0.75
-"""How far the models lie from the fit that the choice is hedged over, in standard deviations: more costs error on
-vehicles that are what they seem, less costs it on the others."""
+"""Distance of the models from the fit in the robust optimisation, in standard deviations. A larger value increases the
+error on vehicles that match the fit, a smaller one on those that do not."""
 MIN_IMPROVEMENT: Final = 0.005
-"""A step that promises less than this share of the error is not worth a flight."""
+"""A step predicted to improve the error by less than this share is not worth a flight."""
 
 _HALVINGS: Final = 5
 _DIFFERENCE: Final = 0.1
@@ -37,7 +37,7 @@ _DIFFERENCE: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class _ChosenGains:
-    """Gains to fly, shape (n,), how that came about, and what else the model had in mind."""
+    """Gains to fly, shape (n,), how they were chosen, and the unshortened optimum."""
 
     kind: Kind
     gains: Vector
@@ -48,9 +48,9 @@ class _ChosenGains:
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """The hedged optimum of the calibrated model, as far as trust goes. At least one flight must be valid.
+    """Propose the robust optimum of the calibrated model, within the trust region. At least one flight must be valid.
 
-    Raises TypeError for an experiment that it is not made for.
+    Raises TypeError for experiments other than the takeoff.
     """
     if not isinstance(experiment, Takeoff):
         raise TypeError(f"calibrated works with takeoff only, not with {experiment.name}")
@@ -86,7 +86,7 @@ def propose(
 
 
 def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors that the calibrated model foretells. At least one flight must be valid."""
+    """The errors predicted by the calibrated model. At least one flight must be valid."""
     calibration = calibrate(experiment, flights)
     base = best_flight([flight for flight in flights if flight.number in calibration.numbers])
     return partial(predict_errors, calibration, base)
@@ -125,7 +125,8 @@ def _choose(
 
 
 def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
-    """∂error/∂gain at the best flight by central differences, as the hedge has it; zero for a pinned gain."""
+    """∂error/∂gain at the best flight by central differences, averaged as in the robust optimum; zero for a pinned
+    gain."""
     steps = np.diag(np.maximum(np.rint(_DIFFERENCE * takeoff.space.scale), 1.0))
     above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
     errors = merit(takeoff, np.concatenate((above, below)), models)
@@ -169,7 +170,7 @@ def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> str:
-    """The parameter that the foretold error hangs on most."""
+    """The parameter to which the predicted error is most sensitive, as a sentence."""
     values = prediction.models - prediction.models.mean(axis=0)
     errors = prediction.errors - prediction.errors.mean()
     spread = np.linalg.norm(values, axis=0)

@@ -1,8 +1,8 @@
-"""What a calibrated model expects of a flight: its curve with a band, its error with an interval.
+"""Predictions of a calibrated model: a flight's curve with a band, and its error with an interval.
 
-The remaining bias is kept inside the loop: what the best flight did beyond its own calibrated model in every step acts
-on the new gains as well, so that gains which hold against gusts are credited with it. Where the record lacks the climb
-rate or the thrust command, it is added outside the loop, the less the further the gains are from the flown ones.
+The remaining bias acts inside the loop: the disturbances of the best flight relative to its own calibrated model are
+applied to the new gains as well, so that gains which reject gusts are credited for it. If the record lacks the climb
+rate or the thrust command, the bias is added outside the loop, and fades with the distance from the flown gains.
 """
 
 from dataclasses import dataclass
@@ -22,17 +22,17 @@ CONFIDENCE: Final = 0.9
 
 _MODELS: Final = 16
 _AT_ONCE: Final = 8
-"""Gain sets that are flown together: their curves are held in memory."""
+"""Number of gain sets simulated together, limited because their curves are held in memory."""
 _MODEL_ERROR: Final = 0.02
-"""Share of the error that even the best simple model is off."""
+"""Relative error of even the best simple model."""
 _GUST_VARIATION: Final = 0.5
-"""Share by which the next flight's gusts cost more or less than the last one's did."""
+"""Relative variation of the error caused by gusts between flights."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlightPrediction:
-    """The expected curve with its band, the expected error with its interval, and the models it was made with: (k, m),
-    with their errors (k,)."""
+    """Predicted curve with its band, predicted error with its interval, and the models used: (k, m), with their errors
+    (k,)."""
 
     trajectory: Trajectory
     error: float
@@ -42,7 +42,7 @@ class FlightPrediction:
 
 
 def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> FlightPrediction:
-    """A flight of `gains`, shape (n,); `base` is the best of the calibrated flights."""
+    """Predict a flight with `gains`, shape (n,); `base` is the best of the calibrated flights."""
     from scipy.special import ndtri
 
     experiment = calibration.experiment
@@ -70,7 +70,7 @@ def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> Fli
 
 
 def predict_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vector:
-    """The errors that `foretell` gives to many gain sets, a few at a time: (c, n) → (c,)."""
+    """Errors as predicted by `predict_flight` for many gain sets, a few at a time: (c, n) → (c,)."""
     experiment = calibration.experiment
     models = calibration.plausible(runs=_MODELS, next_flight=True)
     errors = np.empty(len(gains))
@@ -83,7 +83,7 @@ def predict_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vec
 
 
 def remaining_bias(calibration: Calibration, base: Flight, gains: Vector) -> Samples:
-    """What a flight of `gains`, shape (n,), is expected to do beyond the calibrated model, on the grid."""
+    """Expected deviation of a flight with `gains`, shape (n,), from the calibrated model, on the grid."""
     return np.asarray(remaining_biases(calibration, base, gains[np.newaxis])[0])
 
 
@@ -103,5 +103,5 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
 
 
 def _similarity(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:
-    """1 at the flown gains, 0.6 one scale away from them."""
+    """1 at the flown gains, 0.6 at a distance of one scale."""
     return float(np.exp(-0.5 * np.sum(((gains - flown) / experiment.space.scale) ** 2)))

@@ -1,9 +1,9 @@
-"""The paper's strategy: descend the corrected model's error along its gradient.
+"""The paper's strategy: gradient descent on the corrected model.
 
 The base is the best flight so far. The model, corrected by it outside the loop (or inside, as an option), gives the
-gradient (central differences) and the error at every step of a geometric ladder along its negative; the best step is
-flown. A flight that does not improve leaves the base, and with it the line, where it was: the next one goes half as far
-along it. So does a step that the gate would refuse.
+gradient (central differences) and the error at every step of a geometric ladder along the negative gradient; the best
+step is flown. A flight that does not improve leaves the base and the line unchanged, and the next step is half as long.
+A step that the gate would refuse is halved in the same way.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -26,9 +26,9 @@ from app.core.wording import short
 
 SCALED_LADDER: Final = tuple(2.0**power for power in range(3, -13, -1))
 RAW_LADDER: Final = tuple(10.0 ** (tenths / 10) for tenths in range(30, -1, -1))
-"""Where gains are whole counts."""
+"""Step lengths if a gain is an integer."""
 RAW_REAL_LADDER: Final = SCALED_LADDER
-"""Where all are real: a step of 1 may be far too long."""
+"""Step lengths if all gains are real: a step of 1 may be far too long."""
 MIN_DIFFERENCE: Final = 2.0
 _HALVINGS: Final = 24
 _OUTSIDE: Final = "The correction is added outside the control loop, as a bias over time"
@@ -36,15 +36,18 @@ _OUTSIDE: Final = "The correction is added outside the control loop, as a bias o
 
 @dataclass(frozen=True, slots=True)
 class _Metric:
-    """How lengths are measured: the scale of each gain, shape (n,), and the ladder of lengths tried."""
+    """How step lengths are measured: the scale of each gain, shape (n,), and the ladder of lengths."""
 
     scale: Vector
     ladder: tuple[float, ...]
 
 
 def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vector) -> Vector:
-    """∂error/∂gain at `base`, shape (n,): central differences over the experiment's share of `scale` to each side, at
-    least 2 counts for integer gains, cut off at the bounds; zero where the bounds pin a gain."""
+    """∂error/∂gain at `base`, shape (n,), by central differences.
+
+    The step to each side is the experiment's share of `scale`, at least 2 counts for integer gains, and limited by the
+    bounds; zero where the bounds pin a gain.
+    """
     integer = np.array([gain.integer for gain in space.gains])
     wanted = model.experiment.difference * scale
     steps = np.where(integer, np.maximum(np.rint(wanted), MIN_DIFFERENCE), wanted)
@@ -64,7 +67,7 @@ def _raw_metric(space: PolicySpace) -> _Metric:
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """The next gains on the line from the best flight. At least one flight must be valid."""
+    """Propose the next gains on the line from the best flight. At least one flight must be valid."""
     metric = _Metric(space.scale, SCALED_LADDER) if definition.options.get("scaled", True) else _raw_metric(space)
     base = best_flight(flights)
     base_gains = space.nearest(space.vector(base.gains))
@@ -107,7 +110,7 @@ def propose(
 
 
 def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the model, corrected by the best flight. At least one flight must be valid."""
+    """The errors of the model corrected by the best flight. At least one flight must be valid."""
     return _corrected(definition, experiment, best_flight(flights))[0].errors
 
 
@@ -118,10 +121,10 @@ def _first_allowed_step(
     model: CorrectedModel,
     passes: Callable[[Vector], bool],
 ) -> tuple[LadderStep | None, tuple[LadderStep, ...]]:
-    """The best step, or half of it, or half of that …: the first that was not flown yet and passes the gate; and those
-    that did not pass.
+    """Halve the best step until it was not flown yet and passes the gate; also return the steps that did not pass.
 
-    What was flown did not improve on the base, which is the best of all flights. None once a step rounds to the base.
+    Gains already flown did not improve on the base, which is the best of all flights. None once a step rounds to the
+    base.
     """
     refused: list[LadderStep] = []
     for length in _halvings(best.length):
@@ -171,7 +174,7 @@ def _summary(
 
 
 def _corrected(definition: Definition, experiment: ModelledExperiment, base: Flight) -> tuple[CorrectedModel, str]:
-    """The corrected model, and how it is corrected."""
+    """The corrected model, and a sentence about how it is corrected."""
     if definition.options.get("bias") != "inside":
         return correct_by_bias(experiment, base), f"{_OUTSIDE}."
     if (inside := correct_in_loop(experiment, base)) is not None:

@@ -1,8 +1,9 @@
-"""Gains that fly well on several plausible models at once.
+"""Robust optimum: gains that perform well on several plausible models at once.
 
-A policy is judged by its mean error over the models, plus a metre for each metre by which it rises above 3.6 m on any
-of them or stays below 2.4 m after five seconds: a good distance from what is unsafe. First a fixed set of points spread
-over the box, cut short after 8 s and on half the models; then Nelder–Mead on whole counts from the best two.
+The merit of a policy is its mean error over the models, plus a penalty of one metre per metre by which it rises above
+3.6 m on any model or stays below 2.4 m after five seconds; both limits keep a margin from what is unsafe. A fixed set
+of points spread over the box is evaluated first, for 8 s only and on half the models; then Nelder–Mead on integer
+counts starts from the best two.
 """
 
 from dataclasses import dataclass
@@ -25,30 +26,30 @@ _COARSE_S: Final = 8.0
 _FINE_S: Final = 12.0
 _EVALUATIONS: Final = (60, 40)
 _DIGITS: Final = 9
-"""Merits are compared in nanometres: what lies below differs between machines."""
+"""Merits are rounded to nanometres: smaller differences vary between machines."""
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Lowest and highest gains that may be chosen, both of shape (n,)."""
+    """Lowest and highest allowed gains, both of shape (n,)."""
 
     low: Vector
     high: Vector
 
     def nearest(self, gains: Vector) -> Vector:
-        """The closest whole counts in the box."""
+        """The closest integer counts in the box."""
         return np.clip(np.rint(gains), self.low, self.high)
 
 
 def merit(takeoff: Takeoff, gains: Matrix, models: Matrix, until_s: float = _FINE_S) -> Vector:
-    """Mean error, m, with what is added for unsafe flights: gains (c, 3), models (k, m) → (c,); lower is better."""
+    """Mean error, m, plus the penalty for unsafe flights: gains (c, 3), models (k, m) → (c,); lower is better."""
     sketches = takeoff.sketches(gains, models, until_s)
     beyond = np.maximum(sketches.highest_m - HIGHEST_M, 0.0) + np.maximum(LOWEST_M - sketches.lowest_m, 0.0)
     return np.asarray(np.round(sketches.errors.mean(axis=1) + beyond.max(axis=1), _DIGITS))
 
 
 def find_robust_optimum(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
-    """The best gains found in the box, shape (n,); `known` (c, n) are tried among the first points."""
+    """The best gains found in the box, shape (n,); `known` (c, n) are included in the first points."""
     spread = box.low + halton(len(box.low), _POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))
     first = merit(takeoff, points, models[::2], _COARSE_S)

@@ -1,4 +1,4 @@
-"""Questions that strategies ask of the flights so far."""
+"""Queries of the flight history, shared by strategies."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ def best_flight(flights: Sequence[Flight]) -> Flight:
 
 
 def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
-    """Whether these gains were flown before: to the end, or until something spoke against them."""
+    """Whether these gains were flown before, to the end or until an abort that counts against them."""
     return any(
         dict(flight.gains) == dict(gains) for flight in flights if flight.outcome == "valid" or flight.against_gains
     )

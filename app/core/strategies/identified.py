@@ -1,4 +1,4 @@
-"""Identify the aircraft's model again from the flights, then fly the optimum of the identified model."""
+"""Identify the aircraft's model from the flights, then fly its optimum."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,9 +29,9 @@ _RESTARTS: Final = 8
 _SETTLED: Final = 1e-4
 _MODELS: Final = 48
 _MIN_IMPROVEMENT: Final = 0.002
-"""Share of the best error that the model must promise to gain."""
+"""Smallest predicted improvement worth a flight, as a share of the best flight's expected error."""
 _MODEL_ERROR_SD: Final = 0.005
-"""Standard deviation of what no linear model knows, as a share of the predicted error."""
+"""Standard deviation of the error of any linear model, as a share of the predicted error."""
 _TAIL: Final = 0.05
 _TAIL_SD: Final = 1.6449
 
@@ -39,9 +39,11 @@ _TAIL_SD: Final = 1.6449
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """The optimum of the model identified from all flights, within the step limit of the best. At least one flight must
-    be valid."""
-    assert isinstance(experiment, PitchTracking)  # a definition with another experiment is refused
+    """Propose the optimum of the model identified from all flights, within the step limit around the best flight.
+
+    At least one flight must be valid.
+    """
+    assert isinstance(experiment, PitchTracking)  # definitions with another experiment are refused
     base = best_flight(flights)
     fit = _fit_of(definition)
     found = identify(experiment, flights, fit)
@@ -68,7 +70,8 @@ def propose(
 
 
 def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the model identified from all flights, of the nominal one where none recorded what that takes."""
+    """The errors of the model identified from all flights, or of the nominal model if no flight recorded the required
+    channels."""
     assert isinstance(experiment, PitchTracking)
     found = identify(experiment, flights, _fit_of(definition))
     if found is None:
@@ -82,8 +85,10 @@ def _fit_of(definition: Definition) -> Fit:
 
 
 def _optimum(aircraft: PitchTracking, space: PolicySpace, low: Vector, high: Vector, base: Vector) -> Optimum:
-    """Nelder–Mead on the identified model from the best of 256 spread over the bounds and from the flown gains, started
-    again from its end until that gains nothing."""
+    """Nelder–Mead on the identified model, from the best of 256 points spread over the bounds and from the flown gains.
+
+    Each search is restarted from its end until it no longer improves.
+    """
     reach = PolicySpace(
         tuple(
             replace(gain, lower=float(lower), upper=float(upper))
@@ -110,7 +115,7 @@ def _restarted(aircraft: PitchTracking, space: PolicySpace, start: Vector) -> Op
 
 
 def _expected_error(aircraft: PitchTracking, found: Identified, gains: Vector) -> float:
-    """What the flight is expected to be scored: the model's error, with the noise of the recorded pitch in it."""
+    """Expected score of the flight: the model's error, including the noise of the recorded pitch."""
     return float(_expected_errors(aircraft, found, gains[np.newaxis])[0])
 
 
@@ -119,7 +124,7 @@ def _expected_errors(aircraft: PitchTracking, found: Identified, gains: Matrix) 
 
 
 def _folded(outputs: Matrix, noise: float) -> Matrix:
-    """The mean of |output + normal noise|, whose standard deviation is above zero."""
+    """Mean of |output + normal noise|; `noise` is its standard deviation, above zero."""
     from scipy.special import erf
 
     apart = outputs / (noise * np.sqrt(2.0))
@@ -127,7 +132,7 @@ def _folded(outputs: Matrix, noise: float) -> Matrix:
 
 
 def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> tuple[Trajectory, float, Interval]:
-    """Predicted output with its band, error, and interval: over models as plausible as the identified one."""
+    """Predicted output with its band, error, and interval, over models from the fit's distribution."""
     spread = ParameterDistribution(
         mean=tuple(found.model.tolist()),
         covariance=tuple(tuple(row) for row in found.covariance.tolist()),

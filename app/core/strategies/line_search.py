@@ -1,4 +1,4 @@
-"""Trying step sizes along one direction on a model."""
+"""Line search: evaluates step sizes along one direction on a model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from app.core.strategies.bias import CorrectedModel
 
 @dataclass(frozen=True, slots=True)
 class SearchLine:
-    """Flyable gains at every length from `base` along `direction` (gains per unit of length), each gain held within
-    `low` … `high`; all of shape (n,)."""
+    """Flyable gains along `direction` (gains per unit of length) from `base`, each limited to `low` … `high`; all of
+    shape (n,)."""
 
     space: PolicySpace
     base: Vector
@@ -25,7 +25,7 @@ class SearchLine:
         return np.clip(self.space.nearest(self.base + length * self.direction), self.low, self.high)
 
     def clipped(self, length: float) -> tuple[str, ...]:
-        """The gains that a bound or step limit stops at this length."""
+        """Gains that are limited by a bound or the step limit at this length."""
         wanted = self.base + length * self.direction
         wanted = np.where([gain.integer for gain in self.space.gains], np.rint(wanted), wanted)
         stopped = (wanted < self.low) | (wanted > self.high)

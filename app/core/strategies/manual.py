@@ -1,4 +1,4 @@
-"""The operator's own gains, through the same checks."""
+"""Gains chosen by the operator, subject to the same checks."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -13,8 +13,10 @@ from app.core.wording import short
 
 
 def propose(_definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
-    """The best flown gains, or the nearest inside the bounds, for the operator to change; without a model nothing is
-    predicted of them. At least one flight must be valid."""
+    """Propose the best flown gains, or the nearest inside the bounds, for the operator to change.
+
+    Without a model nothing is predicted. At least one flight must be valid.
+    """
     best = best_flight(flights)
     gains = space.nearest(space.vector(best.gains))
     modelled = experiment.modelled
@@ -33,7 +35,7 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
 
 
 def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the model, corrected by the best flight. At least one flight must be valid."""
+    """The errors of the model corrected by the best flight. At least one flight must be valid."""
     return correct_by_bias(experiment, best_flight(flights)).errors
 
 

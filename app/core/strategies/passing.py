@@ -1,4 +1,4 @@
-"""Whether the gate would let a step fly, asked before it is proposed."""
+"""Gate check of a step before it is proposed."""
 
 from app.core.definition import Definition
 from app.core.envelope import envelope_of
@@ -10,5 +10,5 @@ from app.core.spread import ParameterDistribution
 def allows(
     definition: Definition, experiment: ModelledExperiment, gains: Vector, spread: ParameterDistribution
 ) -> bool:
-    """Whether the experiment sees no hazard in gains of shape (n,) over what is known of the vehicle."""
+    """Whether gains of shape (n,) pass the experiment's hazard checks over the vehicle's parameter distribution."""
     return all(check.passed for check in experiment.hazards(gains, spread, envelope_of(definition, experiment)))

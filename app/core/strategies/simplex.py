@@ -1,4 +1,4 @@
-"""Nelder–Mead on the nominal model alone: the paper's starting point, also a strategy."""
+"""Nelder–Mead on the nominal model alone: the paper's starting point, and also a strategy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _UNLIMITED: Final = 1_000_000
 
 
 def _first_steps(search: SimplexSearch, space: PolicySpace, start: Vector) -> Vector:
-    """The search's own steps upward, or downward where the bounds leave more room there."""
+    """The search's first steps, upward, or downward where the bounds leave more room."""
     step = search.of_gain * start + search.of_scale * space.scale + search.constant
     up, down = np.minimum(step, space.upper - start), np.minimum(step, start - space.lower)
     return np.where(up >= down, up, -down)
@@ -30,8 +30,8 @@ def _first_steps(search: SimplexSearch, space: PolicySpace, start: Vector) -> Ve
 
 @dataclass(frozen=True, slots=True)
 class Optimum:
-    """Where the search on the model ended: gains of shape (n,), the model's error there, evaluations spent; `course` is
-    the lowest error after each iteration."""
+    """Result of a search on the model: gains of shape (n,), the model's error there, and the evaluations used; `course`
+    is the lowest error after each iteration."""
 
     gains: Vector
     error: float
@@ -40,8 +40,11 @@ class Optimum:
 
 
 def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vector) -> Optimum:
-    """Nelder–Mead within the bounds, with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's own),
-    first steps and budget the experiment's own; gains are rounded before each run of the model, and run once."""
+    """Nelder–Mead with reflection 1, expansion 2, contraction ½ and shrinkage ½ (the library's defaults).
+
+    First steps, bounds and budget come from the experiment. Gains are rounded before each model run; a rounded set is
+    run once.
+    """
     from scipy.optimize import minimize
 
     model, search = uncorrected_model(experiment), experiment.search
@@ -79,8 +82,8 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """The nominal model's optimum, or as far towards it as the step limit lets the best flight go. At least one flight
-    must be valid."""
+    """Propose the nominal model's optimum, limited by the step limit around the best flight. At least one flight must
+    be valid."""
     start = space.vector(definition.start.gains) if definition.start.gains else space.nearest(space.default)
     optimum = model_optimum(experiment, space, start)
     base = best_flight(flights)
@@ -110,7 +113,7 @@ def propose(
 
 
 def foresee(_definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the nominal model, which no flight changes."""
+    """The errors of the nominal model, which flights do not change."""
     return uncorrected_model(experiment).errors
 
 

@@ -1,4 +1,4 @@
-"""How far a step may go from the best flight: as far as the predictions before it held."""
+"""Trust region: how far a step may go from the best flight, given how well earlier predictions held."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -10,11 +10,11 @@ GROW: Final = 2.0
 
 
 def trust_fraction(flights: Sequence[Flight]) -> float:
-    """Share of each gain's range, at most 1, from the flights in their order.
+    """Allowed step as a share of each gain's range, at most 1, from the flights in order.
 
-    The whole range until a prediction fails. Half as much after a flight that was aborted for its gains and after one
-    whose error lies above its predicted interval, twice as much after one inside it. The first valid flight says
-    nothing: what foretold it was not calibrated.
+    Starts at the whole range. Halved after a flight aborted because of its gains, and after one whose error exceeds its
+    predicted interval; doubled after one inside the interval. The first valid flight is ignored, because its prediction
+    did not come from a calibrated model.
     """
     fraction, is_calibrated = 1.0, False
     for flight in flights:
