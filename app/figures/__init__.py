@@ -1,6 +1,6 @@
 """The figures of a campaign, one file each: plain data in, a Plotly figure and a data table out.
 
-A new figure is one file and one line in `CAMPAIGN_FIGURES`.
+A new figure takes one file and one line in `CAMPAIGN_FIGURES`.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""What every figure is, and the card that a page, a report or a notebook shows it on."""
+"""Interface of figures, and the card on which a page, report or notebook shows one."""
 
 import html
 import logging
@@ -11,15 +11,16 @@ PlotlyJson = Mapping[str, object]
 CardState = Literal["ready", "waiting", "failed"]
 
 CHECKED_ITEMS: Final = 20
-"""Of a list in a trace: each is as long as there are flights or samples, and made of one kind."""
+"""Number of items validated per list of a trace: a list is as long as there are flights or samples, with items of one
+kind."""
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a data table; `digits` after the point, None for text and for numbers of any size, which are read
-    to four significant digits."""
+    """One column of a data table; `digits` is the number of decimals, None for text and for numbers of any size, which
+    are shown with four significant digits."""
 
     name: str
     title: str
@@ -29,7 +30,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """The same data as the figure, for those who cannot see it or want the numbers."""
+    """The data of the figure as a table, for those who cannot see it or want the numbers."""
 
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -37,9 +38,9 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """A figure with its table and one sentence that says what it shows.
+    """A figure with its table and a one-sentence summary.
 
-    `waiting`: there is nothing to draw yet, `reason` says what is missing. `failed`: drawing broke, `reason` says how.
+    `waiting`: there is nothing to draw yet, `reason` says what is missing. `failed`: drawing failed, `reason` says how.
     """
 
     name: str
@@ -52,7 +53,7 @@ class Card:
 
 
 class Figure(Protocol):
-    """One figure over plain data; it never reads anything else."""
+    """One figure over plain data, without any other input."""
 
     name: ClassVar[str]
 
@@ -67,7 +68,8 @@ class Figure(Protocol):
 
 
 def card_of(figure: Figure) -> Card:
-    """The figure's card; a figure that is not ready or breaks yields a card that says so, never an exception."""
+    """Compute the figure's card; one that is not ready, or raises, yields a card that reports this, never an
+    exception."""
     try:
         if (missing := figure.not_ready()) is not None:
             return Card(name=figure.name, title=figure.title, state="waiting", reason=missing)
@@ -83,13 +85,15 @@ def card_of(figure: Figure) -> Card:
 
 
 def literal(text: str) -> str:
-    """Somebody's words for a trace's name or hover text: Plotly takes neither markup nor a template out of them."""
+    """Escape user text for a trace's name or hover text, so that Plotly finds neither markup nor templates in it."""
     return html.escape(text, quote=False).replace("%{", "%&#123;")
 
 
 def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, object]) -> PlotlyJson:
-    """Traces and layout as Plotly's own JSON, every property checked, of long lists their first items. Raises
-    ValueError on one that does not exist."""
+    """Traces and layout as Plotly's own JSON, with every property validated, and the first items of long lists.
+
+    Raises ValueError for a property that does not exist.
+    """
     import plotly.graph_objects as go
 
     go.Figure(data=[_shortened(trace) for trace in traces], layout=dict(layout))
@@ -97,7 +101,7 @@ def plotly_json(traces: Sequence[Mapping[str, object]], layout: Mapping[str, obj
 
 
 def _shortened(properties: Mapping[str, object]) -> dict[str, object]:
-    """The same properties, of lists the first items only: Plotly takes its time over each."""
+    """The same properties with lists cut to their first items: Plotly's validation of long lists is slow."""
     return {name: _head(value) for name, value in properties.items()}
 
 

@@ -1,4 +1,4 @@
-"""The voltage before and after each flight of a vehicle, by battery."""
+"""Voltage before and after each flight of a vehicle, by battery."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Final
@@ -9,7 +9,7 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 
 _BEFORE_PX: Final = 14
 _AFTER_PX: Final = 7
-"""A voltage that did not change is a dot in its ring."""
+"""An unchanged voltage appears as a dot inside its ring."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class BatteryFlight:
 
 @dataclass(frozen=True, slots=True)
 class BatteriesFigure:
-    """Table columns: `flight`, `battery`, `before`, `after`. A line leads from each voltage before to the one after."""
+    """Table columns: `flight`, `battery`, `before`, `after`. A line connects each voltage before with the one after."""
 
     flights: tuple[BatteryFlight, ...]
     theme: ThemeName = "light"

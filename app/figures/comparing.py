@@ -1,4 +1,4 @@
-"""Flights of any campaigns over the set point, and below them how each differs from the first."""
+"""Flights of any campaigns over the set point, and below them the difference of each from the first."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Final
@@ -19,7 +19,7 @@ LONGEST_NAME: Final = 34
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparedCurve:
-    """One flight: `label` is its letter, `name` what it is called; `curve` None where it left no record."""
+    """One flight: `label` is its letter, `name` its title; `curve` is None if it has no record."""
 
     trial_id: int
     label: str
@@ -29,12 +29,12 @@ class ComparedCurve:
 
 
 Drawn = tuple[int, ComparedCurve, Curve]
-"""A flight with its place among all of them, and its curve."""
+"""A flight with its index among all flights, and its curve."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparisonData:
-    """At least two flights, at most 36: so many pairs of colour and dash there are."""
+    """At least two flights, at most 36, the number of combinations of colour and dash."""
 
     output_title: str
     output_unit: str
@@ -47,8 +47,8 @@ class ComparisonData:
 class ComparisonFigure:
     """Table columns: `time_s`, `set_point`, the flights by their letters (`a`, `b`, …), and `b_less_a` and so on.
 
-    Every trace carries `meta`: `role` (set point, flight, difference, off scale) and, but for the set point, `trial`.
-    A flight has the same colour and dash in both panels; no other has both in common with it.
+    Every trace carries `meta`: `role` (set point, flight, difference, off scale) and, except for the set point,
+    `trial`. A flight has the same colour and dash in both panels, and no other flight has the same combination.
     """
 
     data: ComparisonData
@@ -85,7 +85,7 @@ class ComparisonFigure:
         ]
 
     def _differences(self, recorded: list[Drawn]) -> list[Drawn]:
-        """Of every other flight against the first one, on that one's instants as far as both were recorded."""
+        """Difference of every other flight from the first, at the first one's times, where both were recorded."""
         first = self.data.flights[0].curve
         if first is None or len(first.time_s) == 0:
             return []
@@ -205,7 +205,7 @@ class ComparisonFigure:
 
 
 def line_style(palette: Palette, index: int) -> tuple[str, str]:
-    """Colour and dash of the flight at that place; neighbours differ in both."""
+    """Colour and dash of the flight at an index; neighbours differ in both."""
     teal, orange, blue = palette.gains
     colours = (palette.ink, teal, orange, blue, palette.prediction, palette.bad)
     return colours[index % len(colours)], DASHES[(index + index // len(colours)) % len(DASHES)]
@@ -227,7 +227,7 @@ def _shortened(text: str) -> str:
 
 
 def _off_scale(palette: Palette, flight: ComparedCurve, curve: Curve, low: float, high: float) -> dict[str, object]:
-    """A triangle at the edge where a flight leaves the scale, with how far it went."""
+    """A triangle at the edge where a flight leaves the scale, labelled with its peak value."""
     up = bool(curve.values.max() - high >= low - curve.values.min())
     peak = int(curve.values.argmax() if up else curve.values.argmin())
     text = f"{flight.label} reaches {curve.values[peak]:.2f}"

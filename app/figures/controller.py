@@ -1,4 +1,4 @@
-"""A recorded vertical loop and the replica of it, signal by signal: the paper's Fig. 6."""
+"""A recorded vertical loop and its replica, signal by signal: the paper's Fig. 6."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ Curve = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overlaid:
-    """One signal over time: what was recorded, what the replica gives, all of the same length; and where the recorded
-    one differs, time and value of each mark."""
+    """One signal over time, recorded and from the replica, of equal length; and time and value of each mark where the
+    recorded one differs."""
 
     label: str
     digits: int
@@ -27,8 +27,8 @@ class Overlaid:
 
 @dataclass(frozen=True, slots=True)
 class ControllerFigure:
-    """A panel for each signal over one time axis. Traces as those of `PanelsFigure`, with the roles `recorded`,
-    `replica` and `differs`."""
+    """One panel per signal over a common time axis. Traces as in `PanelsFigure`, with the roles `recorded`, `replica`
+    and `differs`."""
 
     signals: Sequence[Overlaid]
     heading: str

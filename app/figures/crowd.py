@@ -1,4 +1,4 @@
-"""Many flights in one drawing: which are worth a curve of their own, and the envelope that stands for the others."""
+"""Figures with many flights: which are drawn as individual curves, and the envelope that represents the others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from app.figures.history import Band, Curve, FlightData, History
 from app.figures.theme import Palette
 
 MAX_INDIVIDUAL_FLIGHTS: Final = 30
-"""Up to so many flights each is drawn by itself."""
+"""Up to this number, every flight is drawn individually."""
 MANY: Final = 120
-"""From more flights than this on, marks over the flights' numbers are small and bare."""
+"""With more flights than this, marks over the flight numbers are small, without error bars or labels."""
 NEAR_BEST: Final = 5
 LATEST: Final = 3
 PERCENTILES: Final = (10.0, 50.0, 90.0)
@@ -26,7 +26,7 @@ _EARLY_SHARE: Final = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """Between which curves 80 % of `flights` lay at each instant, and the curve that half of them stayed below."""
+    """The band that contains 80 % of `flights` at each time, and their median curve."""
 
     band: Band
     median: Curve
@@ -34,8 +34,10 @@ class Envelope:
 
 
 def select_individual_flights(history: History, chosen: int | None = None) -> frozenset[int]:
-    """Numbers of the flights with curves of their own: all of a few; of many the first, the best and those next to it,
-    the latest, and the `chosen` one."""
+    """Numbers of the flights drawn as individual curves.
+
+    All, if there are few; of many, the first, the best and the next best, the latest, and the `chosen` one.
+    """
     if len(history.flights) <= MAX_INDIVIDUAL_FLIGHTS:
         return frozenset(flight.number for flight in history.flights)
     ranked = sorted(history.valid, key=lambda flight: (flight.error, flight.number))
@@ -45,8 +47,10 @@ def select_individual_flights(history: History, chosen: int | None = None) -> fr
 
 
 def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | None:
-    """Of the valid ones' curves from the command to `until_s`; None without any. Instants lie closer while the flights
-    climb; where a record has ended its last value stands."""
+    """Envelope of the valid flights' curves from the command to `until_s`; None without any.
+
+    Times are denser while the flights climb; after the end of a record its last value holds.
+    """
     curves = [flight.curve for flight in flights if flight.outcome == "valid" and flight.curve is not None]
     curves = [curve for curve in curves if len(curve.time_s)]
     if not curves:
@@ -59,7 +63,7 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
 
 
 def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> list[dict[str, object]]:
-    """Two edges with the band between them, and the middle (`meta` role envelope, edge lower, upper and middle)."""
+    """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
     if envelope is None:
         return []
     quiet: dict[str, object] = {"type": "scatter", "mode": "lines", "legendgroup": "envelope", "legendrank": 800}

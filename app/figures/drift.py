@@ -1,4 +1,4 @@
-"""A vehicle's fitted parameters over its flights, one small panel each, with their 95 % intervals: wear shows here."""
+"""A vehicle's fitted parameters over its flights, one small panel each, with their 95 % intervals, to show wear."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 REACH: Final = 1.96
-"""Half of a 95 % interval, in standard errors."""
+"""Half width of a 95 % interval, in standard errors."""
 _GAP: Final = 0.09
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
-    """One calibration: after which flight of the vehicle, and the parameters by their names."""
+    """One calibration: the flight of the vehicle after which it was made, and the parameters by name."""
 
     flight: int
     campaign_id: int
@@ -26,8 +26,10 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFigure:
-    """Table columns: `flight`, `campaign`, `trial`, then each parameter with its standard error. `since` is the flight
-    after which the vehicle was tuned last: a line in every panel."""
+    """Table columns: `flight`, `campaign`, `trial`, then each parameter with its standard error.
+
+    `since` is the flight after which the vehicle was last tuned, drawn as a line in every panel.
+    """
 
     points: tuple[Point, ...]
     since: int | None
@@ -163,7 +165,7 @@ class CalibrationFigure:
 
 
 def _place(index: int, count: int) -> tuple[float, float]:
-    """Foot and height of a panel, the first one on top, as shares of the whole."""
+    """Bottom and height of a panel as shares of the whole; the first one is on top."""
     height = (1 - _GAP * (count - 1)) / count
     return max(0.0, 1 - index * height - (index - 1) * _GAP), height
 

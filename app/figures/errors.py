@@ -1,4 +1,4 @@
-"""The error of each flight: measured, predicted, best so far, and what the next one must beat."""
+"""The error of each flight: measured, predicted, best so far, and the threshold for the next one."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Final
@@ -12,18 +12,18 @@ from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 FEW: Final = 8
-"""Up to so many flights each carries its error in print."""
+"""Up to this number of flights, every error is labelled."""
 FOOT: Final = 0.05
-"""Height of the marks without an error, as a share of the axis."""
+"""Height of the marks for flights without an error, as a share of the axis."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorsFigure:
-    """Table columns: `flight`, `outcome`, `error`, `standard_error` (of one flight, where the noise is known),
+    """Table columns: `flight`, `outcome`, `error`, `standard_error` (of one flight, if the noise is known),
     `predicted_error`, `predicted_low`, `predicted_high`, `best_so_far`; the proposal is the last row.
 
     Every trace carries `meta.role`: noise (around the best), best so far, threshold, interval, predicted, repeats,
-    measured, not counted, off scale.
+    measured, not counted, not yet judged, off scale.
     """
 
     history: History
@@ -76,7 +76,8 @@ class ErrorsFigure:
         )
 
     def _span(self) -> RobustRange:
-        """Up to the first flight's error and every other one that is no outlier; and up to the next one's interval."""
+        """Range up to the first flight's error, every other one that is not an outlier, and the next flight's
+        interval."""
         errors = [flight.error for flight in self.history.flights if flight.error is not None]
         first = [flight.error for flight in self.history.valid[:1] if flight.error is not None]
         proposal = self.history.proposal
@@ -119,7 +120,7 @@ class ErrorsFigure:
         return "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
 
     def _error_bars(self, palette: Palette) -> dict[str, object]:
-        """One standard error of a single flight, up and down."""
+        """One standard deviation of a single flight, up and down."""
         noise = self.history.noise
         if noise is None or self._is_crowded:
             return {}
@@ -127,7 +128,7 @@ class ErrorsFigure:
         return {"error_y": bar}
 
     def _noise(self, palette: Palette, last: int) -> list[dict[str, object]]:
-        """Where another flight of the best gains would land: what falls in here is no news."""
+        """Range in which another flight of the best gains would lie: a result inside it is not significant."""
         noise = self.history.noise
         if noise is None or noise.around_best is None:
             return []
@@ -149,7 +150,7 @@ class ErrorsFigure:
         ]
 
     def _repeats(self, palette: Palette) -> list[dict[str, object]]:
-        """The mean of flights with the same gains, with its standard error, over those flights."""
+        """Mean of flights with the same gains, with its standard error, beside the last of them."""
         repeats = () if self.history.noise is None else self.history.noise.repeats
         if not repeats:
             return []
@@ -181,8 +182,8 @@ class ErrorsFigure:
         ]
 
     def _intervals(self, palette: Palette, top: float) -> list[dict[str, object]]:
-        """Where each flight's error was expected, of many the next one's only: a bar behind its diamond, cut at the
-        edge."""
+        """Predicted interval of each flight's error, or only the next one's if there are many: a bar behind its
+        diamond, cut at the edge."""
         known = self._expected()
         if not known:
             return []
@@ -214,7 +215,7 @@ class ErrorsFigure:
         return [(number, interval) for number, interval in pairs if interval is not None]
 
     def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
-        """The error beside each mark, clear of the steps; with many flights above the best only."""
+        """The error beside each mark, clear of the steps; with many flights only the best."""
         flights, best = self.history.valid, self.history.best
         return [
             {
@@ -232,8 +233,8 @@ class ErrorsFigure:
         ]
 
     def _without_error(self, palette: Palette, height: float) -> list[dict[str, object]]:
-        """Marks at the foot, clear of the axis' numbers: these flights have no error that would mean anything, or none
-        that anybody vouches for yet."""
+        """Marks at the bottom, clear of the axis labels, for flights that have no meaningful error, or were not
+        reviewed yet."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet judged"}]
         unjudged = [flight for flight in flights if flight.outcome == "not yet judged"]
@@ -273,7 +274,7 @@ class ErrorsFigure:
         }
 
     def _threshold(self, palette: Palette, last: int) -> list[dict[str, object]]:
-        """What a further flight must get below for the stop rule to call it progress."""
+        """The error below which the stop rule counts a further flight as an improvement."""
         best, improvement = self.history.best, self.history.stop_improvement
         if best is None or best.error is None or improvement is None:
             return []
@@ -357,7 +358,7 @@ class ErrorsFigure:
 
 
 def best_so_far(history: History) -> list[float]:
-    """The running minimum of the error, one value for each valid flight."""
+    """Running minimum of the error, one value per valid flight."""
     running: list[float] = []
     for flight in history.valid:
         assert flight.error is not None

@@ -1,4 +1,4 @@
-"""One flight by itself: altitude against prediction, set point and reference, and the thrust below it."""
+"""One flight: altitude with prediction, set point and reference, and the thrust below it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ TABLE_ROWS: Final = 34
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecordData:
-    """One recorded flight. `inputs` are further channels by title (Thrust, Feed-forward, …), all in the unit that
-    `inputs_title` names."""
+    """One recorded flight. `inputs` are further channels by title (Thrust, Feed-forward, …), all in the unit named in
+    `inputs_title`."""
 
     number: int
     output_title: str
@@ -39,7 +39,7 @@ class FlightRecordData:
 
 @dataclass(frozen=True, slots=True)
 class FlightFigure:
-    """Table columns: `time_s`, `measured`, `set_point`, `predicted` (where known), then the inputs by title."""
+    """Table columns: `time_s`, `measured`, `set_point`, `predicted` (if known), then the inputs by title."""
 
     record: FlightRecordData
     theme: ThemeName = "light"
@@ -65,7 +65,7 @@ class FlightFigure:
         )
 
     def _outputs(self, palette: Palette, curve: Curve) -> list[dict[str, object]]:
-        """The flight among what it is seen with, its glitches above all."""
+        """The flight with its context curves, and its glitches on top."""
         record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
         return [
             *band_traces(palette, record.band),
@@ -75,7 +75,7 @@ class FlightFigure:
         ]
 
     def _layout(self, palette: Palette, curve: Curve) -> dict[str, object]:
-        """The output above, the inputs below it where there are any."""
+        """The output on top, the inputs below it if there are any."""
         record, goal = self.record, self.record.set_point
         low, high, _ = robust_span(
             [curve.values], low=min(0.0, float(goal.values.min())), high=max(0.0, float(goal.values.max()))

@@ -1,4 +1,4 @@
-"""The gains of each flight, one small panel a gain, the proposed ones as open diamonds."""
+"""The gains of each flight, one small panel per gain, with the proposed ones as open diamonds."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,7 +11,7 @@ from app.figures.history import History, last_number
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09
-"""Height between two panels as a share of all: room for the name of the lower one."""
+"""Height between two panels as a share of the whole: room for the title of the lower one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ class GainsFigure:
         }
 
     def _names(self, palette: Palette) -> list[dict[str, object]]:
-        """What each gain is, and its unit, above its panel."""
+        """Name and unit of each gain, above its panel."""
         count = len(self.history.gains)
         return [
             {
@@ -170,20 +170,20 @@ class GainsFigure:
 
 
 def padded(low: float, high: float, gain: Gain) -> tuple[float, float]:
-    """A range around `low` … `high` that is at least half a scale wide, so that a change of one count looks small."""
+    """A range around `low` … `high`, at least half a scale wide, so that a change of one count looks small."""
     width = max(high - low, 0.5 * gain.scale)
     middle = (low + high) / 2
     return max(gain.lower - 0.05 * width, middle - 0.65 * width), middle + 0.65 * width
 
 
 def _place(index: int, count: int) -> tuple[float, float]:
-    """Foot and height of a panel, the first one on top, as shares of the whole."""
+    """Bottom and height of a panel as shares of the whole; the first one is on top."""
     height = (1 - GAP * (count - 1)) / count
     return max(0.0, 1 - index * height - (index - 1) * GAP), height
 
 
 def _read(value: float) -> str:
-    """A gain to four significant digits; a whole one in full."""
+    """A gain with four significant digits; an integer in full."""
     return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
 
 

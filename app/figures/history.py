@@ -1,4 +1,4 @@
-"""What the figures draw: a campaign's flights as plain data."""
+"""Input of the figures: a campaign's flights as plain data."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +10,7 @@ from app.core.policy import Gain, Gains
 from app.core.trajectory import Samples
 
 Outcome = Literal["not yet judged", "valid", "aborted", "invalid", "lost"]
-"""What a flight is called where it is drawn."""
+"""Label of a flight's outcome in figures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Curve:
     values: Samples
 
     def at(self, time_s: float) -> float | None:
-        """Linear interpolation, None outside of the record."""
+        """Linear interpolation; None outside the record."""
         if len(self.time_s) == 0 or not self.time_s[0] <= time_s <= self.time_s[-1]:
             return None
         return float(np.interp(time_s, self.time_s, self.values))
@@ -29,7 +29,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """From `low` to `high`, in the unit of what it stands beside."""
+    """From `low` to `high`, in the unit of the quantity it belongs to."""
 
     low: float
     high: float
@@ -38,15 +38,19 @@ class Range:
         return self.low <= value <= self.high
 
     def slice_of(self, rising: Samples) -> tuple[int, int]:
-        """First index and end of the part of `rising`, shape (n,), that lies inside, one more on either side."""
+        """First index and end of the part of `rising`, shape (n,), inside the range, with one more sample on either
+        side."""
         first = max(0, int(np.searchsorted(rising, self.low, "left")) - 1)
         return first, min(len(rising), int(np.searchsorted(rising, self.high, "right")) + 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightData:
-    """One flown trial. `error` and `predicted_error` in the experiment's error unit, None where there is none;
-    `interval` is where the error was expected, `glitches` the seconds during which the record cannot be right."""
+    """One flown trial.
+
+    `error` and `predicted_error` are in the experiment's error unit, None if there is none; `interval` is the predicted
+    interval of the error; `glitches` are the times, s, at which the record is not plausible.
+    """
 
     number: int
     gains: Gains
@@ -60,7 +64,7 @@ class FlightData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """Between which two curves a flight is expected, on the same instants."""
+    """The predicted band of a flight: two curves at the same times."""
 
     lower: Curve
     upper: Curve
@@ -68,8 +72,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NextFlight:
-    """The proposed next flight, with the model's curve for it, its band, and the interval of its error where there
-    are any."""
+    """The proposed next flight, with the model's curve, its band, and the interval of its error, if there are any."""
 
     number: int
     gains: Gains
@@ -81,7 +84,8 @@ class NextFlight:
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Several valid flights of the same gains: their numbers, and the mean of their errors with its standard error."""
+    """Several valid flights with the same gains: their numbers, and the mean of their errors with its standard
+    error."""
 
     numbers: tuple[int, ...]
     mean: float
@@ -90,8 +94,8 @@ class Repeats:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """How much errors scatter: `sd` of a single flight, the repeated flights, and where another flight of the best
-    gains would land with 90 % probability."""
+    """Scatter of the errors: `sd` of a single flight, the repeated flights, and the range in which another flight of
+    the best gains would lie with 90 % probability."""
 
     sd: float
     repeats: tuple[Repeats, ...] = ()
@@ -100,12 +104,12 @@ class Noise:
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """A campaign as its figures see it.
+    """A campaign's data for its figures.
 
-    `stop_improvement`: the share of the best error by which a flight must beat it to count as progress, None when the
-    stop rule does not ask. `flights` in the order of their numbers. `noise`: None while nothing is known of it.
-    `window`: the seconds looked at, which are drawn in more points; None for the whole. `chosen`: the number of
-    a flight that is drawn whatever it is like.
+    `stop_improvement` is the share of the best error by which a flight must be lower to count as an improvement, None
+    if the stop rule has no such condition. `flights` are in the order of their numbers. `noise` is None while it is not
+    known. `window` is the visible time range, s, which is drawn with more points; None for all. `chosen` is the number
+    of a flight that is always drawn.
     """
 
     output_title: str
@@ -124,12 +128,12 @@ class History:
 
     @cached_property
     def valid(self) -> tuple[FlightData, ...]:
-        """Valid flights with an error, the only ones that compete."""
+        """Valid flights with an error: the candidates for the best."""
         return tuple(flight for flight in self.flights if flight.outcome == "valid" and flight.error is not None)
 
     @cached_property
     def best(self) -> FlightData | None:
-        """The valid flight with the lowest error, the earlier one of equals."""
+        """The valid flight with the lowest error, the earliest of equals."""
         return min(self.valid, key=_error, default=None)
 
     @property
@@ -143,6 +147,6 @@ def _error(flight: FlightData) -> float:
 
 
 def last_number(history: History) -> int:
-    """The highest flight number that a figure has to show, the proposed flight's included."""
+    """The highest flight number in a figure, including the proposed flight."""
     numbers = [flight.number for flight in history.flights]
     return max([*numbers, history.proposal.number] if history.proposal is not None else numbers, default=1)

@@ -1,4 +1,4 @@
-"""A campaign's gains as a path over its model's error: contours over two gains at a time."""
+"""A campaign's gains as a path over the model's error: contours over two gains at a time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,23 +16,24 @@ from app.figures.slices import holds, is_high, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 LONGEST_PATH: Final = 60
-"""Of more flights the path shows the latest, and the first and the best."""
+"""Largest number of latest flights in the path; the first and the best are always included."""
 LEVELS: Final = 9
-"""Contours, about."""
+"""Approximate number of contours."""
 SHOWN_SHARE: Final = 0.8
-"""Share of all points that the scale covers; what lies beyond is shaded as off the scale."""
+"""Share of all points covered by the scale; the rest is shaded as off the scale."""
 _TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
-"""The lower the error, the fuller the colour: shares of it from the bottom to the top of the scale."""
+"""Strength of the colour from the bottom to the top of the scale: the lower the error, the stronger the colour."""
 _GROUND: Final = "ground"
 _GAP: Final = 0.09
 _STAR_PX: Final = 17
-"""The best flight's own mark is as wide as the star over it and unseen, so that its number stands clear."""
+"""Size of the best flight's own invisible mark, equal to the star over it, so that its number is placed clear of the
+star."""
 _STACK_GAP: Final = 0.085
 
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """One step that was tried on the model, and what it predicted there."""
+    """One step evaluated on the model, and the error predicted there."""
 
     gains: Gains
     predicted_error: float
@@ -40,7 +41,8 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """How the next gains were looked for: the slopes of the error, the direction of the line, the steps tried on it."""
+    """How the next gains were found: the gradient of the error, the direction of the line, and the steps evaluated on
+    it."""
 
     gradient: Gains
     direction: Gains
@@ -49,7 +51,7 @@ class Search:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Contours from `low` to `high` every `step`, in the error's unit; what is above is off the scale."""
+    """Contours from `low` to `high` every `step`, in the error's unit; higher values are off the scale."""
 
     low: float
     high: float
@@ -58,10 +60,10 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class LandscapeFigure:
-    """Table columns: `what`, one per gain, `predicted` and `measured` error; the rows are the flights, the steps tried,
-    the proposal, and the lowest point of each slice.
+    """Table columns: `what`, one per gain, `predicted` and `measured` error; the rows are the flights, the steps
+    evaluated, the proposal, and the lowest point of each slice.
 
-    Traces bear in `meta` their role (model, beyond, path, best, line, tried, proposed) and their slice, from 1 on.
+    Each trace carries in `meta` its role (model, beyond, path, best, line, tried, proposed) and its slice, from 1.
     """
 
     history: History
@@ -111,7 +113,7 @@ class LandscapeFigure:
         ]
 
     def _shown(self) -> list[FlightData]:
-        """All flights, or of many the latest, with the first and the best before them."""
+        """All flights, or if there are many, the latest together with the first and the best before them."""
         earlier = self.history.flights[:-LONGEST_PATH]
         kept = [flight for flight in earlier if flight is earlier[0] or flight is self.history.best]
         return [*kept, *self.history.flights[-LONGEST_PATH:]]
@@ -154,7 +156,7 @@ class LandscapeFigure:
         return [path, star]
 
     def _line(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
-        """From the centre along the direction that was searched, to the edge of the slice."""
+        """From the centre along the search direction to the edge of the slice."""
         ends = to_edge(one, self.landscape.centre, self.search.direction)
         if ends is None:
             return []
@@ -232,7 +234,7 @@ class LandscapeFigure:
         }
 
     def _note(self, palette: Palette, scale: Scale) -> dict[str, object]:
-        """Where the slices lie and what the contours stand for, below them."""
+        """Text below the slices: where they lie, and the contour interval."""
         held = ", ".join(f"{name} {value:.4g}" for name, value in self.landscape.centre.items())
         between = "<br>" if self.stacked else " · "
         return {
@@ -291,7 +293,7 @@ class LandscapeFigure:
 
 
 def scale_of(slices: Sequence[Slice]) -> Scale:
-    """One for all slices: from their lowest error to what four fifths of their points stay below, in steps of 1, 2 or
+    """A common scale of all slices: from the lowest error to the 80 % quantile of their points, in steps of 1, 2 or
     5."""
     errors = np.array([error for one in slices for row in one.errors for error in row if error is not None])
     low, high = float(errors.min()), float(np.quantile(errors, SHOWN_SHARE))
@@ -300,14 +302,14 @@ def scale_of(slices: Sequence[Slice]) -> Scale:
 
 
 def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
-    """The gains with the lowest error of a slice, and that error."""
+    """The gains with the lowest error in a slice, and that error."""
     errors = np.array([[np.inf if error is None else error for error in row] for row in one.errors])
     row, column = divmod(int(np.argmin(errors)), errors.shape[1])
     return {**centre, one.x: one.x_values[column], one.y: one.y_values[row]}, float(errors[row, column])
 
 
 def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -> list[dict[str, object]]:
-    """The contours, and a shade over what lies above them."""
+    """The contours, and a shade over errors above the scale."""
     suffix = _suffix(index)
     common: dict[str, object] = {
         "type": "contour",
@@ -317,7 +319,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
         "xaxis": f"x{suffix}",
         "yaxis": f"y{suffix}",
         "showscale": False,
-        # Straight pieces: to place labels along smooth ones takes Plotly most of a second.
+        # Straight segments: placing labels along smooth contours takes Plotly most of a second.
         "line": {"width": 0.9, "color": theme.with_opacity(palette.dim, 0.75), "smoothing": 0},
     }
     ground = common | {
@@ -341,7 +343,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
     beyond = common | {
         "name": f"Above {scale.high:g} {unit}",
         "legendgroup": "beyond",
-        "contours": {"type": "constraint", "operation": "<", "value": scale.high},  # Plotly shades what is refused
+        "contours": {"type": "constraint", "operation": "<", "value": scale.high},  # Plotly shades where it fails
         "fillcolor": theme.mixed(palette.earlier, palette.surface, 0.4),
         "line": {"width": 0.9, "color": palette.earlier, "smoothing": 0},
         "hoverinfo": "skip",
@@ -351,7 +353,7 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
 
 
 def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str) -> dict[str, object]:
-    """A trace through these gains, as they lie in the slice."""
+    """A trace through these gains, projected onto the slice."""
     suffix = _suffix(index)
     return {
         "type": "scatter",
@@ -372,7 +374,7 @@ def _told(flight: FlightData, unit: str) -> str:
 
 
 def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[float]]:
-    """A slice's share of the width and of the height: side by side, or one below the other, the first on top."""
+    """Horizontal and vertical domain of a slice: side by side, or stacked with the first on top."""
     gap = _STACK_GAP if stacked else _GAP
     size = (1.0 - gap * (count - 1)) / count
     first = (index - 1) * (size + gap)

@@ -1,4 +1,4 @@
-"""What several figures lay over or under their curves: a prediction's band, and stretches that cannot be right."""
+"""Overlays shared by several figures: a prediction's band, and glitches."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -12,7 +12,7 @@ GLITCH_POINTS: Final = 60
 
 
 def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
-    """Between which curves a flight is expected: two traces (`meta` role band, edge lower and upper), none without."""
+    """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
     if band is None:
         return []
     quiet: dict[str, object] = {
@@ -48,7 +48,7 @@ def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
 def glitch_traces(
     palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
 ) -> list[dict[str, object]]:
-    """The stretches of a flight's record that cannot be right, laid over its curve: one trace, or none."""
+    """The glitches of a flight's record, over its curve: one trace, or none."""
     if curve is None or not glitches:
         return []
     x: list[float | None] = []
@@ -74,6 +74,6 @@ def glitch_traces(
 
 
 def _stretch(curve: Curve, part: Range) -> tuple[list[float], list[float]]:
-    """A part of a curve, with the samples just before and after it, so that a gap shows too."""
+    """Part of a curve, with the samples just before and after it, so that a gap is visible."""
     first, end = part.slice_of(curve.time_s)
     return thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)

@@ -1,4 +1,5 @@
-"""Flights whose error lies beyond the scale: triangles at the upper edge, so that one wild flight flattens no other."""
+"""Marks of flights whose error exceeds the scale: triangles at the upper edge, so that an outlier does not compress the
+others."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -7,14 +8,14 @@ from app.figures.history import FlightData
 from app.figures.theme import Palette
 
 PRINT: Final = 0.18
-"""Share of the axis that an error in print takes on a phone."""
+"""Width of a printed error on a phone, as a share of the axis."""
 
 
 def off_scale_traces(
     palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
 ) -> list[dict[str, object]]:
-    """At height `top` of an axis that ends with flight `last`; of few flights each with its error in print, where the
-    one before leaves room for it."""
+    """Marks at height `top` of an axis that ends with flight `last`; if there are few flights, with the errors that
+    have room."""
     if crowded:
         return [_together(palette, flights, top, unit)] if flights else []
     printed = set(_with_room([flight.number for flight in flights], PRINT * last))
@@ -22,7 +23,7 @@ def off_scale_traces(
 
 
 def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
-    """Of ascending numbers those that are that far from the last one that is taken."""
+    """Of ascending numbers, those at least `room` away from the last one selected."""
     free = 0.0
     for number in numbers:
         if number >= free:
@@ -50,7 +51,7 @@ def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_pr
 
 
 def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> dict[str, object]:
-    """Many in one trace, without their errors in print."""
+    """Many flights in one trace, without printed errors."""
     return {
         "type": "scatter",
         "mode": "markers",

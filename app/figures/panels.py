@@ -1,4 +1,4 @@
-"""A drawing of a few panels, one above the other: what the figures of a publication are made of."""
+"""Stacked panels: the basis of the figures for publications."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Final, Literal
@@ -13,17 +13,17 @@ Style = Literal[
     "goal", "reference", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
     "run 1", "run 2", "run 3", "run 4", "run 5", "run 6",
 ]  # fmt: skip
-"""What a line stands for. A style is told from the others by its dash or width too, not by its colour alone."""
+"""Role of a line. Each style differs from the others in dash or width too, not in colour alone."""
 
 GAP: Final = 0.1
 TABLE_ROWS: Final = 33
 SEPARATE: Final = 60
-"""Up to so many abscissae each is a row of the table; with more, rows are spaced evenly."""
+"""Up to this number of abscissae, each has its own row in the table; with more, rows are spaced evenly."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One line or row of marks: `x` and `y` of the same length; `note` is shown when a point is asked for."""
+    """One line or row of marks: `x` and `y` of the same length; `note` is shown on hover."""
 
     name: str
     style: Style
@@ -35,7 +35,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One pair of axes with its lines, drawn in their order; `digits` after the point in tables and readings."""
+    """One pair of axes with its lines, drawn in order; `digits` is the number of decimals in tables and hover text."""
 
     y_title: str
     lines: tuple[Line, ...]
@@ -45,7 +45,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
-    """Panels over one abscissa. `summary` says in a sentence what is to be seen."""
+    """Panels with a common abscissa. `summary` describes them in a sentence."""
 
     title: str
     summary: str
@@ -57,9 +57,9 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class PanelsFigure:
-    """Table columns: `x`, then one for each line that is not a mere repetition of its name in the panel above.
+    """Table columns: `x`, then one for each line of each panel.
 
-    Every trace carries `meta`: `role` is its style, `panel` its place from 1 on, `line` its name.
+    Every trace carries `meta`: `role` is its style, `panel` its position from 1, `line` its name.
     """
 
     plot: Plot
@@ -160,7 +160,7 @@ class PanelsFigure:
 
 
 def _at(line: Line, x: float, digits: int) -> Cell:
-    """The line's value there, between its points by interpolation, marks only where they are; None elsewhere."""
+    """Value of the line at `x`, interpolated between its points, or exact for marks; None elsewhere."""
     if line.marks:
         return next((round(y, digits) for at, y in zip(line.x, line.y, strict=True) if at == x), None)
     if not line.x or not line.x[0] <= x <= line.x[-1]:

@@ -1,4 +1,4 @@
-"""Axis ranges that one wild flight cannot spoil, and numbers short enough to send."""
+"""Axis ranges that are robust against outliers, and thinned data for drawing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from app.figures.history import Range
 
 MARGIN = 0.06
 SMOOTH: Final = 1e-3
-"""How far a drawn line may pass beside a smooth curve, as a share of its span: a third of a pixel or so."""
+"""Allowed deviation of a drawn line from a smooth curve, as a share of its span: about a third of a pixel."""
 SMOOTH_POINTS: Final = 1000
-"""Among which the bends of a smooth curve are looked for."""
+"""Number of samples among which the bends of a smooth curve are found."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobustRange:
-    """`low` … `high` for an axis; `outside` are the indices of the series that leave it at the top."""
+    """`low` … `high` for an axis; `outside` are the indices of the series that exceed it at the top."""
 
     low: float
     high: float
@@ -28,10 +28,10 @@ class RobustRange:
 
 
 def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: float = 5.0) -> RobustRange:
-    """A range that shows `low` … `high` and every peak that is not an outlier.
+    """A range that covers `low` … `high` and every peak that is not an outlier.
 
-    A peak is an outlier when it exceeds both half again of `low` … `high` and the (low) median of the peaks by more
-    than `spread` times their median absolute deviation.
+    A peak is an outlier if it exceeds `high` by more than half of the range `low` … `high`, and the (low) median of the
+    peaks by more than `spread` times their median absolute deviation.
     """
     middle = median_low(peaks) if peaks else high
     deviation = median_low([abs(peak - middle) for peak in peaks]) if peaks else 0.0
@@ -43,7 +43,7 @@ def robust_range(peaks: Sequence[float], *, low: float, high: float, spread: flo
 
 
 def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> tuple[float, float, tuple[int, ...]]:
-    """A range for whole curves, upwards and downwards: low, high, and the curves that leave it on either side."""
+    """A two-sided range for whole curves: low, high, and the curves that leave it on either side."""
     if not curves:
         curves = [np.array([low, high])]
     up = robust_range([float(values.max()) for values in curves], low=low, high=high)
@@ -54,8 +54,11 @@ def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> tuple[
 def thinned(
     time_s: Samples, values: Samples, points: int, window: Range | None = None
 ) -> tuple[list[float], list[float]]:
-    """At most `points` samples that keep the curve's look and its extremes, at 0.1 ms and 0.1 mm; a curve that stays
-    below 1 keeps a digit more. With a `window` of seconds as many again inside it, up to its edges and just past."""
+    """At most `points` samples that preserve the curve's shape and extremes, rounded to 0.1 ms and four decimals; five
+    decimals for a curve that stays below 1.
+
+    With a `window` of seconds, as many again inside it, up to its edges and just past them.
+    """
     chosen = select_samples(time_s, values, points)
     if window is not None:
         first, end = window.slice_of(time_s)
@@ -65,7 +68,7 @@ def thinned(
 
 
 def thin_by_bends(time_s: Samples, values: Samples) -> tuple[list[float], list[float]]:
-    """The samples at which a smooth curve bends, for a line that nobody points at."""
+    """The samples at which a smooth curve bends, for a line without hover text."""
     near = select_samples(time_s, values, SMOOTH_POINTS)
     time_s, values = time_s[near], values[near]
     chosen = select_bends(time_s, values, SMOOTH * float(np.ptp(values)) if len(values) else 0.0)

@@ -1,4 +1,4 @@
-"""Where things lie in a slice of the landscape, and which flights bear their number there."""
+"""Positions in a slice of the landscape, and placement of the flight numbers."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -8,7 +8,7 @@ from app.core.policy import Gains
 from app.figures.history import FlightData
 
 NUMBER_ROOM: Final = (0.07, 0.075)
-"""A flight's number takes this share of a slice's width and of its height."""
+"""Size of a flight's number, as shares of a slice's width and height."""
 _EDGE: Final = 0.03
 
 PlotPosition = tuple[float, float]
@@ -17,10 +17,10 @@ PlotPosition = tuple[float, float]
 def numbers(
     flights: Sequence[FlightData], best: FlightData | None, one: Slice, *, aside: Gains | None = None
 ) -> list[str]:
-    """What stands beside each flight: the first, the best and the latest flight's number, then those that have room.
+    """Text beside each flight: the numbers of the first, the best and the latest flight, then of those that have room.
 
-    Where those three, or flights of one place, are together, one mark bears all their numbers. What lies at `aside`
-    covers a number, so that only those three may be there.
+    If those three overlap, or flights have the same position, one mark carries all their numbers. Numbers that would
+    cover the mark at `aside` are omitted, except for those three.
     """
     leading = {flights[0].number, flights[-1].number, *([best.number] if best else [])}
     spots = {flight.number: spot(one, flight.gains) for flight in flights}
@@ -37,7 +37,7 @@ def numbers(
 
 
 def spot(one: Slice, gains: Gains) -> PlotPosition:
-    """Where gains lie in a slice, as shares of its width and height."""
+    """Position of gains in a slice, as shares of its width and height."""
     x, y = (
         (gains[name] - values[0]) / (values[-1] - values[0])
         for name, values in ((one.x, one.x_values), (one.y, one.y_values))
@@ -46,18 +46,18 @@ def spot(one: Slice, gains: Gains) -> PlotPosition:
 
 
 def is_high(one: Slice, gains: Gains) -> bool:
-    """Whether a number above these gains would be cut off at the slice's top."""
+    """Whether a number above these gains would be cut off at the top of the slice."""
     return spot(one, gains)[1] > 1.0 - NUMBER_ROOM[1]
 
 
 def _collide(one: PlotPosition, other: PlotPosition, count: int = 1) -> bool:
-    """Whether a number at `one` would touch the `count` numbers at `other`."""
+    """Whether a number at `one` would overlap the `count` numbers at `other`."""
     width, height = NUMBER_ROOM
     return abs(one[0] - other[0]) < width * (1 + count) / 2 and abs(one[1] - other[1]) < height
 
 
 def to_edge(one: Slice, centre: Gains, direction: Gains) -> list[Gains] | None:
-    """The centre, and where the direction leaves the slice; None where it does not lead anywhere in it."""
+    """The centre, and the point where the direction leaves the slice; None if the direction does not move within it."""
     lengths = []
     for name, values in ((one.x, one.x_values), (one.y, one.y_values)):
         if slope := direction.get(name, 0.0):
@@ -75,6 +75,6 @@ def holds(one: Slice, gains: Gains) -> bool:
 
 
 def padded(values: Sequence[float]) -> list[float]:
-    """A slice's range, with room for marks that stand on its edge."""
+    """A slice's range, with room for marks on its edge."""
     room = _EDGE * (values[-1] - values[0])
     return [values[0] - room, values[-1] + room]

@@ -14,23 +14,23 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
-"""Room above the set point, as a multiple of it, for the flight that is still to come."""
+"""Room above the set point for the next flight, as a factor on the set point."""
 SHARED_LEGEND: Final = {"earlier": "Earlier", "invalid": "Not counted"}
-"""Standings whose flights look alike and share an entry of the legend."""
+"""Standings whose flights look alike and share a legend entry."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoriesFigure:
-    """Table columns: `time_s`, `set_point`, `reference` (where known), `envelope_lower`, `envelope_middle` and
-    `envelope_upper` (of many flights), `flight_N` for each flight that is drawn by itself, and `prediction` (where
-    there is one) with `prediction_lower` and `prediction_upper` (where its band is known), at those seconds of
-    `TABLE_TIMES_S` that the experiment lasts.
+    """Table columns: `time_s`, `set_point`, `reference` (if known), `envelope_lower`, `envelope_middle` and
+    `envelope_upper` (with many flights), `flight_N` for each flight drawn individually, and `prediction` (if there is
+    one) with `prediction_lower` and `prediction_upper` (if its band is known), at those `TABLE_TIMES_S` that lie within
+    the experiment.
 
     Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, band, glitch, live,
     pointed, off scale) and, for flights, `trial` and `standing` (best, latest, earlier, invalid, unjudged); a flight's
-    `uid` is `flight-` and its number. The traces `live` and `pointed` are empty: a page fills one while it flies, the
-    other with a flight that is pointed at and has no curve of its own.
+    `uid` is `flight-` and its number. The traces `live` and `pointed` are empty: a page fills the first during a
+    flight, the second with the flight under the pointer if that one has no curve of its own.
     """
 
     history: History
@@ -89,7 +89,7 @@ class TrajectoriesFigure:
         return [-0.01 * self._lasts_s, self._lasts_s]
 
     def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
-        """From the ground to above the set point; where the set point is zero, as far as the first flight strays."""
+        """From the ground to above the set point; if the set point is zero, the range of the first flight."""
         curves = [flight.curve.values for flight in drawn if flight.curve is not None]
         if self.history.proposal is not None and self.history.proposal.curve is not None:
             curves.append(self.history.proposal.curve.values)
@@ -109,7 +109,7 @@ class TrajectoriesFigure:
         return "latest" if flight is self.history.latest else "earlier"
 
     def _weight(self, flight: FlightData) -> tuple[int, int]:
-        """Drawing order: what matters most comes last, on top."""
+        """Drawing order: the most important flights last, on top."""
         return ("invalid", "earlier", "latest", "unjudged", "best").index(self._standing(flight)), flight.number
 
     def _flight(self, palette: Palette, flight: FlightData, points: int) -> dict[str, object]:
@@ -185,7 +185,7 @@ class TrajectoriesFigure:
         ]
 
     def _empty(self, palette: Palette, role: str, name: str) -> dict[str, object]:
-        """A curve that the page fills."""
+        """An empty curve that the page fills."""
         return {
             "type": "scatter",
             "mode": "lines",
@@ -270,7 +270,7 @@ def _style(palette: Palette, standing: str) -> dict[str, object]:
 
 
 def _off_scale(palette: Palette, flight: FlightData, low: float, high: float) -> dict[str, object]:
-    """A triangle at the edge where a flight leaves the scale, with how far it went."""
+    """A triangle at the edge where a flight leaves the scale, labelled with its peak value."""
     assert flight.curve is not None
     values = flight.curve.values
     up = bool(values.max() - high >= low - values.min())

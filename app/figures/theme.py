@@ -1,4 +1,4 @@
-"""The chart style, decided once: colour roles for both themes, type, axes, margins."""
+"""Chart style of all figures: colour roles for both themes, fonts, axes, margins."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 'DejaV
 
 
 MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({"l": 48, "r": 14, "t": 12, "b": 48})
-"""Room for an axis with its title: where a margin grows while it is drawn, the whole chart is drawn a second time."""
+"""Room for an axis with its title: if a margin grows while drawing, Plotly draws the whole chart a second time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ PALETTES: Final[Mapping[ThemeName, Palette]] = MappingProxyType(
 
 
 def axis(palette: Palette, **more: object) -> dict[str, object]:
-    """A quiet axis: hairline grid, no frame, no zero line."""
+    """A plain axis: hairline grid, no frame, no zero line."""
     return {
         "gridcolor": palette.grid,
         "linecolor": palette.grid,
@@ -77,7 +77,7 @@ def titled(palette: Palette, text: str, **more: object) -> dict[str, object]:
 
 
 def layout(palette: Palette, **more: object) -> dict[str, object]:
-    """The layout that every figure starts from."""
+    """The base layout of every figure."""
     return {
         "font": {"family": FONT, "size": 13, "color": palette.ink},
         "paper_bgcolor": "rgba(0,0,0,0)",
@@ -108,19 +108,19 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
 
 
 def with_opacity(colour: str, opacity: float) -> str:
-    """A hex colour as a see-through one."""
+    """A hex colour as rgba with an opacity."""
     red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity:g})"
 
 
 def mixed(colour: str, ground: str, share: float) -> str:
-    """What a see-through `colour` of that share looks like on `ground`, as a hex colour of its own."""
+    """The opaque hex colour of `colour` with opacity `share` over `ground`."""
     pairs = [(int(colour[at : at + 2], 16), int(ground[at : at + 2], 16)) for at in (1, 3, 5)]
     return "#" + "".join(f"{round(share * one + (1.0 - share) * other):02x}" for one, other in pairs)
 
 
 def solid(colour: str | list[str], **more: object) -> dict[str, object]:
-    """A filled mark in full colour; Plotly makes marks of several sizes pale and rimmed unless told otherwise."""
+    """A filled mark in full colour; by default Plotly makes marks of varying size translucent and outlined."""
     return {"color": colour, "opacity": 1, "line": {"width": 0}, **more}
 
 
