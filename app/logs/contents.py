@@ -1,4 +1,4 @@
-"""The bytes of a log, without holding them in memory where the system can map them."""
+"""Access to the bytes of a log, memory-mapped where possible."""
 
 import io
 import mmap
@@ -9,11 +9,11 @@ from app.core.errors import Problem, TrajectoryError
 MAX_BYTES: Final = 512 * 2**20
 
 Contents = bytes | mmap.mmap
-"""Both slice, search and index alike."""
+"""Both support slicing, searching and indexing."""
 
 
 def contents(stream: BinaryIO) -> Contents:
-    """All of a stream, mapped from its file if it has one. Raises TrajectoryError when it is larger than 512 MiB."""
+    """All bytes of a stream, mapped if it has a file. Raises TrajectoryError if it is larger than 512 MiB."""
     size = stream.seek(0, io.SEEK_END)
     stream.seek(0)
     if size > MAX_BYTES:
@@ -26,10 +26,10 @@ def contents(stream: BinaryIO) -> Contents:
         return b""
     try:
         return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    except (OSError, ValueError):  # no file behind it, or one that cannot be mapped
+    except (OSError, ValueError):  # not a file, or one that cannot be mapped
         return stream.read()
 
 
 def refused(reason: str, hint: str) -> TrajectoryError:
-    """A file that cannot be read as the log that it should be."""
+    """The error for a file that cannot be read as the expected kind of log."""
     return TrajectoryError("This file cannot be read as a flight.", hint=hint, problems=(Problem("file", reason),))

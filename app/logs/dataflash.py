@@ -1,7 +1,7 @@
 """Reader of ArduPilot's on-board logs (.bin, "DataFlash"): self-describing binary messages.
 
-Every message begins with A3 95 and its type; messages of type 128 (FMT) give each type's length, name, format and
-columns. Only the few that tell of a takeoff are decoded, so that a log of hours takes seconds.
+Every message begins with A3 95 and its type; messages of type 128 (FMT) define the length, name, format and columns of
+each type. Only the few types needed for takeoffs are decoded, so that a log of several hours takes seconds.
 """
 
 import re
@@ -45,12 +45,12 @@ _WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"}
 _HINT: Final = "Give ArduPilot's .bin log of the flight, with LOG_BITMASK including the control tuning (PSCD, CTUN)."
 
 Table = Mapping[str, NDArray[np.generic]]
-"""The columns of one kind of message, each of shape (n,)."""
+"""Columns of one message type, each of shape (n,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """A type of message as its FMT describes it; `length` includes the three bytes before the columns."""
+    """A message type as defined by its FMT message; `length` includes the three bytes before the columns."""
 
     name: str
     length: int
@@ -59,12 +59,12 @@ class _Kind:
 
 
 def is_dataflash(head: bytes) -> bool:
-    """Whether a file that begins so is one: its first message describes itself."""
+    """Whether a file with this head is a DataFlash log: its first message describes itself."""
     return head.startswith(_SYNC + bytes([_FMT]))
 
 
 def read_dataflash(stream: BinaryIO) -> FlightLog:
-    """Read a whole log. Raises TrajectoryError when there is no altitude in it."""
+    """Read a whole log. Raises TrajectoryError if it contains no altitude."""
     tables = read_tables(contents(stream), _WANTED)
     time_s, channels, title = _altitude(tables)
     if "BAT" in tables and {"TimeUS", "Volt"} <= tables["BAT"].keys():
@@ -87,9 +87,9 @@ def read_dataflash(stream: BinaryIO) -> FlightLog:
 
 
 def read_tables(data: Contents, wanted: frozenset[str]) -> dict[str, Table]:
-    """The messages of these names, by name and column; damaged stretches are passed over.
+    """Messages of the wanted types, by name and column; damaged sections are skipped.
 
-    Integers that stand for hundredths are divided; texts are bytes without the NULs at their end.
+    Integers that represent hundredths are divided by 100; texts are bytes without trailing NULs.
     """
     kinds: dict[int, _Kind] = {}
     places: dict[int, array[int]] = {}
@@ -117,7 +117,8 @@ def read_tables(data: Contents, wanted: frozenset[str]) -> dict[str, Table]:
 
 
 def _define(body: bytes, lengths: list[int], kinds: dict[int, _Kind], wanted: frozenset[str]) -> None:
-    """Take in one FMT message: type, length, name[4], format[16], columns[64]. What makes no sense is left out."""
+    """Register the type defined by an FMT message: type, length, name[4], format[16], columns[64]. Invalid ones are
+    ignored."""
     number, length = body[0], body[1]
     if number == _FMT or length < 3 or lengths[number]:
         return
@@ -145,7 +146,7 @@ def _text(raw: bytes) -> str:
 
 
 def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples], str]:
-    """Time, channels, and where they are from: the vertical controller's own message where it is logged."""
+    """Time, channels, and their source: the vertical controller's own message if it is logged."""
     loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
     if {"TimeUS", "PD"} <= loop.keys():
         time_s = _seconds(loop)
@@ -165,7 +166,7 @@ def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples],
 
 
 def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
-    """The gains, when they were logged at the log's start and whenever they were changed."""
+    """The gains, logged at the start of the log and at every change."""
     table = tables.get("PARM", {})
     names = names_in(ARDUPILOT_SETS)
     if not {"TimeUS", "Name", "Value"} <= table.keys():
@@ -177,7 +178,7 @@ def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
 
 
 def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
-    """Commands to take off, what ends the flight under them, and landings."""
+    """Takeoff commands, events that end the flight, and landings."""
     accepted = [
         (time_s, command) for time_s, command, result in _rows(tables, "MAVC", "Cmd", "Res") if result in _ACCEPTED
     ]
@@ -194,20 +195,20 @@ def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent
 
 
 def _rows(tables: Mapping[str, Table], kind: str, *names: str) -> Iterator[tuple[float, ...]]:
-    """Time and columns of one kind of message, row by row; none where a column is missing."""
+    """Time and columns of one message type, row by row; none if a column is missing."""
     table = tables.get(kind, {})
     if {"TimeUS", *names} <= table.keys():
         yield from zip(_seconds(table).tolist(), *(_numbers(table[name]).tolist() for name in names), strict=True)
 
 
 def _first_instance(table: Table) -> Table:
-    """Of several batteries the first."""
+    """The first battery, if there are several."""
     instance = next((table[name] for name in ("Inst", "Instance") if name in table), None)
     return table if instance is None else {name: values[_numbers(instance) == 0] for name, values in table.items()}
 
 
 def _numbers(column: NDArray[np.generic]) -> Samples:
-    """As floats; NaN where a damaged description made texts of them."""
+    """The column as floats; NaN if a damaged description made it a text."""
     if column.ndim != 1 or column.dtype.kind not in "iuf":
         return np.full(len(column), np.nan)
     with np.errstate(invalid="ignore"):  # a damaged number may be a signalling NaN

@@ -1,4 +1,4 @@
-"""The gains of each autopilot's altitude control, by the names that its logs use."""
+"""Names of the altitude control gains of each autopilot in its logs."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -7,7 +7,7 @@ from typing import Final
 from app.core.loop_log import GAINS
 
 PAPARAZZI: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
-"""Its parameters over MAVLink, and what the takeoff experiment calls them."""
+"""Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
 
 PAPARAZZI_SETS: Final = (GAINS,)
 
@@ -21,5 +21,5 @@ PX4_SETS: Final = (("MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_
 
 
 def names_in(sets: Sequence[Sequence[str]]) -> frozenset[str]:
-    """Every name of these sets."""
+    """All names in these sets."""
     return frozenset(name for names in sets for name in names)

@@ -1,4 +1,4 @@
-"""Reader of recorded runs of the vertical loop: CSV, gzipped or not, one row a step, integers throughout."""
+"""Reader of recorded runs of the vertical loop: CSV, optionally gzipped, one row per step, integers only."""
 
 import csv
 import gzip
@@ -29,7 +29,7 @@ _HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row for each 1
 
 
 def read_loop_trace(path: Path) -> LoopTrace:
-    """Read `path` (.csv or .csv.gz). Raises InputError naming the line and the column of the first thing wrong."""
+    """Read `path` (.csv or .csv.gz). Raises InputError naming the line and the column of the first error."""
     try:
         with path.open("rb") as raw:
             return _read_bytes(path.name, raw, zipped=path.suffix == ".gz")
@@ -40,7 +40,7 @@ def read_loop_trace(path: Path) -> LoopTrace:
 
 
 def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
-    """As `read_loop_trace`, from a stream that says by its first bytes whether it is gzipped."""
+    """As `read_loop_trace`, from a stream; gzip is detected from its first bytes."""
     stream.seek(0)
     zipped = stream.read(len(_GZIP)) == _GZIP
     stream.seek(0)
@@ -51,7 +51,7 @@ def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
 
 
 def may_be_loop_trace(head: bytes) -> bool:
-    """Whether a file that begins so can be one at all: gzipped, or text whose first line names a column of a trace."""
+    """Whether a file with this head can be a trace: gzipped, or text whose first line names a column of a trace."""
     first = head.partition(b"\n")[0]
     return head.startswith(_GZIP) or bool({b"mode", b"z_ref", b"r33"} & {word.strip() for word in first.split(b",")})
 
@@ -67,7 +67,7 @@ def _read_bytes(name: str, raw: BinaryIO, *, zipped: bool) -> LoopTrace:
 
 
 def _unpack(name: str, source: BinaryIO, plain: BinaryIO) -> None:
-    """A small file may unpack to a huge one."""
+    """Decompress to a bounded size: a small file may expand to a huge one."""
     while chunk := source.read(2**20):
         plain.write(chunk)
         if plain.tell() > MAX_BYTES:

@@ -1,8 +1,9 @@
-"""Reader of Paparazzi's ground logs: a .data file with one message a line, and its .log companion, XML, with the
+"""Reader of Paparazzi's ground logs: a .data file with one message per line, and its .log companion, XML, with the
 airframe and the settings.
 
-A line is the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks. VERT_LOOP
-tells everything about the vertical loop, in its own integers; without it the altitude is ROTORCRAFT_FP's.
+A line contains the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks.
+VERT_LOOP contains the complete state of the vertical loop, in its own integers; without it the altitude comes from
+ROTORCRAFT_FP.
 """
 
 import re
@@ -35,14 +36,14 @@ _HINT: Final = "Give the .data file of Paparazzi's ground log, with VERT_LOOP or
 
 
 def is_paparazzi(head: bytes) -> bool:
-    """Whether a file that begins so is a .data file."""
+    """Whether a file with this head is a .data file."""
     return bool(_LINE.match(head))
 
 
 def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> FlightLog:
-    """Read a .data file, and the gains from its companion's airframe and settings where that is at hand.
+    """Read a .data file, and the gains from the airframe and settings in its companion, if given.
 
-    Without, the gains are those that the loop's own commands follow from. Raises TrajectoryError when there is no
+    Without a companion, the gains are inferred from the loop's own commands. Raises TrajectoryError if there is no
     altitude, or the companion cannot be read.
     """
     lines = _read(stream)
@@ -77,9 +78,10 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
 
 
 def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[LoopLog, dict[str, float] | None]:
-    """The samples of the vertical loop and the gains at their end, from companion and messages; None without any.
+    """Read the samples of the vertical loop and its last gains, from companion and messages; the gains are None if
+    incomplete.
 
-    Raises TrajectoryError when there is no VERT_LOOP.
+    Raises TrajectoryError if there is no VERT_LOOP.
     """
     lines = _read(stream)
     if not len(lines.loop_time_s):
@@ -94,7 +96,7 @@ def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[
 
 @dataclass(slots=True)
 class _Lines:
-    """What the lines of one aircraft say, the first one that tells of its height."""
+    """Messages of one aircraft: the first one that reports its altitude."""
 
     aircraft: str = ""
     others: set[str] = field(default_factory=set)
@@ -106,7 +108,7 @@ class _Lines:
     values: list[tuple[float, int, float]] = field(default_factory=list)
 
     def loop_log(self) -> LoopLog:
-        """The samples whose time rises."""
+        """The samples whose time increases."""
         time_s, values = np.array(self.loop_time_s), np.array(self.loop, dtype=np.int64).reshape(-1, len(FIELDS))
         rising = np.ones(len(time_s), dtype=np.bool_)
         rising[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
@@ -114,7 +116,7 @@ class _Lines:
 
 
 def _read(stream: BinaryIO) -> _Lines:
-    """Whatever is not a line of these messages is passed over."""
+    """Parse the stream; lines other than these messages are skipped."""
     lines = _Lines()
     stream.seek(0)
     if not is_paparazzi(stream.read(_MAX_LINE_BYTES)):
@@ -150,7 +152,7 @@ def _take(lines: _Lines, time: bytes, aircraft: str, message: bytes, fields: Seq
 
 
 def _whole(fields: Sequence[bytes], count: int) -> list[int] | None:
-    """The first fields as 32-bit integers; None when there are fewer, or others."""
+    """The first fields as 32-bit integers; None if there are fewer, or other values."""
     if len(fields) < count:
         return None
     try:
@@ -168,7 +170,7 @@ def _float(text: bytes) -> float:
 
 
 def _altitude(lines: _Lines) -> tuple[Samples, dict[str, Samples]]:
-    """Time and channels, from whichever message came more often. Raises TrajectoryError when there is neither."""
+    """Time and channels, from the more frequent message. Raises TrajectoryError if there is neither."""
     if not lines.loop_time_s and not lines.time_s:
         raise refused("holds neither VERT_LOOP nor ROTORCRAFT_FP", _HINT)
     loop = _loop_channels(lines.loop_log()) if lines.loop_time_s else {}
@@ -181,7 +183,7 @@ def _altitude(lines: _Lines) -> tuple[Samples, dict[str, Samples]]:
 
 
 def _loop_channels(log: LoopLog) -> dict[str, Samples]:
-    """Altitudes up in metres, commands as shares of full thrust."""
+    """Altitudes in metres, positive up; commands as shares of full thrust."""
     return {
         "altitude_m": -log["z"] / 2**8,
         "climb_rate_m_s": -log["zd"] / 2**19,
@@ -194,14 +196,14 @@ def _loop_channels(log: LoopLog) -> dict[str, Samples]:
 
 
 def _starts(log: LoopLog) -> list[LogEvent]:
-    """The last samples before the reference sets out on its own."""
+    """The last samples before the reference starts to move by itself."""
     idle = log.idle
     sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
     return [LogEvent(float(log.time_s[place]), "the reference setting out") for place in sets_out]
 
 
 def _ends(log: LoopLog) -> list[LogEvent]:
-    """Where a set point that was held for two seconds becomes another one, or the loop stops working."""
+    """Times at which a set point that was held for two seconds changes, or the loop becomes inactive."""
     idle, set_point = log.idle, log["z_sp"]
     stops = np.flatnonzero(~idle[:-1] & idle[1:])
     moments = [LogEvent(float(log.time_s[place]), "the loop being switched off") for place in stops]
@@ -216,14 +218,15 @@ def _ends(log: LoopLog) -> list[LogEvent]:
 
 @dataclass(slots=True)
 class _Configuration:
-    """What the .log companion says about gains: those built in, and the numbers by which DL_VALUE names settings."""
+    """Gains in the .log companion: those built into the airframe, and the numbers by which DL_VALUE identifies
+    settings."""
 
     _built_in: dict[str, float] = field(default_factory=dict)
     _numbers: dict[int, str] = field(default_factory=dict)
     _count: int = 0
 
     def read(self, companion: BinaryIO) -> None:
-        """Raises TrajectoryError when it is not a .log file, or larger than 16 MiB."""
+        """Parse the companion. Raises TrajectoryError if it is not a .log file, or larger than 16 MiB."""
         companion.seek(0)
         text = companion.read(MAX_COMPANION_BYTES + 1)
         if len(text) > MAX_COMPANION_BYTES:
@@ -239,7 +242,7 @@ class _Configuration:
             ) from error
 
     def settings(self, values: Sequence[tuple[float, int, float]]) -> list[Setting]:
-        """The gains built in, and every value that the vehicle reported later."""
+        """The built-in gains, and every value that the vehicle reported later."""
         found = [Setting(-np.inf, name, value) for name, value in self._built_in.items()]
         found += [Setting(time_s, self._numbers[n], value) for time_s, n, value in values if n in self._numbers]
         return found

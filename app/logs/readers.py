@@ -1,4 +1,4 @@
-"""Every kind of log that is read here, told by how it begins; a new one is one line of `READERS`."""
+"""All supported kinds of logs, recognised by their first bytes; a new one takes one line in `READERS`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _COMPANION: Final = ".log"
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """One kind of log: what its files are called and how they begin, and who reads them."""
+    """One kind of log: its file suffix and title, a test of its first bytes, and the function that reads it."""
 
     suffix: str
     title: str
@@ -29,7 +29,7 @@ class Reader:
 
 
 def _alone(read: Callable[[BinaryIO], FlightLog]) -> Callable[[BinaryIO, BinaryIO | None], FlightLog]:
-    """A reader of logs that have no companion."""
+    """Adapt a reader of logs without a companion."""
     return lambda stream, _companion: read(stream)
 
 
@@ -44,10 +44,10 @@ SUFFIXES: Final = (".csv", *(reader.suffix for reader in READERS))
 
 
 def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | None = None) -> Sequence[Takeoff]:
-    """Every takeoff in a log, or the one that a CSV file is.
+    """Read every takeoff in a log, or the single one in a CSV file.
 
-    The content says what it is; `name`, the file's, only what it should have been. `companion` is the .log file of a
-    .data file. Raises TrajectoryError in words for whatever cannot be read.
+    The kind of log is determined from the content; the file `name` is used only in error messages. `companion` is the
+    .log file of a .data file. Raises TrajectoryError for anything that cannot be read.
     """
     stream.seek(0)
     head = stream.read(_HEAD_BYTES)
@@ -77,12 +77,14 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
 def read_takeoff(
     stream: BinaryIO, *, name: str = "", number: int | None = None, companion: BinaryIO | None = None
 ) -> Takeoff:
-    """The takeoff of that number in a log, or its only one. Raises TrajectoryError, listing them when it is not clear
-    which one is meant."""
+    """Read one takeoff of a log by its number, or the only one.
+
+    Raises TrajectoryError, listing them, if it is not clear which one is meant.
+    """
     return choose(read_takeoffs(stream, name=name, companion=companion), number)
 
 
 def read_content(content: bytes, *, name: str, number: int | None, companion: bytes | None) -> Takeoff:
-    """The same of files that are in memory, for a process of its own."""
+    """As `read_takeoff`, for files in memory, so that it can run in a separate process."""
     beside = None if companion is None else BytesIO(companion)
     return read_takeoff(BytesIO(content), name=name, number=number, companion=beside)

@@ -1,9 +1,9 @@
 """Reader of takeoffs flown elsewhere: CSV with the columns time_s, altitude_m and optionally more.
 
-UTF-8 (a byte order mark is fine), commas between values, decimal points, lines ending in LF or CRLF; one header line,
-then one line a sample. `time_s` counts from the command and rises strictly; altitude is positive up. Of further
-columns, the channels that the program knows are kept; others are left in the file. Gaps are read as they are: whoever
-scores the flight judges them.
+UTF-8 (with or without a byte order mark), commas between values, decimal points, lines ending in LF or CRLF; one header
+line, then one line per sample. `time_s` counts from the command and increases strictly; altitude is positive up. Of
+further columns, known channels are kept and others ignored. Gaps are read without a check: scoring the flight detects
+them.
 """
 
 import csv
@@ -36,11 +36,10 @@ _ROW_HINT: Final = "Correct or remove the named line and upload the file again; 
 
 
 def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
-    """Read a whole file, in memory bounded by 200 000 rows however long it is.
+    """Read a whole file; memory is bounded by 200 000 rows whatever its length.
 
-    An optional column in which values are missing is left out, which the trajectory's `source` says.
-
-    Raises TrajectoryError naming the line and the column of the first thing wrong, and what to do about it.
+    An optional column with missing values is left out and named in the trajectory's `source`. Raises TrajectoryError
+    naming the line and the column of the first error, and what to do about it.
     """
     lines = _Lines(io.BytesIO(stream) if isinstance(stream, bytes) else stream)
     reader = csv.reader(lines, strict=True)
@@ -58,7 +57,7 @@ def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
 
 
 def _without_holes(channels: dict[str, Samples], numbers: "array[int]") -> tuple[dict[str, Samples], str]:
-    """The columns in which no value is missing, and the flight's source, which names the others."""
+    """The columns without missing values, and the flight's source, which names the others."""
     holes = {name: int(np.isnan(values).argmax()) for name, values in channels.items() if np.isnan(values).any()}
     complete = {name: values for name, values in channels.items() if name not in holes}
     if not holes:
@@ -68,7 +67,7 @@ def _without_holes(channels: dict[str, Samples], numbers: "array[int]") -> tuple
 
 
 class _Lines:
-    """Text lines of a byte stream, each of bounded length, counted."""
+    """Text lines of a byte stream, numbered, each of bounded length."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -130,7 +129,7 @@ def _columns(header: Sequence[str]) -> list[str]:
 def _read_rows(
     reader: Iterator[list[str]], header: Sequence[str], columns: Sequence[str], lines: _Lines
 ) -> tuple[list["array[float]"], "array[int]"]:
-    """The kept columns' values, and the line each row stood on. Empty lines are skipped."""
+    """Values of the kept columns, and the line number of each row. Empty lines are skipped."""
     places = [header.index(name) for name in columns]
     values = [array("d") for _ in columns]
     numbers = array("L")
@@ -157,7 +156,7 @@ def _read_rows(
 
 
 def _value(text: str, line: int, column: str) -> float:
-    """NaN where an optional value is missing."""
+    """The value of a cell; NaN for a missing optional one."""
     if column not in _REQUIRED and text.strip().lower() in _MISSING:
         return math.nan
     return _number(text, line, column)
@@ -190,7 +189,7 @@ def _require_rows(rows: int) -> None:
 
 
 def _require_rising_when_stored(time_s: Samples, numbers: "array[int]") -> None:
-    """Trajectories are kept in single precision; time stamps must stay apart there."""
+    """Trajectories are stored in single precision; time stamps must remain distinct there."""
     stored = time_s.astype(np.float32)
     if (late := np.flatnonzero(np.diff(stored) <= 0.0)).size:
         raise _refused(

@@ -1,11 +1,10 @@
-"""Takeoffs in a flight log: where each begins and ends, the gains it was flown with, and its record.
+"""Detection of takeoffs in a flight log: where each begins and ends, the gains it was flown with, and its record.
 
-A reader brings a log into the form of `FlightLog`; what is a takeoff is decided here, alike for every format. Where the
-autopilot says when it was in the air, each such time that leads up by 0.5 m is a flight, and nothing else is: an
-estimate that settles at boot, or jumps at a touchdown, is none. Where it does not say so, flights are told by altitude,
-while the motors were armed if that is known: off the ground by 0.15 m and on to at least 0.5 m. A flight begins with
-the command to take off where the log holds one, else where the vehicle leaves the ground, and ends with the command to
-land, with another gain, or on the ground.
+A reader converts a log to a `FlightLog`; takeoffs are detected here in the same way for every format. If the autopilot
+logs when it was in the air, each such interval that rises by 0.5 m is a flight, and nothing else is: an estimate that
+settles at boot, or jumps at a touchdown, is not. Otherwise flights are detected by altitude, while the motors were
+armed if that is known: off the ground by 0.15 m and on to at least 0.5 m. A flight begins with the takeoff command if
+the log contains one, else at lift-off; it ends with the landing command, a change of a gain, or on the ground.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +36,7 @@ _ALTITUDES: Final = frozenset({"altitude_m", "reference_m", "set_point_m"})
 
 @dataclass(frozen=True, slots=True)
 class LogEvent:
-    """Something that happened, in seconds of the log, and what it was: "the block Takeoff"."""
+    """An event in seconds of the log, and its description: "the block Takeoff"."""
 
     time_s: float
     what: str
@@ -45,7 +44,7 @@ class LogEvent:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A gain that the vehicle held from this time on."""
+    """A gain that the vehicle used from this time on."""
 
     time_s: float
     name: str
@@ -54,7 +53,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A time in which something was so, in seconds of the log; `end_s` is infinite where the log ends before it."""
+    """An interval in which a condition held, in seconds of the log; `end_s` is infinite if the log ends first."""
 
     begin_s: float
     end_s: float
@@ -62,14 +61,14 @@ class Span:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightLog:
-    """What any log says, in seconds of the log's own `clock` (`vehicle` or `ground`), altitude up.
+    """Contents of any log, in seconds of the log's own `clock` (`vehicle` or `ground`), altitude up.
 
-    `time_s` has shape (n,) and may repeat or step back; `altitude_m` is among the channels, each of shape (n,), NaN
-    where a value is missing. `gain_sets` are the names of gains that make a set, the first one of which every name is
-    known holds. `from_ground` says that the altitude is to be counted from where the vehicle stood. Of `starts`
-    (commands to take off), `ends` (commands that end the flight under them) and `landings` (the vehicle is down, says
-    the autopilot) there may be none. `in_air` are the times from a lift-off to a touchdown, `armed` those with the
-    motors armed, both as the autopilot says and in their order; None where the log does not say.
+    `time_s` has shape (n,) and may repeat or step back. `channels`, each of shape (n,) with NaN for missing values,
+    include `altitude_m`. `gain_sets` are alternative sets of gain names; the first one whose names are all known
+    applies. `from_ground`: the altitude is to be measured from where the vehicle stood. `starts` (takeoff commands),
+    `ends` (commands that end the flight) and `landings` (reported by the autopilot) may be empty. `in_air` are the
+    intervals from lift-off to touchdown, `armed` those with the motors armed, both as reported by the autopilot and in
+    order; None if the log does not report them.
     """
 
     title: str
@@ -89,8 +88,11 @@ class FlightLog:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Takeoff:
-    """One takeoff: its record, time counted from its beginning; the gains held then, empty where the log does not say;
-    and what is to be known about how both were read. `start_s` is in seconds since the log's first sample."""
+    """One takeoff.
+
+    `trajectory` is its record, with time counted from its beginning; `gains` are those used then, empty if not in the
+    log; `notes` explain how both were read. `start_s` is in seconds since the log's first sample.
+    """
 
     number: int
     start_s: float
@@ -101,7 +103,7 @@ class Takeoff:
 
     @property
     def summary(self) -> str:
-        """As in a list to choose from."""
+        """Description for a list to choose from."""
         held = ", ".join(f"{name} {value:g}" for name, value in self.gains.items()) or "gains not in the log"
         return (
             f"{self.start_s:.1f} s into the log, from {self.begins_with}, {self.trajectory.time_s[-1]:.1f} s long, "
@@ -110,7 +112,7 @@ class Takeoff:
 
 
 def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
-    """In the order of their times. Raises TrajectoryError when there is none."""
+    """Find the takeoffs, ordered by time. Raises TrajectoryError if there is none."""
     time_s, channels = _usable(log)
     altitude_m = channels["altitude_m"]
     found: list[Takeoff] = []
@@ -146,7 +148,7 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
 
 
 def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
-    """The takeoff of that number, or the only one. Raises TrajectoryError that lists them where it is not clear."""
+    """The takeoff with this number, or the only one. Raises TrajectoryError that lists them if it is not clear."""
     if number is None and len(takeoffs) == 1:
         return takeoffs[0]
     if number is not None and 1 <= number <= len(takeoffs):
@@ -160,7 +162,7 @@ def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
 
 
 def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
-    """The samples whose altitude is a number and whose time rises. Raises TrajectoryError when too few are left."""
+    """Samples with a finite altitude and increasing time. Raises TrajectoryError if too few remain."""
     altitude_m = log.channels["altitude_m"]
     with np.errstate(invalid="ignore"):
         good = np.isfinite(altitude_m) & np.isfinite(log.time_s) & (np.abs(altitude_m) <= _LARGEST)
@@ -184,7 +186,8 @@ def _where_looked(log: FlightLog) -> str:
 
 
 def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:
-    """The last sample where the vehicle stood, and the first where it is down again, or the last of all."""
+    """Indices of the last sample on the ground before each flight, and of the first one down again, or the last of
+    all."""
     if log.in_air is not None:
         yield from _flights_in_air(time_s, altitude_m, log.in_air)
         return
@@ -196,7 +199,7 @@ def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[t
 
 
 def _flights_in_air(time_s: Samples, altitude_m: Samples, in_air: Sequence[Span]) -> Iterator[tuple[int, int]]:
-    """Every time in the air that leads higher than a hop above where the vehicle stood in the second before it."""
+    """Every interval in the air that rises by more than a hop above the ground level in the second before it."""
     last = len(time_s) - 1
     for span in in_air:
         first, off = _between(time_s, span.begin_s - _BEFORE_S, span.begin_s)
@@ -230,9 +233,9 @@ def _flights_by_altitude(
 
 
 def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int:
-    """The sample from which on the altitude stays near the ground for two seconds; past the last one without any."""
+    """Index from which the altitude stays near the ground for two seconds; past the last one if it never does."""
     soon = int(np.searchsorted(time_s, time_s[up] + LONGEST_S))
-    for past_all in (soon, len(time_s)):  # most flights are short, most of a long log is behind them
+    for past_all in (soon, len(time_s)):  # most flights are short, so search a part of a long log first
         low = altitude_m[up:past_all] <= ground_m + NEAR_GROUND_M
         edges = np.flatnonzero(np.diff(np.concatenate(([False], low, [False])).astype(np.int8))) + up
         for first, past in edges.reshape(-1, 2).tolist():
@@ -242,7 +245,7 @@ def _down(time_s: Samples, altitude_m: Samples, up: int, ground_m: float) -> int
 
 
 def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[LogEvent, bool]:
-    """What time counts from, and whether it is a command: the first one, since what comes after repeats it."""
+    """The event from which time counts, and whether it is a command: the first one, since later ones repeat it."""
     ahead_s = max(free_from_s, stood_s - _COMMAND_AHEAD_S)
     commands = [start for start in log.starts if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
     if not commands:
@@ -253,9 +256,10 @@ def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[LogE
 def _kept(
     log: FlightLog, time_s: Samples, begin: LogEvent, held: "_GainsAt", stood: int, down: int
 ) -> tuple[slice, LogEvent]:
-    """Which samples make the record, and what ends it; nothing in words where that is the landing or the log's end.
+    """The samples of the record, and the event that ends it; without a description if that is the landing or the log's
+    end.
 
-    Commands that end a flight can do so only in the air: what a heartbeat tells of a mode may be a second old.
+    Commands end a flight only in the air: a mode reported by a heartbeat may be a second old.
     """
     off_s = max(begin.time_s, float(time_s[stood]))
     ends = [moment for moment in log.ends if moment.time_s > off_s]
@@ -268,7 +272,7 @@ def _kept(
 
 
 def _between(time_s: Samples, first_s: float, last_s: float) -> tuple[int, int]:
-    """The first sample of a stretch of time, and the one past its last."""
+    """Index of the first sample of an interval, and the one past its last."""
     first = int(np.searchsorted(time_s, first_s))
     return first, max(first, int(np.searchsorted(time_s, last_s, side="right")))
 
@@ -279,7 +283,7 @@ def _ground_m(time_s: Samples, altitude_m: Samples, begin_s: float, stood: int) 
 
 
 class _GainsAt:
-    """The gains that the vehicle held at a time, and when they became others."""
+    """The gains that the vehicle used at a time, and their later changes."""
 
     def __init__(self, log: FlightLog, at_s: float) -> None:
         known = {setting.name for setting in log.settings}
@@ -302,7 +306,7 @@ class _GainsAt:
 
 @dataclass(frozen=True, slots=True)
 class _Record:
-    """What is known about one takeoff, to be put together."""
+    """Data from which one takeoff is assembled."""
 
     log: FlightLog
     begin: LogEvent

@@ -1,7 +1,7 @@
-"""Reader of telemetry logs (.tlog): both directions of a MAVLink connection, each frame after its time in µs.
+"""Reader of telemetry logs (.tlog): both directions of a MAVLink connection, each frame preceded by its time in µs.
 
-Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock; the takeoff from the command that the ground
-station sent (a block named so, NAV_TAKEOFF, the takeoff mode), the gains from what the vehicle answered.
+Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock, the takeoff from the ground station's
+command (a block with such a name, NAV_TAKEOFF, the takeoff mode), the gains from the vehicle's replies.
 """
 
 import importlib
@@ -25,7 +25,7 @@ _MAGICS: Final = (0xFE, 0xFD)
 _MAGIC: Final = re.compile(rb"[\xfe\xfd]")
 _SIGNED: Final = 0x01
 _FIRST_US, _LAST_US = 631_152_000_000_000, 4_102_444_800_000_000
-"""Stamps of the years 1990 … 2100."""
+"""Time stamps of the years 1990 … 2100."""
 _POSITION: Final = struct.Struct("<I6f")
 _RESTART_S: Final = 1.0
 _ARMED: Final = 128
@@ -40,7 +40,7 @@ _HINT: Final = (
 
 
 class _Message(Protocol):
-    """What pymavlink decodes: fields are attributes of the names in the dialect's definition."""
+    """A message decoded by pymavlink: fields are attributes with the names in the dialect's definition."""
 
     def get_srcSystem(self) -> int: ...  # noqa: N802 - pymavlink's name
     def __getattr__(self, name: str) -> float | int | str: ...
@@ -48,8 +48,11 @@ class _Message(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Autopilot:
-    """What differs between autopilots. `parameters` maps their names to those of the gains, which some keep as whole
-    numbers only; some have a mode that takes off."""
+    """Differences between autopilots.
+
+    `parameters` maps their parameter names to those of the gains. Some store gains as integers only; some have a
+    takeoff mode.
+    """
 
     title: str
     dialect_module: str
@@ -61,7 +64,7 @@ class _Autopilot:
 
     @property
     def dialect(self) -> ModuleType:
-        """Loaded when the first log of such a vehicle is read: a dialect is a thousand classes."""
+        """Loaded when the first log of such a vehicle is read, because a dialect contains a thousand classes."""
         return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
 
 
@@ -78,12 +81,13 @@ _AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
         12: _Autopilot("PX4", "v20.common", PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
     }
 )
-"""By the number in their heartbeat. Paparazzi flies to altitudes above its local origin, others above the ground."""
+"""By the autopilot number in the heartbeat. Paparazzi's altitude is above its local origin, that of the others above
+the ground."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Frame:
-    """Where a frame lies: its first byte and the one past its last; its message's number, sender and time."""
+    """Location of a frame: its first byte and the one past its last; its message number, sender and payload."""
 
     start: int
     end: int
@@ -96,7 +100,7 @@ class _Frame:
 
 
 def is_tlog(head: bytes) -> bool:
-    """Whether a file that begins so is one: a stamp of our time, and a frame's first byte."""
+    """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame."""
     return (
         len(head) > _STAMP_BYTES
         and head[_STAMP_BYTES] in _MAGICS
@@ -105,7 +109,7 @@ def is_tlog(head: bytes) -> bool:
 
 
 def read_tlog(stream: BinaryIO) -> FlightLog:
-    """Read a whole log. Raises TrajectoryError when nothing in it is a flight of a vehicle that is known here."""
+    """Read a whole log. Raises TrajectoryError if it contains no flight of a known vehicle."""
     data = contents(stream)
     system, autopilot = _vehicle(data)
     conversation = _Telemetry(autopilot, system)
@@ -126,7 +130,7 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
 
 
 def _frames(data: Contents) -> Iterator[_Frame]:
-    """Every frame that another one follows, or the log's end; what is damaged is passed over."""
+    """Every frame that is followed by another one, or by the log's end; damaged parts are skipped."""
     position, size = _STAMP_BYTES, len(data)
     while position + 12 <= size:
         frame = _frame_at(data, position, size)
@@ -166,7 +170,7 @@ def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
 
 
 def _is_whole(dialect: ModuleType, data: Contents, frame: _Frame, extra: bytes) -> bool:
-    """Whether the checksum is right; pymavlink's own decoding takes ten times as long."""
+    """Whether the checksum is correct; pymavlink's own decoding takes ten times as long."""
     past = _past_payload(data, frame)
     checksum = int.from_bytes(data[past : past + 2], "little")
     return bool(dialect.x25crc(data[frame.start + 1 : past] + extra).crc == checksum)
@@ -177,13 +181,13 @@ def _past_payload(data: Contents, frame: _Frame) -> int:
 
 
 def _payload(data: Contents, frame: _Frame, size: int) -> bytes:
-    """MAVLink 2 leaves out zeros at the end."""
+    """The payload, zero-padded: MAVLink 2 truncates trailing zeros."""
     return data[frame.payload : _past_payload(data, frame)][:size].ljust(size, b"\0")
 
 
 @dataclass(slots=True)
 class _Sent:
-    """A command that waits for its answer."""
+    """A command without an answer so far."""
 
     moment: LogEvent
     moments: list[LogEvent]
@@ -191,7 +195,8 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Telemetry:
-    """What ground and vehicle said to each other, in the vehicle's time; that of the last position holds for all."""
+    """The exchange between ground station and vehicle, in the vehicle's time; messages are dated by the last
+    position."""
 
     autopilot: _Autopilot
     system: int
@@ -234,7 +239,7 @@ class _Telemetry:
     def position(self, payload: bytes, stamp_s: float) -> None:
         boot_ms, _, _, down_m, _, _, down_m_s = _POSITION.unpack(payload)
         now_s = boot_ms / 1000 + self._offset_s
-        if now_s < self._now_s - _RESTART_S:  # its clock begins again: go on by the ground's
+        if now_s < self._now_s - _RESTART_S:  # the vehicle's clock restarted: continue with the ground's
             self._offset_s += self._now_s - now_s + max(stamp_s - self._stamp_s, 0.0)
             now_s = boot_ms / 1000 + self._offset_s
             self._restarts += 1
@@ -244,10 +249,10 @@ class _Telemetry:
         self._climb_rate_m_s.append(-down_m_s)
 
     def log(self) -> FlightLog:
-        """Raises TrajectoryError when there was no position."""
+        """The log as read so far. Raises TrajectoryError if there was no position."""
         if not self._time_s:
             raise refused("holds no LOCAL_POSITION_NED of the vehicle", _HINT)
-        for sent in self._sent.values():  # an answer that is missing in the log refuses nothing
+        for sent in self._sent.values():  # a command without an answer counts as accepted
             sent.moments.append(sent.moment)
         for time_s, number in self._activated:
             name = self._blocks.get(number, "")

@@ -1,10 +1,10 @@
 """Reader of PX4's logs (.ulg, "ULog").
 
-The file is sieved first: of the messages only those that tell of a takeoff go on to pyulog, and of their formats only
-flat and sensible ones. So memory and time stay bounded by the flight, whatever a file claims to hold.
+The file is filtered first: only messages needed for takeoffs, with flat and valid formats, are passed to pyulog. This
+bounds memory and time by the flight, whatever a file claims to contain.
 
-A takeoff is told by the land detector (`vehicle_land_detected`), the arming state and the mode (`vehicle_status`). A
-log without them is searched for rises of the altitude, and a note says so.
+A takeoff is detected from the land detector (`vehicle_land_detected`), the arming state and the mode
+(`vehicle_status`). A log without them is searched for rises of the altitude, and a note reports this.
 """
 
 import io
@@ -45,10 +45,10 @@ _ACCEPTED: Final = 0
 _ANSWERED_WITHIN_S: Final = 2.0
 _TAKEOFF_MODE, _HOVER_MODE = 17, 4
 _COMING_DOWN: Final = frozenset({5.0, 12.0, 18.0, 20.0})
-"""Return, descend, land, precision landing: nobody takes off in these."""
+"""Return, descend, land, precision landing: no takeoff begins in these modes."""
 _ARMED: Final = 2.0
 _BOUNCE_S: Final = 2.0
-"""A vehicle that is off the ground again sooner than this after a touchdown has not taken off anew."""
+"""Leaving the ground sooner than this after a touchdown is not a new takeoff."""
 _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position", 3: "mission", 5: "return", 18: "land"}
 
 _HINT: Final = "Give PX4's .ulg log of the flight, with vehicle_local_position in it."
@@ -57,12 +57,12 @@ Topic = Mapping[str, NDArray[np.generic]]
 
 
 def is_ulog(head: bytes) -> bool:
-    """Whether a file that begins so is one."""
+    """Whether a file with this head is a ULog."""
     return head.startswith(_MAGIC)
 
 
 def read_ulog(stream: BinaryIO) -> FlightLog:
-    """Read a whole log. Raises TrajectoryError when there is no altitude in it."""
+    """Read a whole log. Raises TrajectoryError if it contains no altitude."""
     from pyulog import ULog
     from pyulog.exceptions import ULogException
 
@@ -99,7 +99,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
 
 @dataclass(slots=True)
 class _LogFilter:
-    """What of a log is worth reading. `damages` counts the stretches that were passed over."""
+    """Filters the messages of a log. `damages` counts the sections that were skipped."""
 
     kept: bytearray = field(default_factory=bytearray)
     damages: int = 0
@@ -108,7 +108,7 @@ class _LogFilter:
     _appended: list[int] = field(default_factory=list)
 
     def filter(self, data: Contents) -> None:
-        """Go through all messages; after damage, on from the next mark that the logger sets for that."""
+        """Go through all messages; after damage, resume at the next synchronisation mark of the logger."""
         self.kept += _MAGIC + b"\x01" + data[len(_MAGIC) + 1 : _HEADER_BYTES]
         position, size = _HEADER_BYTES, len(data)
         while position + 3 <= size:
@@ -143,7 +143,7 @@ class _LogFilter:
         return False
 
     def _takes_format(self, body: bytes) -> bool:
-        """Whether it is that of a wanted topic: flat, every name once, a time among them."""
+        """Whether this is the format of a wanted topic: flat, with unique names, including a time stamp."""
         name, _, described = body.decode("ascii", "replace").partition(":")
         parts = [part for part in described.split(";") if part]
         if name not in _TOPICS or len(parts) > _MAX_FIELDS:
@@ -162,7 +162,7 @@ class _LogFilter:
         return sound
 
     def _subscribes(self, body: bytes) -> bool:
-        """Whether it is for the first instance of a wanted topic."""
+        """Whether this subscribes to the first instance of a wanted topic."""
         if len(body) < 4:
             return False
         instance, number, name = body[0], body[1] | body[2] << 8, body[3:].decode("ascii", "replace")
@@ -181,7 +181,7 @@ class _LogFilter:
 
 
 def _is_gain(body: bytes) -> bool:
-    """Whether a parameter is one of the gains, in the form that PX4 writes: "float NAME" and its value."""
+    """Whether a parameter is one of the gains, in PX4's form: "float NAME" and its value."""
     key = body[1 : 1 + body[0]].decode("ascii", "replace")
     kind, _, name = key.partition(" ")
     return kind == "float" and name in names_in(PX4_SETS) and len(body) == 1 + body[0] + 4
@@ -197,7 +197,7 @@ def _settings(log: "ULog") -> Iterator[Setting]:
 
 
 def _channels(position: Topic, topics: Mapping[str, Topic]) -> dict[str, Samples]:
-    """Altitude where the estimator calls it valid, and what else was logged, at the times of the position."""
+    """Altitude where the estimator reports it as valid, and the other channels, at the times of the position."""
     time_s, altitude_m = _seconds(position), -_numbers(position["z"])
     if "z_valid" in position:
         altitude_m = np.where(_numbers(position["z_valid"]) != 0.0, altitude_m, np.nan)
@@ -216,7 +216,7 @@ def _channels(position: Topic, topics: Mapping[str, Topic]) -> dict[str, Samples
 
 
 def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
-    """Commands and modes that take off, those that end a flight, and landings."""
+    """Takeoff commands and modes, those that end a flight, and landings."""
     starts: list[LogEvent] = []
     ends: list[LogEvent] = []
     landings: list[LogEvent] = []
@@ -245,10 +245,11 @@ def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent
 
 
 def _in_air(topics: Mapping[str, Topic]) -> list[Span] | None:
-    """From each lift-off to the touchdown, as the land detector has it, with the motors armed where that is known.
+    """Intervals from each lift-off to the touchdown, as reported by the land detector, with the motors armed if that is
+    known.
 
-    No lift-off is what happens in a mode that comes down, or within two seconds of a touchdown: the landing's bounce.
-    None without the land detector.
+    A lift-off in a descending mode, or within two seconds of a touchdown (a bounce), is not counted. None without the
+    land detector.
     """
     landed = list(_rows(topics, _LANDED, "landed"))
     if not landed:
@@ -267,13 +268,13 @@ def _in_air(topics: Mapping[str, Topic]) -> list[Span] | None:
 
 
 def _armed(topics: Mapping[str, Topic]) -> list[Span] | None:
-    """The times with the motors armed; None where the log does not say."""
+    """Intervals with the motors armed; None if the log does not report them."""
     arming = list(_rows(topics, _STATUS, "arming_state"))
     return _spans((time_s, state == _ARMED) for time_s, state in arming) if arming else None
 
 
 def _spans(told: Iterable[tuple[float, bool]]) -> list[Span]:
-    """The times in which something was so, of what was told of it and when."""
+    """Intervals in which a condition held, from timed reports of it."""
     spans: list[Span] = []
     since_s: float | None = None
     for time_s, holds in told:
@@ -286,7 +287,7 @@ def _spans(told: Iterable[tuple[float, bool]]) -> list[Span]:
 
 
 def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:
-    """What the last of these rows, of a time and a value, said at a time; None before the first."""
+    """A function of time that returns the latest value of these rows (time, value); None before the first."""
     told = sorted((time_s, value) for time_s, value in rows)
     times = [time_s for time_s, _ in told]
 
@@ -298,7 +299,8 @@ def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:
 
 
 def _missing(topics: Mapping[str, Topic]) -> Iterator[str]:
-    """What the log lacks to tell a takeoff from an altitude that jumps, and what was done without it."""
+    """Notes on missing topics that distinguish a takeoff from a jump of the altitude, and on the method used without
+    them."""
     has_status = any(True for _ in _rows(topics, _STATUS, "arming_state", "nav_state"))
     if not any(True for _ in _rows(topics, _LANDED, "landed")):
         how = "while it was armed" if has_status else "armed or not"
@@ -316,7 +318,7 @@ def _notes(sieve: _LogFilter, log: "ULog") -> Iterator[str]:
 
 
 def _rows(topics: Mapping[str, Topic], topic: str, *names: str) -> Iterator[tuple[float, ...]]:
-    """Time and columns of a topic, row by row; none where a column is missing."""
+    """Time and columns of a topic, row by row; none if a column is missing."""
     table = topics.get(topic, {})
     if {"timestamp", *names} <= table.keys():
         yield from zip(_seconds(table).tolist(), *(_numbers(table[name]).tolist() for name in names), strict=True)
