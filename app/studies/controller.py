@@ -1,4 +1,4 @@
-"""The paper's Fig. 6: a recorded run of the autopilot's vertical loop against the replica of it."""
+"""The paper's Fig. 6: a recorded run of the autopilot's vertical loop compared with its replica."""
 
 from pathlib import Path
 from typing import Final
@@ -13,7 +13,7 @@ from app.logs.loop_trace import read_loop_trace
 from app.studies.results import Progress, Result, Row, curve
 
 RECORDED_TAKEOFF: Final = Path(__file__).parent / "data" / "takeoff_default.csv.gz"
-"""A takeoff at the default gains, as the autopilot's own code computed it."""
+"""A takeoff at the default gains, computed by the autopilot's own code."""
 
 _PANELS: Final = {
     "figure6-reference": ("the reference model, in counts", ("z_ref", "zd_ref", "zdd_ref")),
@@ -22,7 +22,7 @@ _PANELS: Final = {
 
 
 def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -> Result:
-    """Replay a recorded run and compare every output of every step. Raises InputError for a file that is no trace."""
+    """Replay a recorded run and compare every output of every step. Raises InputError if the file is not a trace."""
     on_progress(0.0, "reading the recorded run")
     trace = read_loop_trace(trace_file)
     on_progress(0.3, f"replaying {len(trace)} steps")

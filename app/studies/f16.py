@@ -1,4 +1,4 @@
-"""The paper's F-16 experiment over many inaccurate models: which method finds the true optimum, and after how many
+"""The paper's F-16 experiment over many inaccurate models: which methods find the true optimum, and in how many
 flights."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,26 +21,29 @@ from app.processes import process_context
 from app.vehicles.lti import whole_flight
 
 BEST_ERROR: Final = 0.204716
-"""The local optimum of the truth, rad·s, to ±0.0002: the same from 20 starts."""
+"""Local optimum of the true system, rad·s, to ±0.0002: the same from 20 starts."""
 WITHIN: Final = 0.05
 MAX_FLIGHTS: Final = 40
 SEARCH_FLIGHTS: Final = 300
-"""Flights that Nelder–Mead without a model may take."""
+"""Flight budget of Nelder–Mead without a model."""
 SHOWCASE_SEED: Final = 50
-"""Chosen among the models off by ±45 % because its campaign looks like the paper's."""
+"""Chosen among the models off by ±45 % because its campaign resembles the paper's."""
 SHOWCASE_FLIGHTS: Final = 25
 PAPER_FLIGHTS: Final = 27
 PAPER_NEAR_OPTIMAL_AFTER: Final = 16
 _KEPT_STARTS: Final = 256
 
 Progress = Callable[[int, int], None]
-"""Told how many campaigns are done, and of how many."""
+"""Called with the number of campaigns done and their total."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
-    """How the next gains are found. An empty `strategy` is Nelder–Mead on the aircraft itself, without a model.
-    `log_noise` is that of the vehicle's option."""
+    """A method of finding the next gains.
+
+    An empty `strategy` is Nelder–Mead on the aircraft itself, without a model. `log_noise` is the vehicle's option of
+    that name.
+    """
 
     name: str
     title: str
@@ -82,20 +85,20 @@ METHODS: Final[Mapping[str, Method]] = MappingProxyType({method.name: method for
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignResult:
-    """One campaign on the truth: the noise-free error of every flight, rad·s, in their order."""
+    """One campaign on the true system: the noise-free error of every flight, rad·s, in order."""
 
     seed: int
     errors: tuple[float, ...]
 
     @property
     def flights_to_optimum(self) -> int | None:
-        """The number of the first flight within 5 % of the true optimum; None when there is none."""
+        """Number of the first flight within 5 % of the true optimum; None if there is none."""
         return next((n for n, error in enumerate(self.errors, 1) if error <= (1.0 + WITHIN) * BEST_ERROR), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodResult:
-    """A method over the inaccurate models of one perturbation, by seed."""
+    """Results of a method over the inaccurate models of one perturbation, by seed."""
 
     method: str
     title: str
@@ -104,31 +107,32 @@ class MethodResult:
 
     @property
     def flights(self) -> tuple[int, ...]:
-        """Flights to within 5 % of the optimum, of the campaigns that came so far."""
+        """Flights to within 5 % of the optimum, for the campaigns that reached it."""
         return tuple(n for campaign in self.campaigns if (n := campaign.flights_to_optimum) is not None)
 
     @property
     def share(self) -> float:
-        """Of the campaigns that came within 5 % of the optimum."""
+        """Share of campaigns that came within 5 % of the optimum."""
         return len(self.flights) / len(self.campaigns)
 
     @property
     def median_flights(self) -> float | None:
-        """Of the campaigns that came so far."""
+        """Median of `flights`; None if no campaign came near the optimum."""
         return median(self.flights) if self.flights else None
 
     def share_by(self, flight: int) -> float:
-        """Of the campaigns that came so far by that flight."""
+        """Share of campaigns that came within 5 % of the optimum by that flight."""
         return sum(n <= flight for n in self.flights) / len(self.campaigns)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Showcase:
-    """One campaign in full, for the paper's figures 2 to 4.
+    """One complete campaign, for the paper's figures 2 to 4.
 
-    `search_errors`: the model's lowest error so far at each iteration of the start's Nelder–Mead (figure 2, left).
-    `model_hand`, `model_start`: the model's run with the hand gains and with the start's (figure 2, right).
-    `flights`: gains, error and record of every true flight (figures 3 and 4); `best` is the number of the best.
+    `search_errors`: the model's lowest error so far at each iteration of the Nelder–Mead search for the start (figure
+    2, left). `model_hand`, `model_start`: the model's run with the hand gains and with the start gains (figure 2,
+    right). `flights`: gains, error and record of every flight of the true system (figures 3 and 4); `best` is the
+    number of the best.
     """
 
     search_errors: tuple[float, ...]
@@ -164,8 +168,11 @@ def study(
     max_flights: int = MAX_FLIGHTS,
     processes: int = 2,
 ) -> tuple[MethodResult, ...]:
-    """Every method on every inaccurate model, each campaign until it is within 5 % of the true optimum, has nothing to
-    propose or has flown `max_flights`. The same arguments give the same results, however many processes compute."""
+    """Run every method on every inaccurate model.
+
+    Each campaign ends when it is within 5 % of the true optimum, has nothing to propose, or has flown `max_flights`.
+    The results do not depend on the number of processes.
+    """
     cases = [
         _Case(method=m, perturbation=perturbation, seed=s, max_flights=max_flights) for s in seeds for m in methods
     ]
@@ -185,7 +192,7 @@ def study(
 
 
 def showcase(seed: int = SHOWCASE_SEED, *, flights: int = SHOWCASE_FLIGHTS, perturbation: float = 0.45) -> Showcase:
-    """The paper's method, scaled, on one inaccurate model, and the search that gave its start."""
+    """The paper's method, scaled, on one inaccurate model, and the search for its start gains."""
     definition = _definition(METHODS["outside"], perturbation, seed, flights)
     experiment = PitchTracking(definition.experiment_options)
     default, optimum = experiment.space.default, start(perturbation, seed)
@@ -199,13 +206,13 @@ def showcase(seed: int = SHOWCASE_SEED, *, flights: int = SHOWCASE_FLIGHTS, pert
 
 @cache
 def truth() -> PitchTracking:
-    """The experiment whose model is the truth."""
+    """The experiment whose model is the true system."""
     return PitchTracking({"perturbation": 0.0})
 
 
 @lru_cache(maxsize=_KEPT_STARTS)
 def start(perturbation: float, seed: int) -> Optimum:
-    """Where every campaign on an inaccurate model begins: that model's optimum, searched from the hand gains."""
+    """Start of every campaign on an inaccurate model: that model's optimum, searched from the hand gains."""
     experiment = PitchTracking({"perturbation": perturbation, "model_seed": seed})
     return model_optimum(experiment, experiment.space, experiment.space.default)
 
@@ -241,8 +248,8 @@ def _definition(method: Method, perturbation: float, seed: int, max_flights: int
 
 
 def _flown(definition: Definition, method: Method, *, until_near: bool) -> Iterator[Flight]:
-    """The campaign's flights, until one is within 5 % of the optimum (where asked), nothing is proposed, or the budget
-    is spent."""
+    """Fly the campaign until a flight is within 5 % of the optimum (with `until_near`), nothing is proposed, or the
+    budget is used up."""
     flights: list[Flight] = []
     while len(flights) < definition.stop.max_flights:
         proposal = next_proposal(definition, flights)
@@ -259,18 +266,18 @@ def _flown(definition: Definition, method: Method, *, until_near: bool) -> Itera
 
 
 def _true_errors(gains: Sequence[Mapping[str, float]]) -> list[float]:
-    """Noise-free errors on the truth, rad·s."""
+    """Noise-free errors on the true system, rad·s."""
     aircraft = truth()
     vectors = np.array([aircraft.space.vector(one) for one in gains])
     return [float(error) for error in aircraft.errors(aircraft.outputs(vectors, aircraft.nominal_model))]
 
 
 class _NearError(Exception):
-    """The search has come within 5 % of the optimum."""
+    """Raised when the search is within 5 % of the optimum."""
 
 
 def _searched(case: _Case) -> tuple[float, ...]:
-    """Nelder–Mead on the truth from the same start, every evaluation a flight."""
+    """Nelder–Mead on the true system from the same start; every evaluation is a flight."""
     from scipy.optimize import minimize
 
     space, first = PitchTracking.space, start(case.perturbation, case.seed).gains

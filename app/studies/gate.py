@@ -1,4 +1,4 @@
-"""The gate of a campaign, held before the reproductions' flights too."""
+"""The gate of a campaign, applied to the flights of reproductions."""
 
 from typing import Final
 
@@ -11,18 +11,19 @@ from app.studies.results import OVERRULE
 from app.vehicles.open import get_kind
 
 _CAMPAIGN: Final = Definition(experiment="takeoff", first_step_fraction=1.0)
-"""The default campaign, free to step anywhere inside its bounds."""
+"""The default campaign, without a step limit inside its bounds."""
 
 
 def judge_takeoff(gains: Gains) -> GateResult:
-    """The verdict on a takeoff's gains before anything has flown. Takes a tenth of a second."""
+    """Check a takeoff's gains as before the first flight. Takes a tenth of a second."""
     experiment = get_experiment(_CAMPAIGN.experiment)
     return check_policy(_CAMPAIGN, experiment, experiment.space, gains, (), spread=prior_distribution(experiment))
 
 
 def overruled_for(gains: Gains, vehicle: str) -> str:
-    """Why these gains may fly on a vehicle of this kind although the gate refuses them; empty where it does not.
+    """The reason for flying these gains on a vehicle of this kind despite the gate's refusal; empty if it does not
+    refuse.
 
-    Raises GainsError for gains that nobody can overrule the gate for.
+    Raises GainsError if the refusal cannot be overruled.
     """
     return require_flyable(judge_takeoff(gains), overrule=OVERRULE, is_real=get_kind(vehicle).is_real)

@@ -1,7 +1,7 @@
-"""A process that computes one reproduction, with less priority than everything else, and says how far it is.
+"""A low-priority process that computes one reproduction and reports its progress.
 
-It holds one end of a lifeline: when its parent lets go or dies, it ends at once. A reproduction is pure, so nothing is
-lost by that.
+The process watches a pipe to its parent: when the parent closes the pipe or dies, it ends at once. A reproduction is
+pure, so nothing is lost.
 """
 
 import os
@@ -25,7 +25,7 @@ SHUTDOWN_TIMEOUT_S: Final = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Said by the process: the share done, 0 … 1, and what it is at."""
+    """Message of the process: the share done, 0 … 1, and the current activity."""
 
     share: float
     doing: str
@@ -33,7 +33,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class StudyError:
-    """Said by the process: an error of ours, for a person."""
+    """Message of the process: a GainlineError, to be shown to a person."""
 
     message: str
     hint: str
@@ -42,7 +42,7 @@ class StudyError:
 
 @dataclass(frozen=True, slots=True)
 class InternalFailure:
-    """Said by the process: the program's own mistake, and where it was made."""
+    """Message of the process: an internal error, with its traceback."""
 
     what: str
     traceback: str
@@ -52,11 +52,11 @@ StudyMessage = Progress | Result | StudyError | InternalFailure
 
 
 class ProcessDiedError(Exception):
-    """The process is gone without a word; `args` hold its exit code."""
+    """The process ended without a result; `args` hold its exit code."""
 
 
 class StudyProcess:
-    """One reproduction between enter and exit; on exit the process is ended, wherever it is."""
+    """Runs one reproduction between enter and exit; on exit the process is killed, whatever its state."""
 
     def __init__(self, name: str, *, full: bool) -> None:
         context = process_context()
@@ -78,7 +78,7 @@ class StudyProcess:
         self._process.join(SHUTDOWN_TIMEOUT_S)
 
     def listen(self, within_s: float) -> StudyMessage | None:
-        """What it says next, None when it says nothing for so long. Raises ProcessDiedError."""
+        """Return the next message, or None if there is none within that time. Raises ProcessDiedError."""
         try:
             if not self._pipe.poll(within_s):
                 return None
@@ -106,6 +106,6 @@ def _outcome(tell: Callable[[float, str], None], name: str, full: bool) -> Resul
 
 
 def _end_with(pipe: Connection) -> None:
-    """Nothing is ever said to the process: what arrives is the end of its parent."""
+    """Exit when the parent ends: it never sends anything, so the pipe becomes readable only when it closes."""
     pipe.poll(None)
     os._exit(0)

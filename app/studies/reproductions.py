@@ -1,6 +1,6 @@
-"""The reproductions there are: what each shows in the paper, and how it is run here.
+"""Registry of reproductions: what each shows in the paper, and how it is run here.
 
-The programs that run them are imported by whoever runs one: who only lists them needs none.
+The modules that run them are imported on use, so that listing them needs none.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,9 +16,9 @@ from app.studies.results import Progress, Result
 class Reproduction:
     """One experiment, table or figure of the paper.
 
-    `line` says what is done here, `paper` what the paper shows. `figures` names the drawings of a result in their order
-    with the paper's name for each. `run(on_progress, full)` is pure: the same result every time; `full` asks for the
-    long form where `long_form` says that there is one.
+    `line` describes what is done here, `paper` what the paper shows. `figures` names the figures of a result in order,
+    with the paper's name for each. `run(on_progress, full)` is pure: the same result every time; `full` requests the
+    long form, which exists if `long_form` is not empty.
     """
 
     name: str
@@ -122,7 +122,7 @@ REPRODUCTIONS: Final[Mapping[str, Reproduction]] = MappingProxyType({each.name: 
 
 
 def get_reproduction(name: str) -> Reproduction:
-    """Raises InputError when there is none of that name."""
+    """The reproduction with this name. Raises InputError if there is none."""
     if name not in REPRODUCTIONS:
         raise InputError(
             "There is no such reproduction.",

@@ -1,4 +1,4 @@
-"""What a reproduction comes to: numbers beside the published ones, and figures to draw. Plain data, kept as JSON."""
+"""Result of a reproduction: numbers compared with the published ones, and figures. Plain data, stored as JSON."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -13,21 +13,21 @@ from app.figures.panels import Line, Plot, Style
 from app.figures.scale import thinned
 
 Progress = Callable[[float, str], None]
-"""Told the share that is done, 0 … 1, and what is being done."""
+"""Called with the share done, 0 … 1, and the current activity."""
 
 OVERRULE: Final = "reproduces the paper's own flights in simulation"
-"""Why gains that the gate refuses are flown all the same; on a real vehicle nobody could."""
+"""Reason recorded for flying gains that the gate refuses; not possible on a real vehicle."""
 
 CURVE_POINTS: Final = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is what this program is held
-    to, where it was measured or worked out beforehand. None where there is no such number.
+    """One number of a result.
 
-    `numbers` are further figures of the same row by name with their unit in it; `overruled` says why gains were flown
-    that the gate refuses.
+    `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
+    this program, if it was measured or computed beforehand. None if there is no such number. `numbers` are further
+    values of the row, by name including the unit; `overruled` is the reason for flying gains that the gate refuses.
     """
 
     group: str
@@ -46,7 +46,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Everything that one reproduction found; `figures` by their name in its registry entry."""
+    """Complete result of one reproduction; `figures` by the names in its registry entry."""
 
     rows: tuple[Row, ...]
     figures: Mapping[str, Plot]
@@ -60,7 +60,7 @@ _RESULT: Final = TypeAdapter(Result)
 
 
 def result_from_json(document: object) -> Result:
-    """What `as_json` made, back again. Raises ValueError for anything else."""
+    """Restore a result from `as_json`. Raises ValueError for anything else."""
     return _RESULT.validate_python(document)
 
 
@@ -71,13 +71,13 @@ def ratio(measured: float, paper: float | None) -> float | None:
 def curve(
     name: str, style: Style, x: Samples, y: Samples | NDArray[np.int64], *, note: str = "", points: int = CURVE_POINTS
 ) -> Line:
-    """A line through samples of shape (n,), thinned so that it keeps its look and its extremes."""
+    """A line through samples of shape (n,), thinned so that its shape and extremes are preserved."""
     near, values = thinned(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), points)
     return Line(name=name, style=style, x=tuple(near), y=tuple(values), note=note)
 
 
 def marks(name: str, style: Style, x: Samples, y: Samples, *, note: str = "") -> Line:
-    """A mark for each of the samples of shape (n,)."""
+    """A mark for each sample of shape (n,)."""
     return Line(
         name=name,
         style=style,

@@ -1,4 +1,4 @@
-"""Reproductions over HTTP."""
+"""HTTP API of reproductions."""
 
 from typing import Annotated
 
@@ -25,13 +25,13 @@ def list_reproductions(session: Reader) -> Page[ReproductionSummary]:
 
 @router.get("/{name}")
 def get_reproduction(session: Reader, name: Name) -> Reproduction:
-    """One of them with the rows of its newest result: measured, published, and their ratio."""
+    """One reproduction with the rows of its newest result: measured, published, and their ratio."""
     return service.get_reproduction(session, name)
 
 
 @router.post("/{name}/run", status_code=status.HTTP_202_ACCEPTED)
 def run_reproduction(act: IdempotentPost, name: Name, body: Run | None = None) -> Job:
-    """Have it run. While it waits or runs already, the answer is that job."""
+    """Request a run. If one is queued or running already, its job is returned."""
     return act(Job, lambda session: service.request_run(session, name, full=(body or Run()).full))
 
 

@@ -1,4 +1,4 @@
-"""What a reproduction looks like from outside."""
+"""API views of reproductions."""
 
 from datetime import datetime
 from typing import Annotated
@@ -16,14 +16,14 @@ class Run(Request):
 
 
 class ReproductionFigure(BaseModel):
-    """A drawing of a reproduction, and what the paper calls it."""
+    """A figure of a reproduction, and its title in the paper."""
 
     name: str
     title: str
 
 
 class LatestRun(BaseModel):
-    """The newest finished run; its job says when it was started."""
+    """The newest finished run; its job records when it was started."""
 
     job_id: int
     full: bool
@@ -32,9 +32,9 @@ class LatestRun(BaseModel):
 
 
 class ReproductionSummary(BaseModel):
-    """One experiment, table or figure of the paper. `line` says what is done here, `paper` what the paper shows.
+    """One experiment, table or figure of the paper. `line` describes what is done here, `paper` what the paper shows.
 
-    `job` is the newest run that waits, runs, or failed after the `latest` one.
+    `job` is the newest run that is queued or running, or that failed or was cancelled after the `latest` one.
     """
 
     name: str
@@ -48,8 +48,8 @@ class ReproductionSummary(BaseModel):
 
 
 class ReproductionRow(BaseModel):
-    """One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is what this program is held
-    to. `overruled` says why gains were flown that the gate refuses."""
+    """One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is the target value of this
+    program. `overruled` is the reason for flying gains that the gate refuses."""
 
     group: str
     label: str

@@ -1,4 +1,4 @@
-"""What people and scripts do with reproductions: have one run, read what came of it."""
+"""Services for reproductions: request a run, read its result."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -25,7 +25,7 @@ CAME_TO_NOTHING: Final = (JobState.FAILED, JobState.CANCELLED)
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a job of this kind is to do."""
+    """Parameters of a reproduction job."""
 
     name: str
     full: bool = False
@@ -35,7 +35,7 @@ _ORDER: Final = TypeAdapter(Order)
 
 
 def read_order(order: object) -> Order:
-    """Raises GainlineError for a job of another version of the program."""
+    """Parse a job's order. Raises GainlineError for a job of another version of the program."""
     try:
         found = _ORDER.validate_python(order)
     except ValidationError as error:
@@ -46,12 +46,12 @@ def read_order(order: object) -> Order:
 
 
 def list_reproductions(session: Session) -> list[schemas.ReproductionSummary]:
-    """All there are, in the order of the registry, without their rows."""
+    """All reproductions, in the order of the registry, without their rows."""
     return [schemas.ReproductionSummary.model_validate(_summary(session, each)) for each in REPRODUCTIONS.values()]
 
 
 def get_reproduction(session: Session, name: str) -> schemas.Reproduction:
-    """One with the rows of its newest result. Raises NotFoundError."""
+    """One reproduction with the rows of its newest result. Raises NotFoundError."""
     each = _registered(name)
     result = _result(session, name)
     return schemas.Reproduction.model_validate(
@@ -65,7 +65,7 @@ def get_reproduction(session: Session, name: str) -> schemas.Reproduction:
 
 
 def request_run(session: Session, name: str, *, full: bool) -> Job:
-    """Have it run; one that waits or runs already serves for this too. Raises NotFoundError."""
+    """Request a run; a queued or running one is reused. Raises NotFoundError."""
     _registered(name)
     row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, ACTIVE_STATES) or jobs.enqueue_job(
         session, REPRODUCTION_JOB, order={"name": name, "full": full}
@@ -74,7 +74,7 @@ def request_run(session: Session, name: str, *, full: bool) -> Job:
 
 
 def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> Card:
-    """A figure of the newest result, or a card that waits for one. Raises NotFoundError."""
+    """A figure of the newest result, or a waiting card if there is none. Raises NotFoundError."""
     each = _registered(name)
     if figure_name not in each.figures:
         raise NotFoundError(f"figure {figure_name} of", name, hint=f"There are: {', '.join(each.figures)}.")
@@ -114,7 +114,7 @@ def _summary(session: Session, each: Reproduction) -> dict[str, object]:
 
 
 def _open_job(session: Session, each: Reproduction, latest: JobRow | None) -> Job | None:
-    """What a page has to show beside the result: the run under way, or a later one that came to nothing."""
+    """The job to show beside the result: the current run, or a later one that failed or was cancelled."""
     if (row := jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, ACTIVE_STATES)) is None:
         row = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, CAME_TO_NOTHING)
         if row is None or (latest is not None and row.id < latest.id):
@@ -134,7 +134,7 @@ def _latest_run(row: JobRow) -> schemas.LatestRun | None:
 
 
 def _result(session: Session, name: str) -> Result | None:
-    """The newest result; one that this version of the program cannot read counts as none."""
+    """The newest result; None also if this version of the program cannot read it."""
     row = jobs.latest_result(session, REPRODUCTION_JOB, name)
     if row is None:
         return None

@@ -1,8 +1,8 @@
 """The paper's tables and the takeoffs behind them (its figures 7 and 11), flown again.
 
-Each table is the gains of the paper's successive flights with the error it published, and the error that was measured
-once for reference on the vehicle that stands for the table's: the original vertical loop closed around JSBSim for
-Table 1, the noise-free twin for Table 2.
+Each table lists the gains of the paper's successive flights with the published error and a reference error, which was
+measured once on the vehicle that represents the table's: the original vertical loop closed around JSBSim for Table 1,
+the noise-free twin for Table 2.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,19 +19,19 @@ from app.vehicles.base import FlightOptions, OptionValue
 from app.vehicles.open import open_vehicle
 
 VEHICLES: Final[Mapping[str, Mapping[str, OptionValue]]] = MappingProxyType({"jsbsim": {}, "twin": {"scatter": 0.0}})
-"""What reproductions fly on, without noise."""
+"""Vehicles used by reproductions, with options for flights without noise."""
 
 FROM_DEFAULT: Final = 5
-"""So many flights of each table are the series from the default gains, the others the one from the simplex's."""
+"""Number of flights in each table that start from the default gains; the others start from the simplex's."""
 LEFT_WINDOW: Final = ((0.0, 30.0), (0.0, 3.7))
 RIGHT_WINDOW: Final = ((1.0, 10.0), (2.7, 3.15))
-"""Seconds and metres shown: the whole takeoff, and the overshoot alone."""
+"""Time (s) and altitude (m) shown: the whole takeoff (left), and the overshoot alone (right)."""
 _RUNS: Final[tuple[Style, ...]] = ("run 1", "run 2", "run 3", "run 4", "run 5")
 
 
 @dataclass(frozen=True, slots=True)
 class PublishedFlight:
-    """One row of a table: kp, ki, kd; the error published and the one of the reference measurement, both in m."""
+    """One row of a table: kp, ki, kd; the published error and that of the reference measurement, both in m."""
 
     gains: tuple[int, int, int]
     paper: float
@@ -40,7 +40,7 @@ class PublishedFlight:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of the paper; `vehicle` is the kind that stands for what it was flown on."""
+    """A table of the paper; `vehicle` is the kind of vehicle that represents the paper's."""
 
     number: int
     title: str
@@ -75,9 +75,9 @@ TABLES: Final[Mapping[str, Table]] = MappingProxyType({
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Takeoff:
-    """One gain set of a table flown on one vehicle: its error and how far it rose above the set point, both in m.
+    """One gain set of a table flown on one vehicle: its error and its overshoot above the set point, both in m.
 
-    `overruled` says why it was flown although the gate refuses it.
+    `overruled` is the reason for flying it although the gate refuses it.
     """
 
     published: PublishedFlight
@@ -89,7 +89,7 @@ class Takeoff:
 
 
 def run_table(name: str, figure: str, on_progress: Progress) -> Result:
-    """Fly a table on both vehicles; `figure` is the name of the paper's figure that shows its flights."""
+    """Fly a table on both vehicles; `figure` is the name of the paper's figure of these flights."""
     table = TABLES[name]
     kinds = (table.vehicle, *(kind for kind in VEHICLES if kind != table.vehicle))
     total, rows, own = len(kinds) * len(table.flights), [], []
@@ -141,7 +141,7 @@ def _label(gains: Mapping[str, float]) -> str:
 
 
 def _plot(table: Table, shown: Sequence[Takeoff], *, default: bool) -> Plot:
-    """The takeoffs of one of the table's two series on its own vehicle."""
+    """Takeoffs of one of the table's two series on its own vehicle."""
     experiment = get_experiment("takeoff")
     (first_s, last_s), height = LEFT_WINDOW if default else RIGHT_WINDOW
     first = shown[0].trajectory

@@ -1,4 +1,4 @@
-"""Carrying out reproductions: each in a process of its own, watched until its result is stored."""
+"""Execution of reproduction jobs, each in a separate process that is supervised until its result is stored."""
 
 import threading
 from concurrent.futures import CancelledError
@@ -16,14 +16,13 @@ from app.studies.results import Result
 from app.studies.service import read_order
 
 LOOK_S: Final = 0.5
-"""How often at most progress is stored, and how soon a cancelled job is noticed."""
+"""Smallest interval, s, between stored progress reports, and largest delay until a cancelled job is noticed."""
 
 _log = structlog.get_logger(__name__)
 
 
 class ReproductionJob:
-    """What the runner of reproductions carries out. `closing` ends what is under way; it runs again with the next
-    worker."""
+    """Executes reproduction jobs. `closing` interrupts the current one, which the next worker runs again."""
 
     def __init__(self, database: Database, *, worker: str, lease_s: float, closing: threading.Event) -> None:
         self._database = database
@@ -32,8 +31,10 @@ class ReproductionJob:
         self._closing = closing
 
     def __call__(self, job: ClaimedJob) -> None:
-        """From the stored order to the stored result. Raises GainlineError for a person, and CancelledError when the
-        worker ends."""
+        """Run a job from its stored order to its stored result.
+
+        Raises GainlineError for errors to be shown to a person, and CancelledError when the worker ends.
+        """
         order, started_s = read_order(job.order), monotonic()
         with StudyProcess(order.name, full=order.full) as process:
             try:
@@ -51,7 +52,7 @@ class ReproductionJob:
         _log.info("reproduction stored", name=order.name, seconds=round(monotonic() - started_s, 1))
 
     def _watch(self, job: ClaimedJob, process: StudyProcess) -> Result | None:
-        """Until it has a result, storing how far it is; None when the job was cancelled meanwhile."""
+        """Wait for the result and store the progress; None if the job was cancelled meanwhile."""
         latest, stored = Progress(0.0, "starting"), Progress(0.0, "")
         due_s = 0.0
         while True:
@@ -75,7 +76,7 @@ class ReproductionJob:
         raise CancelledError
 
     def _still_wanted(self, job: ClaimedJob, latest: Progress, *, is_news: bool) -> bool:
-        """Whether the job is still this worker's; what is news is stored, and told to the browsers by that."""
+        """Whether the job still belongs to this worker; new progress is stored, which also notifies the browsers."""
         with self._database.write() as session:
             if not is_news:
                 return jobs.heartbeat_job(session, job.id, worker=self._worker, lease_s=self._lease_s)
@@ -85,7 +86,7 @@ class ReproductionJob:
 
 
 def _checked(said: StudyMessage) -> Result:
-    """The result. Raises GainlineError when the process met with an error."""
+    """The result. Raises GainlineError if the process reported an error."""
     match said:
         case Result():
             return said

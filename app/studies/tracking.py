@@ -1,4 +1,4 @@
-"""The paper's F-16 experiment (its figures 2, 3 and 4), and what each method comes to over many inaccurate models."""
+"""The paper's F-16 experiment (its figures 2, 3 and 4), and a comparison of methods over many inaccurate models."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ PERTURBATION: Final = 0.45
 SEEDS: Final = 50
 BRIEF_SEEDS: Final = 10
 EXPECTED_START: Final = {0.2: 1.15, 0.45: 1.90, 0.8: 7.2}
-"""Median error of the model's optimum flown on the truth, over the true optimum's, at each perturbation."""
+"""Median error of the model's optimum on the true system, relative to the true optimum's, at each perturbation."""
 EXPECTED: Final = {
     "raw": (0.13, 24.5),
     "outside": (0.45, 4.0),
@@ -39,27 +39,31 @@ EXPECTED: Final = {
     "identified": (1.0, 2.0),
     "simplex": (1.0, 26.0),
 }
-"""Methods by name: the share of 50 models at ±45 % with which a prototype came near, and its median flights then."""
+"""Results of a prototype by method: the share of 50 models at ±45 % for which it came near, and its median flights
+then."""
 EXPECTED_NOISY: Final = {"identified-noisy": (0.55, 2.0), "map-noisy": (1.0, 2.0)}
-"""The same with noisy logs; least squares came near for 50 to 60 %. Their flights were not told: two without noise."""
+"""The same with noisy logs; least squares came near for 50 to 60 %. The flights were not reported: two are the value
+without noise."""
 AT_LEAST_SECOND: Final = 0.98
-"""The share of models, 49 of 50, for which the model identified again is to come near by the second flight."""
+"""Required share of models, 49 of 50, for which the identified model comes near by the second flight."""
 NOISY_FLIGHTS: Final = 5
 """Flights of a campaign with noisy logs."""
 PROTOTYPE_NEAR: Final = 18.0
-"""Flights of the prototype's showcase."""
+"""Flights until near the optimum in the prototype's showcase."""
 
 _UNIT: Final = "rad·s"
 _SEARCHES: Final = 4
 _STYLES: Final[tuple[Style, ...]] = ("run 1", "run 2", "run 3", "run 4", "run 5", "run 6")
 _FROM_SHOWCASE: Final = 0.05
 _FROM_STARTS: Final = 0.4
-"""Shares of the whole at which the starts and the comparison of methods begin."""
+"""Shares of the total progress at which the starts and the comparison of methods begin."""
 
 
 def run_f16(on_progress: Progress, full: bool) -> Result:
-    """The showcase, the starts over 50 models, and the methods over 10 of them; in full over all 50, the model
-    identified again also at the other perturbations and from noisy logs."""
+    """Run the showcase, the starts over 50 models, and the methods over 10 of them.
+
+    In full, the methods run over all 50, and the identified model also at the other perturbations and with noisy logs.
+    """
     seeds = range(SEEDS if full else BRIEF_SEEDS)
     on_progress(0.0, "the showcase campaign")
     shown = showcase()
@@ -98,7 +102,7 @@ def _definition() -> Iterator[Row]:
 
 
 def _optimum() -> Vector:
-    """The true local optimum, from where it is known to be to three digits: shape (6,)."""
+    """The true local optimum, searched from its value known to three digits: shape (6,)."""
     gains = np.array([-20.0, -50.0, -57.3, -14.796, -4.210, -0.008])
     for _ in range(_SEARCHES):
         gains = model_optimum(truth(), PitchTracking.space, gains).gains
@@ -163,7 +167,7 @@ def _starts(on_progress: Progress) -> Iterator[Row]:
 
 @dataclass(frozen=True, slots=True)
 class _Comparison:
-    """Methods over the same models, and how many flights each may take."""
+    """Methods over the same models, and the flight budget of each campaign."""
 
     perturbation: float
     methods: tuple[str, ...]
@@ -267,7 +271,7 @@ def _search_plot(errors: Vector) -> Plot:
 
 
 def _response_plot(title: str, runs: Sequence[tuple[str, Trajectory]]) -> Plot:
-    """Pitch against its reference, one panel a run, and what is between them in a panel below."""
+    """Pitch and its reference, one panel per run, with the error of all runs in a panel below."""
     styles: tuple[Style, ...] = ("before", "after")
     styled = tuple((name, run, style) for (name, run), style in zip(runs, styles, strict=True))
     pitch = tuple(

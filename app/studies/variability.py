@@ -1,8 +1,8 @@
-"""The paper's Fig. 12: one policy flown again and again on one battery; how much its errors scatter, and whether the
-battery shows in them.
+"""The paper's Fig. 12: one policy flown repeatedly on one battery, to measure the scatter of its errors and any trend
+over the battery.
 
-The paper flew one battery at each of two gain sets. Here many batteries are flown on the twin, so that the scatter of a
-single one can be told from the scatter as such: σ is pooled over the groups, √(Σ (e − ē)² / Σ (n − 1)).
+The paper flew one battery with each of two gain sets. Here many batteries are flown on the twin, to separate the
+scatter of σ between batteries from σ itself: σ is pooled over the groups, √(Σ (e − ē)² / Σ (n − 1)).
 """
 
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ GROUPS: Final = 200
 REPEATS: Final = 10
 FADING_GROUPS: Final = 40
 FADE: Final = 0.005
-"""By how much of its thrust the control experiment's battery is weaker in the last flight than in the first."""
+"""Loss of thrust of the control experiment's battery from the first to the last flight, as a share."""
 CONFIDENCE: Final = 0.9
 SEED: Final = 1
 _NO_PRIOR: Final = Scatter(sd=0.0, degrees_of_freedom=0.0)
@@ -33,7 +33,7 @@ _NO_PRIOR: Final = Scatter(sd=0.0, degrees_of_freedom=0.0)
 
 @dataclass(frozen=True, slots=True)
 class RepeatedPolicy:
-    """A gain set that the paper repeated: its published σ, and the error of Table 2's one flight of it, both in m."""
+    """A gain set that the paper repeated: its published σ, and the error of its one flight in Table 2, both in m."""
 
     title: str
     gains: tuple[int, int, int]
@@ -53,8 +53,10 @@ POLICIES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Errors in m of shape (groups, repeats), in the order of the flights, on steady and on fading batteries;
-    `overruled` says why they were flown although the gate refuses the gains."""
+    """Errors in m of shape (groups, repeats), in the order of the flights, on steady and on fading batteries.
+
+    `overruled` is the reason for flying the gains although the gate refuses them.
+    """
 
     steady: Matrix
     fading: Matrix
@@ -62,7 +64,7 @@ class Repeats:
 
 
 def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_groups: int = FADING_GROUPS) -> Result:
-    """Fly both policies `groups` times ten flights; `groups` and `fading_groups` ≥ 1."""
+    """Fly both policies on `groups` batteries of ten flights each; `groups` and `fading_groups` ≥ 1."""
     per_policy = groups + fading_groups
     found: list[Repeats] = []
     for place, policy in enumerate(POLICIES):
@@ -95,8 +97,11 @@ def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_group
 
 
 def repeated_errors(gains: tuple[int, int, int], *, seed: int, group: int, fade: float = 0.0) -> Vector:
-    """Errors of ten flights of one policy on one battery of the twin, shape (10,): what differs is the twin's scatter
-    and, with `fade`, the thrust, which falls from flight to flight by that share in all."""
+    """Errors of ten flights of one policy on one battery of the twin, shape (10,).
+
+    The flights differ by the twin's scatter and, with `fade`, by the thrust, which falls by that share over the ten
+    flights.
+    """
     (twin,) = population("twin", 1, seed)
     hover = float(twin.options["hover_throttle"])
     errors = np.empty(REPEATS)
@@ -129,7 +134,7 @@ def pooled_sigma(errors: Matrix) -> float:
 
 
 def share_with_trend(errors: Matrix) -> float:
-    """The share of batteries, rows of (groups, repeats), whose trend is seen."""
+    """Share of batteries, rows of (groups, repeats), with a resolved trend."""
     trends = [trend_of(range(errors.shape[1]), row, CONFIDENCE) for row in errors.tolist()]
     return float(np.mean([trend is not None and trend.is_resolved for trend in trends]))
 
@@ -210,7 +215,7 @@ def _percent(share: float) -> str:
 
 
 def _plot(batteries: list[Vector]) -> Plot:
-    """The first battery of each policy, as the paper shows one of each."""
+    """The first battery of each policy; the paper also shows one of each."""
     spread = [float(errors.std(ddof=1)) for errors in batteries]
     return Plot(
         title="ten takeoffs on one battery",

@@ -1,4 +1,5 @@
-"""Random vehicles to try a tuning method on: how they fly, what is unsafe, and how well each could fly at best."""
+"""Random vehicles for testing tuning methods: their flights, a safety criterion, and the best achievable error of
+each."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -25,10 +26,10 @@ from app.vehicles.twin import TwinFlight
 HIGHEST_M: Final = 3.75
 LOWEST_M: Final = 2.25
 SETTLED_S: Final = 5.0
-"""An altitude above the first is unsafe, and one below the second so long after the command."""
+"""An altitude is unsafe above `HIGHEST_M`, and below `LOWEST_M` from this time after the command on."""
 
 JSBSIM_EVERY: Final = 10
-"""Of the vehicles with further physics, every tenth flies in JSBSim, with gusts."""
+"""Every tenth vehicle with further physics flies in JSBSim, with gusts."""
 
 _QUIET: Final = {"twin": {"scatter": 0.0}, "jsbsim": {"gust_m_s": 0.0, "altitude_noise_m": 0.0}}
 _SIMULATIONS: Final[Mapping[str, Callable[[dict[str, float], int], Simulation]]] = MappingProxyType(
@@ -48,17 +49,17 @@ class SampledVehicle:
 
     @property
     def quiet(self) -> "SampledVehicle":
-        """The same vehicle without anything that differs between its flights."""
+        """The same vehicle without any variation between its flights."""
         return replace(self, options={**self.options, **_QUIET[self.kind]})
 
 
 def population(name: str, count: int, seed: int) -> tuple[SampledVehicle, ...]:
-    """The first `count` vehicles of a population; more of them leave the first ones as they are.
+    """The first `count` vehicles of a population; a larger count does not change the first ones.
 
     `four-parameter`: twins with hover throttle 0.45 … 0.75, motor lag 0 … 100 ms, latency 0 … 0.4 s, drag 0 … 0.4 1/s.
-    `further-physics`: also quadratic share 0 … 1, ground effect 0 … 25 % fading over 0.2 … 0.6 m, measurement delay
-    0 … 40 ms, battery sag 0 … 3 %; every tenth in JSBSim, with gusts. `twin`: the twin of the paper's drone each time.
-    All uniform, all with the scatter of the paper's flights. Raises InputError for an unknown name.
+    `further-physics`: also quadratic share 0 … 1, ground effect 0 … 25 % fading over 0.2 … 0.6 m, measurement delay 0 …
+    40 ms, battery sag 0 … 3 %; every tenth in JSBSim, with gusts. `twin`: always the twin of the paper's drone. All
+    uniform, all with the scatter of the paper's flights. Raises InputError for an unknown name.
     """
     if name not in _DRAWS:
         raise InputError(
@@ -127,9 +128,10 @@ _DRAWS: Final[Mapping[str, Callable[[int, np.random.Generator], SampledVehicle]]
 
 
 def fly(vehicle: SampledVehicle, gains: Gains, seed: int) -> Trajectory:
-    """One takeoff, the same as through the vehicle seam, in one call: for the twin 1.5 ms instead of 30.
+    """Fly one takeoff, with the same result as through the vehicle interface, in one call: for the twin 1.5 ms instead
+    of 30.
 
-    Gains are whole counts of 32 bits. A flight that breaks down has altitudes that are no numbers.
+    Gains are 32-bit integers. A flight that diverges numerically has non-finite altitudes.
     """
     rows = _rows(vehicle, gains, seed)
     rows[:, SET_POINT] = TAKEOFF_ALTITUDE_M
@@ -139,14 +141,14 @@ def fly(vehicle: SampledVehicle, gains: Gains, seed: int) -> Trajectory:
 
 
 def noise_free_error(vehicle: SampledVehicle, gains: Gains) -> float:
-    """The takeoff's error (m) on the vehicle without scatter, gusts or sensor noise; infinite for a breakdown."""
+    """The takeoff's error (m) without scatter, gusts or sensor noise; infinite if it diverges numerically."""
     altitude = _rows(vehicle.quiet, gains, seed=0)[: len(_TAKEOFF.grid_s), ALTITUDE]
     return float(_TAKEOFF.errors(altitude[np.newaxis])[0]) if np.isfinite(altitude).all() else float("inf")
 
 
 def is_unsafe(trajectory: Trajectory) -> bool:
-    """Whether a flight rose above 3.75 m, was below 2.25 m later than 5 s after the command, or diverged to what is no
-    number."""
+    """Whether a flight rose above 3.75 m, was below 2.25 m later than 5 s after the command, or has non-finite
+    altitudes."""
     altitude: Samples = trajectory["altitude_m"]
     if not np.isfinite(altitude).all():
         return True
@@ -156,7 +158,7 @@ def is_unsafe(trajectory: Trajectory) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Optimum:
-    """The best gains that were found for a vehicle inside the default bounds, and their noise-free error (m)."""
+    """The best gains found for a vehicle inside the default bounds, and their noise-free error (m)."""
 
     gains: Mapping[str, float]
     error: float
@@ -165,9 +167,9 @@ class Optimum:
 def own_optimum(vehicle: SampledVehicle) -> Optimum:
     """The gains in the default bounds with the lowest noise-free error.
 
-    The optimum of the takeoff model most like the vehicle, searched from many starts, then refined on the vehicle
-    itself: over whole counts for twins; for JSBSim, which flies a hundred times slower, by Nelder–Mead and coarser
-    steps. The valley is flat: what is left is below 0.4 % of the error for twins.
+    The optimum of the takeoff model closest to the vehicle is searched from many starts, then refined on the vehicle
+    itself: over integer counts for twins; for JSBSim, which is a hundred times slower, by Nelder–Mead and coarser
+    steps. The optimum is flat: the remaining error is below 0.4 % for twins.
     """
     space, (start, evaluations, coarsest, finest) = _TAKEOFF.space, _REFINEMENT[vehicle.kind]
 
@@ -184,12 +186,12 @@ def own_optimum(vehicle: SampledVehicle) -> Optimum:
 _REFINEMENT: Final[Mapping[str, tuple[float, int, float, float]]] = MappingProxyType(
     {"twin": (0.0, 0, 0.5, 0.002), "jsbsim": (0.5, 30, 0.25, 0.05)}
 )
-"""How the model's optimum is refined on the vehicle: first step and flights of Nelder–Mead, then the coarsest and the
+"""Refinement of the model's optimum on the vehicle: first step and flights of Nelder–Mead, then the coarsest and the
 finest steps along each gain; steps as shares of the gain's scale."""
 
 
 def _model_of(vehicle: SampledVehicle) -> Vector:
-    """The takeoff model that is most like the vehicle, shape (m,)."""
+    """Parameters of the takeoff model closest to the vehicle, shape (m,)."""
     known = {name: float(value) for name, value in vehicle.options.items()}
     if vehicle.kind == "jsbsim":
         known["hover_throttle"] = known["mass_kg"] * GRAVITY_M_S2 / (FULL_THRUST_N * known["thrust_scale"])
@@ -197,7 +199,7 @@ def _model_of(vehicle: SampledVehicle) -> Vector:
 
 
 def _model_optimum(model: Vector) -> Vector:
-    """The model's best gains: Nelder–Mead from two known valleys and the best six of 128 Sobol points."""
+    """The model's best gains: Nelder–Mead from two known local optima and the best six of 128 Sobol points."""
     from scipy.stats import qmc
 
     space = _TAKEOFF.space
@@ -218,7 +220,7 @@ _VALLEYS: Final = np.array([[1600.0, 1023.0, 130.0], [3500.0, 1040.0, 220.0]])
 
 
 def _descend(error: Callable[[Vector], float], start: Vector, step: float, evaluations: int) -> Vector:
-    """Nelder–Mead with a first step of a share of each gain's scale."""
+    """Nelder–Mead with a first step of `step` times each gain's scale."""
     space = _TAKEOFF.space
     return minimise_in_box(
         error, start, step * space.scale, space.lower, space.upper, evaluations=evaluations, tolerance=0.5
@@ -226,7 +228,8 @@ def _descend(error: Callable[[Vector], float], start: Vector, step: float, evalu
 
 
 def _polish(error: Callable[[Vector], float], start: Vector, coarsest: float, finest: float) -> Vector:
-    """Steps along each gain, halved when none helps, from `coarsest` down to `finest` of its scale."""
+    """Coordinate search with steps from `coarsest` down to `finest` of each gain's scale, halved when no step
+    improves."""
     space = _TAKEOFF.space
     best, lowest, share = start, error(start), coarsest
     while share >= finest:
