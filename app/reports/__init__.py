@@ -1,1 +1,1 @@
-"""A campaign on paper: one HTML file that needs neither this program nor a network, and the same as PDF."""
+"""Campaign reports: one HTML file that needs neither this program nor a network, and the same as PDF."""

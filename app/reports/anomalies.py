@@ -1,4 +1,4 @@
-"""What did not go as it should, in the order of the flights."""
+"""Anomalies of a campaign, in the order of the flights."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
@@ -20,7 +20,7 @@ _CAUSES: Final[Mapping[AbortCause, str]] = {
 
 
 def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
-    """Flights that do not count, glitches, overruled gates, gains that read back otherwise, and orders that failed."""
+    """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
         if (kind := _ENDINGS.get(trial.state)) is not None:
             yield Anomaly(trial.number, kind, f"{trial.reason or 'No reason was given.'}{_counting(trial)}")
@@ -40,7 +40,7 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
 
 
 def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
-    """Flights, by their numbers, whose stored record does not fit its checksum any more."""
+    """Flights, by number, whose stored record does not match its checksum."""
     for number_of_flight in damaged:
         yield Anomaly(
             number_of_flight,
@@ -51,7 +51,7 @@ def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
 
 
 def _counting(trial: Trial) -> str:
-    """What an aborted flight says of its gains, where that is known."""
+    """Whether an aborted flight counts against its gains, if that is known."""
     if trial.state != "aborted" or trial.abort_cause is None:
         return ""
     return f" {_CAUSES[trial.abort_cause]}"

@@ -1,4 +1,4 @@
-"""What a report says, as plain data; `service` gathers it, `rendering` puts it on paper."""
+"""Content of a report as plain data; `service` collects it, `rendering` formats it."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -11,7 +11,7 @@ from app.trials.schemas import Trial
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One setting with its title."""
+    """One setting: title and value."""
 
     title: str
     value: str
@@ -19,7 +19,7 @@ class Fact:
 
 @dataclass(frozen=True, slots=True)
 class Anomaly:
-    """Something that did not go as it should: of which flight (None: of none), what kind, and what is known of it."""
+    """An anomaly: its flight (None if it belongs to none), its kind, and a description."""
 
     flight: int | None
     kind: str
@@ -28,7 +28,7 @@ class Anomaly:
 
 @dataclass(frozen=True, slots=True)
 class Photo:
-    """A picture as it was taken."""
+    """An unmodified photo."""
 
     media_type: str
     data: bytes
@@ -37,7 +37,7 @@ class Photo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """What people left with a trial: its note, the photos that the report has room for, and how many it has not."""
+    """Remarks on a trial: its note, the photos that fit into the report, and the number of those left out."""
 
     trial: Trial
     photos: tuple[Photo, ...]
@@ -46,10 +46,10 @@ class Remark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """A campaign, as the API tells of it, with its settings in words and its figures drawn for a light page.
+    """A campaign as the API returns it, with its settings in words and its figures drawn for a light page.
 
-    `remarks` in the order of the trials, at most `photo_bytes` of photos in all; `what` was tuned and `how`,
-    `anomalies` in the order of the flights, `made_at` by program `version`.
+    `remarks` are in the order of the trials, with at most `photo_bytes` of photos in all; `what` was tuned and `how`;
+    `anomalies` are in the order of the flights; `made_at` is the time of creation, by program `version`.
     """
 
     campaign: Campaign
@@ -67,7 +67,7 @@ class Report:
 
     @property
     def flown(self) -> tuple[Trial, ...]:
-        """Trials that left the ground, the ones in the table of runs."""
+        """Trials that left the ground: those in the table of runs."""
         return tuple(trial for trial in self.trials if trial.state in FLOWN)
 
 

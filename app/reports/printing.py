@@ -1,4 +1,4 @@
-"""A report as PDF, printed by a Chromium where there is one: a process of its own, without a network."""
+"""Reports as PDF, printed by Chromium if it is installed, in a separate process without network access."""
 
 import os
 import shutil
@@ -37,8 +37,10 @@ _log = structlog.get_logger(__name__)
 
 
 def print_pdf(page: Callable[[], str]) -> bytes:
-    """The HTML that `page` gives, as PDF; it is asked for once there is a browser and a place to print it. Raises
-    UnavailableError when no browser is there, it is printing others already, or it fails; and what `page` raises."""
+    """Print the HTML returned by `page` as PDF; `page` is called only once a browser and a free slot are available.
+
+    Raises UnavailableError if there is no browser, all slots are in use, or printing fails; and whatever `page` raises.
+    """
     browser = _browser()
     if not _places.acquire(blocking=False):
         raise UnavailableError(
@@ -65,7 +67,7 @@ def _browser() -> str:
 def _printed(browser: str, html: str, folder: Path) -> bytes:
     page, out = folder / "report.html", folder / "report.pdf"
     page.write_text(html, encoding="utf-8")
-    # As root a Chromium starts only without its sandbox; what it opens is our own file, under a policy of its own.
+    # As root, Chromium starts only without its sandbox; it opens only our own file, which has its own security policy.
     flags = [*_FLAGS, *(["--no-sandbox"] if os.geteuid() == 0 else []), f"--user-data-dir={folder / 'profile'}"]
     command = [browser, *flags, f"--print-to-pdf={out}", page.as_uri()]
     try:
@@ -81,8 +83,11 @@ def _printed(browser: str, html: str, folder: Path) -> bytes:
 
 
 def _run(command: list[str]) -> tuple[int, str]:
-    """How it ended, and what it said. It has a process group of its own: when it takes too long, or whoever waits is
-    interrupted, its children end with it. Raises TimeoutExpired and OSError."""
+    """Return the exit code and the error output of a command.
+
+    It has its own process group, so that its children end with it on a time-out or if the caller is interrupted. Raises
+    TimeoutExpired and OSError.
+    """
     with subprocess.Popen(  # noqa: S603  # found in PATH
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", process_group=0
     ) as browser:

@@ -1,4 +1,4 @@
-"""What people left with the flights: notes, and as many photos as a file can hold that is to be sent."""
+"""Notes and photos of the flights, limited to a file size that can still be sent."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -11,11 +11,11 @@ from app.reports.content import Photo, Remark
 from app.trials.schemas import Trial
 
 MAX_BYTES: Final = 24 * 2**20
-"""Of all photos together, as they were taken; in the file they take a third more."""
+"""Limit for all photos together, in original size; they take a third more in the file."""
 
 
 def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
-    """Of the trials that have any, in their order."""
+    """Remarks of the trials that have any, in order."""
     photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
     for row, size in repository.photos(session, campaign_id):
         photos.setdefault(row.trial_id, []).append((row, size))
@@ -29,7 +29,7 @@ def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> I
 
 
 def _fitting(photos: dict[int, list[tuple[TrialPhotoRow, int]]]) -> set[int]:
-    """Ids of those that fit: the first of each trial comes before the second of any."""
+    """Ids of the photos that fit: the first photo of each trial comes before the second of any."""
     kept, room = set[int](), MAX_BYTES
     turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
     for _, photo_id, size in turns:

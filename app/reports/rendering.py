@@ -1,4 +1,4 @@
-"""A report as one HTML file: text escaped, charts drawn by the library inside it, nothing asked from anywhere."""
+"""Rendering of a report as one HTML file, with escaped text and embedded chart library, that makes no requests."""
 
 import base64
 import hashlib
@@ -39,15 +39,18 @@ _STATES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """The whole file, and the policy under which a server has to hand it out: inline scripts by their hash, no network,
-    no origin of its own."""
+    """The file, and the content security policy with which a server must send it: inline scripts by hash, no network,
+    no origin."""
 
     html: str
     policy: str
 
 
 def render(report: Report, plotly: str, zone: tzinfo | None = None) -> Document:
-    """`plotly`: source of the chart library; `zone`: of the printed times, this machine's where it is None."""
+    """Render a report.
+
+    `plotly` is the source of the chart library; `zone` is the time zone of printed times, None for this machine's.
+    """
     draw = _script((_TEMPLATES / "draw.js").read_text(encoding="utf-8"))
     library = _script(plotly)
     own = _policy(library, draw)
@@ -72,18 +75,18 @@ def render(report: Report, plotly: str, zone: tzinfo | None = None) -> Document:
 
 @lru_cache(maxsize=2)
 def chart_library(ui_dir: Path) -> str:
-    """Source of the chart library: as the built dashboard ships it, else the larger one of the figures' own package."""
+    """Source of the chart library: the one of the built dashboard, or else the larger one of the plotly package."""
     shipped = ui_dir / _BUNDLE
     if shipped.is_file():
         return shipped.read_text(encoding="utf-8")
-    from plotly.offline import get_plotlyjs  # five megabytes, wanted only without a dashboard
+    from plotly.offline import get_plotlyjs  # five megabytes, needed only without a dashboard
 
     source: str = get_plotlyjs()
     return source
 
 
 def file_name(campaign_id: int, ending: str) -> str:
-    """What a report is saved as."""
+    """File name of a report."""
     return f"campaign-{campaign_id}-report.{ending}"
 
 
@@ -94,20 +97,21 @@ def _state(campaign: Campaign) -> str:
 
 
 def _script(source: str) -> Markup:
-    """Source that may stand between script tags as it is."""
+    """Source that is safe between script tags without escaping."""
     if "</script" in source.lower() or "<!--" in source:
         raise ValueError("this script would end early inside a page")
     return Markup(source)  # noqa: S704  # ours and the library's, checked above
 
 
 def _data(report: Report) -> Markup:
-    """The figures as JSON in which nothing can look like a tag."""
+    """The figures as JSON that cannot contain a tag."""
     drawn = {card.name: card.figure for card in report.cards if card.state == "ready"}
     return Markup(json.dumps(drawn, ensure_ascii=False).replace("<", "\\u003c"))  # noqa: S704  # no `<` is left
 
 
 def _policy(*scripts: Markup) -> str:
-    """The chart library writes its own style rules, so that styles inside the file cannot be told by hash."""
+    """The content security policy. The chart library writes its own style rules, so inline styles cannot be allowed by
+    hash."""
     hashes = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()}'" for each in scripts
     )
@@ -142,7 +146,7 @@ def _environment(zone: tzinfo | None) -> "Environment":
 
 
 def _here(at: datetime) -> tzinfo:
-    """This machine's zone, as it was at that time."""
+    """This machine's time zone at that time."""
     zone = at.astimezone().tzinfo
     assert zone is not None
     return zone
@@ -157,7 +161,7 @@ def _flights(numbers: list[int]) -> str:
 
 
 def _panels(card: Card) -> int:
-    """How many panels the figure has."""
+    """Number of panels in the figure."""
     layout = None if card.figure is None else card.figure["layout"]
     return sum(name.startswith("xaxis") for name in layout) if isinstance(layout, Mapping) else 0
 

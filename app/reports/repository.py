@@ -1,4 +1,4 @@
-"""What a report reads that no view of the API tells."""
+"""Queries of report data that no API view contains."""
 
 from collections.abc import Sequence
 
@@ -9,8 +9,8 @@ from app.db.models import TrialPhotoRow, TrialRow
 
 
 def photos(session: Session, campaign_id: int) -> Sequence[tuple[TrialPhotoRow, int]]:
-    """The photos of all its trials with their sizes in bytes, in the order in which they were added; what they show is
-    read only when it is asked for."""
+    """The photos of all trials of a campaign with their sizes in bytes, in the order they were added; the image data is
+    loaded on access."""
     wanted = (
         select(TrialPhotoRow, func.length(TrialPhotoRow.data))
         .join(TrialPhotoRow.trial)

@@ -1,4 +1,4 @@
-"""Reports over HTTP, each under a policy of its own: nothing but what the file holds."""
+"""HTTP API of reports, each with its own content security policy that allows only the file's own content."""
 
 from fastapi import APIRouter, Response
 
@@ -37,9 +37,9 @@ def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id
     responses={200: {"content": {"application/pdf": {"schema": {"type": "string", "format": "binary"}}}}},
 )
 def get_report_as_pdf(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
-    """The same, printed by a Chromium on the server; 503 where there is none, or it is printing already."""
+    """The same as PDF, printed by Chromium on the server; 503 if it is not installed or already busy printing."""
     with database.read() as session:
-        get_row(session, campaign_id)  # an unknown campaign is told of as such, whatever there is to print with
+        get_row(session, campaign_id)  # an unknown campaign is reported even if there is no printer
     return Response(
         print_pdf(lambda: _document(database, settings, campaign_id).html),
         media_type="application/pdf",
@@ -48,7 +48,7 @@ def get_report_as_pdf(database: CurrentDatabase, settings: CurrentSettings, camp
 
 
 def _document(database: Database, settings: Settings, campaign_id: int) -> Document:
-    """Read in a transaction of its own, which is over before the page is made. Raises NotFoundError."""
+    """Read in a transaction that ends before rendering. Raises NotFoundError."""
     with database.read() as session:
         report = report_of(session, campaign_id)
     return render(report, chart_library(settings.ui_dir))

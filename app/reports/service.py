@@ -1,4 +1,4 @@
-"""Gathers what a report says: the same views that the API gives, and nothing computed anew."""
+"""Collects the content of a report: the API's own views, without computing anything new."""
 
 from collections.abc import Callable, Iterator
 from typing import Final, TypeVar
@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 
 def report_of(session: Session, campaign_id: int) -> Report:
-    """Everything that is known of a campaign, for one reader. Raises NotFoundError."""
+    """Collect all data of a campaign, as for one reader. Raises NotFoundError."""
     campaign = campaigns.get_campaign(session, campaign_id)
     statistics = campaign_statistics(session, campaign_id)
     trials = tuple(_all(lambda cursor: trials_service.list_trials(session, campaign_id, limit=_PAGE, cursor=cursor)))
@@ -56,7 +56,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
 
 
 def _landscape(session: Session, campaign: Campaign) -> Iterator[Card]:
-    """Where one was computed: a report is written from what there is."""
+    """The landscape card, if one was computed: a report uses only existing results."""
     card = landscape_card(session, campaign.id, "light", stacked=True).card
     if card.state == "ready":
         yield card
@@ -78,7 +78,7 @@ def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], 
 
 
 def _all(page_after: Callable[[str | None], Page[T]]) -> Iterator[T]:
-    """Every item of a list that comes in pages."""
+    """All items of a paginated list."""
     cursor = None
     while True:
         page = page_after(cursor)

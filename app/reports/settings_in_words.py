@@ -1,4 +1,4 @@
-"""What was tuned and how: a campaign's frozen settings as titles and values."""
+"""A campaign's frozen settings, as titles and values: what was tuned, and how."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, Protocol
@@ -33,7 +33,7 @@ class _Described(Protocol):
 
 
 def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Identity | None) -> tuple[Fact, ...]:
-    """The vehicle, REAL or simulated, with its settings; and the manoeuvre that was flown."""
+    """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
     vehicle = campaign.vehicle
     kind = VEHICLE_KINDS.get(vehicle.kind)
     facts = [

@@ -1,4 +1,4 @@
-"""Numbers, gains and times as a report prints them: no more digits than the measurement carries, always with a unit."""
+"""Numbers, gains and times as printed in a report: with digits that match the uncertainty, and with units."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime, tzinfo
@@ -12,12 +12,12 @@ NOTHING: Final = "–"
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """`0.132`; a true minus, a dash where there is none."""
+    """`0.132`; with a true minus sign, and a dash for None."""
     return NOTHING if value is None else f"{value:.{digits}f}".replace("-", "−")
 
 
 def plus_minus(value: float | None, uncertainty: float | None, unit: str) -> str:
-    """`0.132 ± 0.007 m`; the value alone where its uncertainty is not known."""
+    """`0.132 ± 0.007 m`; the value alone if its uncertainty is not known."""
     if value is None:
         return NOTHING
     after = f" {unit}" if unit else ""
@@ -33,7 +33,7 @@ def interval(span: Interval | None) -> str:
 
 
 def gain(value: float) -> str:
-    """A whole gain in full, any other in four significant digits."""
+    """An integer gain in full, any other with four significant digits."""
     text = f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
     return text.replace("-", "−")
 
@@ -48,7 +48,7 @@ def percent(share: float) -> str:
 
 
 def option(value: OptionValue, unit: str = "") -> str:
-    """A setting: yes and no for switches, numbers short, texts as they are."""
+    """A setting: yes or no for switches, numbers in short form, texts unmodified."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     text = f"{value:g}".replace("-", "−") if isinstance(value, int | float) else value
@@ -56,7 +56,7 @@ def option(value: OptionValue, unit: str = "") -> str:
 
 
 def instant(at: datetime | None, zone: tzinfo) -> str:
-    """`22 Nov 2026, 14:03 CET (13:03 UTC)`; UTC alone where that is the zone's own time."""
+    """`22 Nov 2026, 14:03 CET (13:03 UTC)`; UTC alone if the zone is at UTC."""
     if at is None:
         return NOTHING
     here = at.astimezone(zone)
