@@ -1,1 +1,1 @@
-"""Flights of any campaigns side by side."""
+"""Comparison of flights of any campaigns."""

@@ -1,4 +1,4 @@
-"""Comparisons of flights over HTTP."""
+"""HTTP API of flight comparisons."""
 
 from typing import Annotated
 
@@ -19,14 +19,14 @@ TrialIds = Annotated[
 
 @router.get("")
 def compare_flights(session: Reader, trial: TrialIds) -> FlightComparison:
-    """Flights of any campaigns side by side, in the order given: their gains, settings and errors, what differs, and
-    which of each two is better."""
+    """Compare flights of any campaigns, in the order given: their gains, settings and errors, what differs, and which
+    of each two is better."""
     return service.compare_flights(session, trial)
 
 
 @router.get("/figure")
 def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "light") -> FigureCard:
-    """Their curves over the set point, and below them how each differs from the first."""
+    """Their curves over the set point, and below them the difference of each from the first."""
     return figure_card(service.comparison_figure(session, trial, theme))
 
 
@@ -36,7 +36,7 @@ def get_comparison_figure(session: Reader, trial: TrialIds, theme: Theme = "ligh
     responses={200: {"content": {"text/csv": {"schema": {"type": "string"}}}}},
 )
 def get_comparison_csv(session: Reader, trial: TrialIds) -> Response:
-    """Their curves on one grid of time, every 0.02 s; each flight's own CSV has the record as it was stored."""
+    """Their curves on a common time grid of 0.02 s; each flight's own CSV contains the record as stored."""
     export = service.export_curves(session, trial)
     return Response(
         export.csv,

@@ -1,4 +1,4 @@
-"""What a comparison of flights looks like from outside."""
+"""API views of flight comparisons."""
 
 from datetime import datetime
 from typing import Annotated, Literal
@@ -18,7 +18,7 @@ _BASIS = (
 
 
 class FlightSetting(BaseModel):
-    """Something that a flight was flown with."""
+    """A setting with which a flight was flown."""
 
     title: str
     unit: str
@@ -26,9 +26,9 @@ class FlightSetting(BaseModel):
 
 
 class ComparedFlight(BaseModel):
-    """One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
-    all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight, null while
-    nobody knows it."""
+    """One of the flights. `label` is its letter in the figure, `name` its name in sentences; `group` is the mean of all
+    valid flights with its gains in its campaign, `scatter` the standard deviation of one such flight, null while it is
+    not known."""
 
     trial_id: int
     label: str
@@ -49,8 +49,8 @@ class ComparedFlight(BaseModel):
 
 
 class FlightDifference(BaseModel):
-    """A gain or setting that is not the same in all flights: its value in each, in their order, null where a flight has
-    no such thing, and its change against the first flight's, where both are numbers."""
+    """A gain or setting that is not the same in all flights: its value in each, in order, null if a flight does not
+    have it, and its change from the first flight's value, if both are numbers."""
 
     title: str
     unit: str
@@ -59,15 +59,15 @@ class FlightDifference(BaseModel):
 
 
 class FurtherFlights(BaseModel):
-    """Further flights of the gains of each after which the difference, if it stays, would be decided."""
+    """Further flights with the gains of each that would decide the comparison, if the difference stays the same."""
 
     trial: int
     against: int
 
 
 class FlightPair(BaseModel):
-    """One flight's gains against another's, each with all their flights. `difference` is trial − against; `confidence`
-    that of the likelier direction, for `repeats` in one campaign that anything has changed."""
+    """One flight's gains compared with another's, each with all their flights. `difference` is trial − against;
+    `confidence` is that of the likelier direction, or, for `repeats` in one campaign, that anything has changed."""
 
     trial_id: int
     against_id: int
@@ -81,8 +81,8 @@ class FlightPair(BaseModel):
 
 
 class FlightComparison(BaseModel):
-    """Flights side by side, in the order in which they were named; every later one of each pair stands against the
-    earlier. `sentence` is the verdict on all of them: the lowest against the first one, or against the next lowest."""
+    """A comparison of flights, in the order in which they were named; in each pair the later one is compared with the
+    earlier. `sentence` is the overall verdict: the lowest compared with the first one, or with the next lowest."""
 
     error_unit: str
     verdict: Verdict | None

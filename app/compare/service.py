@@ -1,4 +1,4 @@
-"""Flights side by side: what differs between them, what that was worth, and their curves."""
+"""Comparison of flights: what differs between them, its effect on the error, and their curves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ GRID_STEP_S: Final = 0.02
 
 @dataclass(frozen=True, slots=True)
 class CurvesExport:
-    """The curves of several flights on one grid of time, as CSV."""
+    """The curves of several flights on a common time grid, as CSV."""
 
     file_name: str
     csv: str
 
 
 def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightComparison:
-    """Raises InputError naming the flights that cannot be compared."""
+    """Compare the flights. Raises InputError naming those that cannot be compared."""
     sides = sides_of(session, trial_ids)
     batteries = repository.batteries(session, trial_ids)
     settings = [settings_of(side, batteries.get(side.row.id, "")) for side in sides]
@@ -58,8 +58,10 @@ def comparison_figure(session: Session, trial_ids: Sequence[int], theme: ThemeNa
 
 
 def export_curves(session: Session, trial_ids: Sequence[int]) -> CurvesExport:
-    """Every 0.02 s from the command to the end of the longest record, straight between samples, empty outside of a
-    record. Raises InputError naming the flights that cannot be compared."""
+    """Sample the curves every 0.02 s from the command to the end of the longest record.
+
+    Linear between samples, empty outside a record. Raises InputError naming the flights that cannot be compared.
+    """
     sides = sides_of(session, trial_ids)
     data = _drawn(session, sides)
     ends = [float(flight.curve.time_s[-1]) for flight in data.flights if flight.curve is not None]

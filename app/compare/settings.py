@@ -1,4 +1,4 @@
-"""What a flight was flown with, and in what several flights differ."""
+"""Settings of a flight, and the differences between several flights."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -15,7 +15,8 @@ from app.vehicles.open import VEHICLE_KINDS
 
 
 def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
-    """Vehicle, experiment and strategy with their settings, the battery, and what else the vehicle said of itself."""
+    """Vehicle, experiment and strategy with their settings, the battery, and the other settings recorded with the
+    flight."""
     row, campaign = side.row, side.campaign
     kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
     strategy = STRATEGIES[campaign.strategy]
@@ -38,14 +39,14 @@ def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
 
 
 def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[FlightDifference]:
-    """Those settings that are not the same in all flights; one that a flight does not have is None there."""
+    """The settings that are not the same in all flights; None for a flight without that setting."""
     titles = dict.fromkeys((one.title, one.unit) for settings in flights for one in settings)
     values = [{(one.title, one.unit): one.value for one in settings} for settings in flights]
     return _differing((title, unit, [own.get((title, unit)) for own in values]) for title, unit in titles)
 
 
 def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference]:
-    """Those gains that are not the same in all flights."""
+    """The gains that are not the same in all flights."""
     known = {gain.name: gain for side in sides for gain in side.experiment.space.gains}
     names = dict.fromkeys(name for side in sides for name in side.row.gains)
     return _differing(
@@ -55,7 +56,7 @@ def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference
 
 
 def _seed(campaign: CampaignRow) -> str:
-    """As text: how far two seeds are apart says nothing."""
+    """As text, because the difference between two seeds has no meaning."""
     return str(campaign.definition["seed"])
 
 

@@ -1,4 +1,4 @@
-"""The flights that are compared, each with what is known of its gains and of what flew it."""
+"""The compared flights, each with its gain group, scatter and vehicle."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -25,9 +25,12 @@ MAX_FLIGHTS: Final = len(LABELS)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparisonFlight:
-    """One flight. `group` holds the valid flights of its gains in its campaign, None where the flight is not one of
-    them; `scatter` is pooled over the compared campaigns in which the same vehicle flew the same experiment: those of
-    the same `population`."""
+    """One flight of a comparison.
+
+    `group` holds the valid flights with its gains in its campaign, None if the flight is not one of them. `scatter` is
+    pooled over the compared campaigns of the same `population`: those in which the same vehicle flew the same
+    experiment.
+    """
 
     row: TrialRow
     campaign: CampaignRow
@@ -40,7 +43,8 @@ class ComparisonFlight:
 
 
 def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFlight]:
-    """The flights in that order. Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared."""
+    """The flights in the given order. Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be
+    compared."""
     found = repository.trials_by_id(session, trial_ids)
     campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
     experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
@@ -78,8 +82,11 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
 
 
 def population_of(campaign: CampaignRow) -> str:
-    """The same for campaigns whose flights are repeats of one another but for their gains: one vehicle with one set of
-    settings, one experiment. Who flew what was flown elsewhere is not known, so that such a campaign stands alone."""
+    """A key common to campaigns whose flights differ only in their gains: one vehicle with the same settings, one
+    experiment.
+
+    For flights made elsewhere the vehicle is not known, so such a campaign is a population of its own.
+    """
     vehicle = campaign.vehicle
     if not fleet.can_fly(vehicle):
         return f"campaign {campaign.id}"
@@ -109,7 +116,7 @@ def _refusal(
     found: Mapping[int, TrialRow],
     experiments: Mapping[int, Experiment],
 ) -> str | None:
-    """Why the flight at that place cannot be compared, or None when it can."""
+    """Why the flight at this index cannot be compared, or None if it can."""
     trial_id = trial_ids[index]
     if row is None:
         return f"there is no trial {trial_id}; its campaign may have been deleted"

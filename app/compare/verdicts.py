@@ -1,8 +1,9 @@
-"""Which of two flights' gains are better, or why nobody can say; and the same of several flights in one sentence.
+"""Verdicts on pairs of flights, and on several flights in one sentence: whose gains are better, or why there is no
+verdict.
 
 Each flight counts with all valid flights of its gains in its campaign, and the scatter is that of its population, so
-that flights of one campaign get the verdict that they have there. Between populations there is none: vehicle and gains
-differ together, and only the errors stand beside each other.
+flights of one campaign have the same verdict as in that campaign. Between populations there is no verdict, because
+vehicle and gains differ together; only the errors are reported.
 """
 
 import math
@@ -19,7 +20,7 @@ from app.trials.comparisons import CONFIDENCE
 
 
 def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidates: int = 1) -> FlightPair:
-    """`side` against `against`, chosen among so many `candidates` for its low error."""
+    """Compare `side` with `against`; `side` was chosen among that many `candidates` for its low error."""
     if side.group is None or against.group is None:
         missing = side if side.group is None else against
         sentence = f"{capitalised(missing.name)} is {missing.row.state}: it has no error that counts."
@@ -45,8 +46,11 @@ def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidate
 
 
 def overall_verdict(sides: Sequence[ComparisonFlight]) -> tuple[Verdict | None, str]:
-    """The gains with the lowest mean (plus its standard error, as in a campaign) against those of the first flight, or
-    where they are the first flight's, against the next lowest."""
+    """Compare the gains with the lowest mean (plus its standard error, as in a campaign) with those of the first
+    flight.
+
+    If they are the first flight's, they are compared with the next lowest.
+    """
     ranked = sorted((side for side in sides if side.group is not None), key=_rank)
     if len(ranked) < 2:
         return None, "No verdict: fewer than two of these flights have an error that counts."
@@ -62,7 +66,7 @@ def overall_verdict(sides: Sequence[ComparisonFlight]) -> tuple[Verdict | None, 
 
 
 def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
-    """What has to be known before the numbers are believed."""
+    """Caveats that apply to the numbers."""
     first = sides[0]
     apart = dict.fromkeys(_why_apart(side, first)[1] for side in sides if side.population != first.population)
     campaigns: dict[str, set[int]] = {}
@@ -102,7 +106,7 @@ def _pair(side: ComparisonFlight, against: ComparisonFlight, basis: Basis, sente
 
 
 def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group) -> FlightPair:
-    """Two means with scatters of their own: the difference has the sum of both variances."""
+    """Compare two means with different scatters: the difference has the sum of both variances."""
     difference = own.mean - other.mean
     known = side.scatter.known and against.scatter.known
     apart = math.hypot(own.standard_error(side.scatter), other.standard_error(against.scatter))
@@ -116,7 +120,7 @@ def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other:
 
 
 def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, str]:
-    """What is not the same in the two campaigns beside the gains: in few words, and with what that means."""
+    """What differs between the two campaigns besides the gains: in short, and as a sentence with its consequence."""
     one, other = side.campaign.vehicle, against.campaign.vehicle
     if side.experiment.name != against.experiment.name:
         how, what = (
@@ -137,7 +141,7 @@ def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, 
 
 
 def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) -> FlightPair:
-    """Two flights of the same gains in one campaign: has anything changed between them?"""
+    """Compare two flights of the same gains in one campaign: whether anything has changed between them."""
     errors = dict(zip(group.numbers, group.errors, strict=True))
     numbers = (against.row.number, side.row.number)
     found = drift_of(Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]])), side.scatter)
@@ -159,7 +163,7 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
 
 
 def _changed(side: ComparisonFlight, against: ComparisonFlight, said: Comparison) -> str:
-    """The same gains in two campaigns."""
+    """Sentence for the same gains in two campaigns."""
     amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
     if said.confidence is None:
         return (

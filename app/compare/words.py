@@ -1,4 +1,4 @@
-"""Numbers and flights in sentences."""
+"""Formatting of numbers and flights in sentences."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -10,12 +10,12 @@ from app.db.models import CampaignRow, TrialRow
 
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:
-    """`0.105 ± 0.012 m`, in as many digits as the uncertainty allows; the value alone where there is none."""
+    """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; the value alone if it has none."""
     return plus_minus(value, standard_error, unit) if standard_error else f"{value:.3f} {unit}"
 
 
 def percent(confidence: float) -> str:
-    """A confidence as people say it; one that rounds to certainty is not claimed."""
+    """A confidence as a percentage; `more than 99 %` instead of a value that rounds to certainty."""
     return "more than 99 %" if confidence > 0.995 else f"{100.0 * confidence:.0f} %"
 
 
@@ -24,7 +24,7 @@ def flights(count: int) -> str:
 
 
 def named(group: Group, name: str) -> str:
-    """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains, and how often they were flown."""
+    """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains and their number of flights."""
     return f"{name} ({format_gains(group.gains)}; {flights(group.size)})"
 
 
@@ -33,7 +33,7 @@ def capitalised(sentence: str) -> str:
 
 
 def names_of(rows: Sequence[TrialRow], campaigns: Mapping[int, CampaignRow]) -> list[str]:
-    """`flight 3`; with its campaign where there are several, and with that one's id where two have the same name."""
+    """`flight 3`; with the campaign's name if there are several, and with its id if two have the same name."""
     used = {row.campaign_id: campaigns[row.campaign_id].name for row in rows}
     if len(used) == 1:
         return [f"flight {row.number}" for row in rows]
@@ -46,7 +46,7 @@ def names_of(rows: Sequence[TrialRow], campaigns: Mapping[int, CampaignRow]) -> 
 
 
 def file_stem(rows: Sequence[TrialRow]) -> str:
-    """`compare-campaign-3-flights-1-4-campaign-5-flight-2`; only how many there are, where that would be long."""
+    """`compare-campaign-3-flights-1-4-campaign-5-flight-2`; only the number of flights if that would be too long."""
     numbers: dict[int, list[int]] = {}
     for row in rows:
         numbers.setdefault(row.campaign_id, []).append(row.number)
