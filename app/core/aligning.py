@@ -106,10 +106,9 @@ def _changes(altitude_m: Samples) -> Samples:
 
 
 def _correlations(first: Samples, wide: Samples) -> Samples:
-    """Pearson correlation of `first`, shape (n,), with every window of its length in `wide`, shape (n + m,): shape (m +
-    1,).
+    """Pearson correlation of `first`, shape (n,), with every window of its length in `wide`.
 
-    0 for a window without motion.
+    `wide` has shape (n + m,), the result (m + 1,); 0 for a window without motion.
     """
     stretches = sliding_window_view(wide, len(first))
     centred = first - first.mean()

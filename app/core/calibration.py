@@ -38,8 +38,7 @@ _NOISE_FLOOR: Final = 0.4
 """Noise standard deviation assumed by the first pass (`_FIRST_SCALE`), and the minimum that is always assumed
 (`_NOISE_FLOOR`): both in units of the experiment's scatter."""
 _DIFFERENCE: Final = 0.1
-"""Step of the difference quotients, in prior standard deviations: well above the quantisation of the loop's
-integers."""
+"""Step of the difference quotients, in prior standard deviations: well above the quantisation of the loop."""
 _STARTS: Final = 32
 _WIDEST_OWN: Final = 4.0
 _MAX_STEPS: Final = 20
@@ -81,11 +80,10 @@ class Calibration:
         )
 
     def plausible(self, *, runs: int, width: float = 1.0, next_flight: bool = False) -> Matrix:
-        """Return `runs` models (a power of two), `width` standard deviations from the fitted one in orthogonal
-        directions.
+        """Return `runs` models (a power of two), `width` standard deviations from the fitted one.
 
-        Shape (runs, m). With fewer runs than parameters + 1, the last parameters keep their fitted values.
-        `next_flight` includes the differences between flights.
+        They lie in orthogonal directions; shape (runs, m). With fewer runs than parameters + 1, the last parameters
+        keep their fitted values. `next_flight` includes the differences between flights.
         """
         from scipy.linalg import hadamard
 
@@ -138,8 +136,7 @@ def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Cali
 
 
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
-    """Distribution of the vehicle's parameters: from the data sheet before the first valid flight, from the calibration
-    afterwards.
+    """Distribution of the vehicle's parameters: the data sheet's until a flight is valid, then the calibrated one.
 
     Experiments without a calibration always use the data sheet; for those without a model the distribution is empty.
     """
@@ -211,8 +208,7 @@ class _Fit:
         return np.concatenate((likely[np.argmin(cost)], np.zeros(len(self.gains) * len(self.own))))
 
     def minimum(self, start: Vector) -> Vector:
-        """Gauss–Newton within the bounds, damped (Levenberg–Marquardt) where the residuals decrease less than
-        predicted."""
+        """Gauss–Newton within the bounds, damped (Levenberg–Marquardt) if residuals decrease less than predicted."""
         others = len(start) - len(self.mean)
         lower = np.concatenate((self.lower, np.full(others, -_WIDEST_OWN)))
         upper = np.concatenate((self.upper, np.full(others, _WIDEST_OWN)))
@@ -233,8 +229,11 @@ class _Fit:
         return at
 
     def _flown(self, unknowns: Vector) -> tuple[Matrix, Vector]:
-        """Outputs of the models, shape (k, s), and the residuals: the whitened deviations from the flights, then the
-        deviations of the unknowns from their priors."""
+        """Outputs of the models, shape (k, s), and the residuals.
+
+        The residuals are the whitened deviations from the flights, then the deviations of the unknowns from their
+        priors.
+        """
         outputs, m = self.outputs(unknowns), len(self.mean)
         deviations = self._whitened(outputs - self.measured).ravel()
         return outputs, np.concatenate((deviations, (unknowns[:m] - self.mean) / self.sd, unknowns[m:]))
@@ -275,8 +274,7 @@ class _Fit:
         return self.experiment.outputs(gains, models)[:, :: self.every]
 
     def _whitened(self, deviations: Samples) -> Samples:
-        """Innovation of each sample, in its standard deviations; the first few samples are not predicted from earlier
-        ones."""
+        """Innovation of each sample, in its standard deviations; the first few samples are only scaled."""
         order = len(self.memory)
         new = deviations.copy()
         for lag, share in enumerate(self.memory, start=1):

@@ -46,8 +46,7 @@ class Drift:
 
 
 def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
-    """Compare two fits: `before` from when the vehicle was last tuned, `now` the newest, both keyed by parameter
-    name."""
+    """Compare the fit with which the vehicle was last tuned (`before`) with the newest (`now`), by parameter name."""
     from scipy.special import ndtri
 
     names = [name for name in MONITORED_PARAMETERS if name in before and name in now]

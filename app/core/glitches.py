@@ -105,8 +105,10 @@ def find_glitches(experiment: Experiment, trajectory: Trajectory) -> tuple[Glitc
 
 
 def repaired(experiment: Experiment, trajectory: Trajectory, glitches: tuple[Glitch, ...]) -> Trajectory:
-    """A copy of the record with the scored output interpolated linearly across each glitch, from the last good sample
-    before it to the first one after it."""
+    """A copy of the record with the scored output interpolated linearly across each glitch.
+
+    The line runs from the last good sample before the glitch to the first one after it.
+    """
     values = trajectory[experiment.output].copy()
     time_s = trajectory.time_s
     for glitch in glitches:

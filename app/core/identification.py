@@ -37,8 +37,7 @@ _ROUNDS: Final = 40
 _DIFFERENCE: Final = 1e-5
 _LARGEST_STEP: Final = 0.5
 _SETTLED: Final = 0.01
-"""The fit has converged once a step is below this share of the standard errors and the noise changes by less than
-it."""
+"""The fit has converged once a step is below this share of the standard errors, and the noise changes by less."""
 _SINGLE_PRECISION: Final = 6e-8
 _SMALLEST: Final = 1e-12
 _MIN_RECORD: Final = WINDOW_STEPS + 1
@@ -46,8 +45,11 @@ _MIN_RECORD: Final = WINDOW_STEPS + 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identified:
-    """Identified parameters, shape (19,), their covariance (19, 19), and the noise of each recorded state (5,), in the
-    source's units; `flights` are the numbers of the flights used."""
+    """Result of an identification.
+
+    `model` is the parameter vector, shape (19,), with its `covariance` (19, 19); `noise` is that of each recorded state
+    (5,), in the source's units; `flights` are the numbers of the flights used.
+    """
 
     model: Vector
     covariance: Matrix
@@ -60,8 +62,7 @@ class Identified:
 
 
 def identify(experiment: PitchTracking, flights: Sequence[Flight], fit: Fit) -> Identified | None:
-    """Fit the model to every flight that recorded its states and commands, aborted ones included; None if there is
-    none.
+    """Fit the model to every flight with recorded states and commands, aborted ones included; None if there is none.
 
     Pure and deterministic; uses trajectories as they are stored.
     """

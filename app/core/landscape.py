@@ -63,8 +63,7 @@ class Landscape:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandscapePlan:
-    """What to compute: the gains through which the slices go (`centre`), and the gain sets that they must contain
-    (`marks`)."""
+    """What to compute: the gains through which the slices go (`centre`), and those they must contain (`marks`)."""
 
     definition: Definition
     flights: tuple[Flight, ...]
@@ -75,8 +74,11 @@ class LandscapePlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandscapeGrid:
-    """Inputs for computing the slices in chunks: the model, the gains through which they go, shape (n,), the pairs of
-    gains that are varied, and the values of each gain."""
+    """Inputs for computing the slices in chunks.
+
+    The model, the gains through which the slices go, shape (n,), the pairs of gains that are varied, and the values of
+    each gain.
+    """
 
     space: PolicySpace
     predict_errors: ErrorsOf

@@ -166,8 +166,10 @@ def check_simulation(log: LoopLog) -> SimulationCheck | None:
 
 
 def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
-    """As `check_simulation`, and return both sides of `SIMULATED` for every sample after the command; NaN where the
-    integrator is not active."""
+    """As `check_simulation`, and return both sides of `SIMULATED` for every sample after the command.
+
+    NaN where the integrator is not active.
+    """
     found = _first_command(log)
     if found is None:
         return None
@@ -198,11 +200,10 @@ def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
 
 
 def infer_gains(log: LoopLog) -> dict[str, float] | None:
-    """Infer the integer gains from the log: those that reproduce the feedback of more samples than any neighbours, and
-    of most samples.
+    """Infer the integer gains from the log.
 
-    The search starts near a least squares fit on the three errors. None if the flight cannot distinguish neighbouring
-    gains.
+    They are those that reproduce the feedback of more samples than any neighbours, and of most samples. The search
+    starts near a least squares fit on the three errors. None if the flight cannot distinguish neighbouring gains.
     """
     active = np.flatnonzero(~log.idle)
     if len(active) < _FEWEST_TO_INFER:
@@ -290,8 +291,7 @@ def _forward_difference(sample: LoopLog) -> Counts:
 
 
 def _feed_forward_change(sample: LoopLog) -> Counts:
-    """How far ff_cmd moves in one step: 2ζω and ω² are both 3 per s, and one count of acceleration is 0.63 of
-    thrust."""
+    """How far ff_cmd moves in one step: 2ζω and ω² are both 3 per s, one count of acceleration is 0.63 of thrust."""
     change = 3.1 / loop.RATE_HZ * (np.abs(sample["zdd_ref"]) + np.abs(sample["zd_ref"]) / 2**9)
     return np.ceil(0.63 * change).astype(np.int64) + _ROUNDING
 

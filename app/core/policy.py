@@ -158,8 +158,10 @@ class PolicySpace:
         return np.maximum(low, self.lower), np.minimum(high, self.upper)
 
     def change(self, one: Gains, other: Gains) -> dict[str, float]:
-        """Difference of two gain sets, each gain as a share of its range (of its upper bound's magnitude, at least 1,
-        if its bounds pin it)."""
+        """Difference of two gain sets, each gain as a share of its range.
+
+        For a gain pinned by its bounds, as a share of the bound's magnitude, at least 1.
+        """
         return {
             gain.name: abs(one[gain.name] - other[gain.name]) / (gain.span or max(abs(gain.upper), 1.0))
             for gain in self.gains

@@ -144,8 +144,7 @@ def repeat_proposal(
     kind: Kind,
     why: Explanation,
 ) -> Proposal:
-    """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval if the scatter is
-    known."""
+    """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval if it is known."""
     measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
     curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
     bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
@@ -163,8 +162,7 @@ def repeat_proposal(
 
 
 def interval_scale(flights: Sequence[Flight]) -> float:
-    """The factor f: above 1 if earlier flights missed their predictions by more than their intervals, below 1 if by
-    less."""
+    """The factor f: above 1 if earlier prediction errors exceeded their intervals, below 1 if they were smaller."""
     from scipy.special import ndtri
 
     half_width = float(ndtri(0.5 + CONFIDENCE / 2))

@@ -56,8 +56,10 @@ NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="not
 
 
 def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
-    """Distribution given by the data sheet: each parameter within `known_within` of its nominal value; empty without a
-    model."""
+    """Distribution given by the data sheet: each parameter within `known_within` of its nominal value.
+
+    Empty without a model.
+    """
     modelled = experiment.modelled
     if modelled is None:
         return NO_PARAMETERS

@@ -7,8 +7,11 @@ from app.core.strategies.simplex import model_optimum
 
 
 def start_gains(definition: Definition, experiment: Experiment, space: PolicySpace) -> dict[str, float]:
-    """The experiment's default gains, the gains in the definition (given, or the best of another campaign), or the
-    optimum of the nominal model searched from the default, if there is a model."""
+    """Gains of the first flight: given ones, the nominal model's optimum, or the experiment's defaults.
+
+    Given gains are those in the definition, its own or the best of another campaign. The optimum is searched from the
+    default gains, if there is a model.
+    """
     modelled = experiment.modelled
     if definition.start.gains is not None:
         return space.check(definition.start.gains, field="start.gains")

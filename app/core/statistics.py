@@ -235,8 +235,7 @@ def optimism(means: Sequence[float], standard_errors: Sequence[float]) -> float:
 
 
 def _products_of_others(factors: Matrix) -> Matrix:
-    """Row i holds the product of all rows of `factors` except the i-th, both (n, k); without division, because some are
-    0."""
+    """Row i holds the product of all rows of `factors` but the i-th, both (n, k); without division, as some are 0."""
     before, after = np.ones_like(factors), np.ones_like(factors)
     np.cumprod(factors[:-1], axis=0, out=before[1:])
     np.cumprod(factors[:0:-1], axis=0, out=after[-2::-1])
@@ -258,10 +257,9 @@ def drift_of(group: Group, scatter: PooledScatter) -> Drift | None:
 
 
 def trend_of(x: Sequence[float], errors: Sequence[float], confidence: float = 0.9) -> Trend | None:
-    """Least squares line through at least three points, with the t interval of its slope, n − 2 degrees of freedom (the
-    paper's Fig. 12: error against battery voltage).
+    """Least squares line through at least three points, with the t interval of its slope, n − 2 degrees of freedom.
 
-    None if there are fewer points, or x does not vary.
+    The paper's Fig. 12: error against battery voltage. None if there are fewer points, or x does not vary.
     """
     from scipy.special import stdtrit
 
@@ -311,8 +309,7 @@ def _certainty(difference: float, scatter: PooledScatter, sizes: tuple[int, int]
 def _further(
     first: Group, second: Group, scatter: PooledScatter, confidence: float, candidates: int, looks: int
 ) -> FlightsToDecide | None:
-    """Add flights, always to the policy with fewer (the first of equals), until the same difference would be
-    decided."""
+    """Add flights to the policy with fewer (the first of equals) until the same difference would be decided."""
     sizes = [first.size, second.size]
     for count in range(1, MAX_FURTHER_FLIGHTS + 1):
         sizes[0 if sizes[0] <= sizes[1] else 1] += 1

@@ -49,8 +49,7 @@ class Transfer:
 def transfer(
     definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight
 ) -> Transfer:
-    """Compute the transfer from the first valid flight, for the whole campaign; only the step after that flight is
-    shortened."""
+    """Compute the transfer from the first valid flight, for the whole campaign; only the next step is shortened."""
     valid = [flight for flight in flights if flight.outcome == "valid"]
     plain = Transfer(experiment=experiment, step_fraction=definition.step_fraction, agreement=None, sentence="")
     if not valid:

@@ -6,8 +6,7 @@ from typing import Final, Literal
 _MAX_DIGITS: Final = 6
 _SHORT_DIGITS: Final = 4
 _TWO_DIGITS_BELOW: Final = 3.55
-"""An uncertainty whose leading digits are below this is given a second digit: rounding 0.012 to 0.01 would lose too
-much."""
+"""An uncertainty with leading digits below this is given a second digit: 0.012 as 0.01 would lose too much."""
 
 
 def decimals(uncertainty: float | None) -> int:

@@ -17,8 +17,11 @@ def wrap32(value: int) -> int:
 
 @kernel
 def divide(dividend: int, divisor: int) -> int:
-    """Quotient truncated toward zero, as in C. Exact for 32-bit operands, because a double resolves their quotients
-    (two different ones differ by at least 2⁻³¹ of their size, a double resolves 2⁻⁵³)."""
+    """Quotient truncated toward zero, as in C.
+
+    Exact for 32-bit operands, because a double resolves their quotients (two different ones differ by at least 2⁻³¹ of
+    their size, a double resolves 2⁻⁵³).
+    """
     return int(dividend / divisor)
 
 
@@ -29,8 +32,7 @@ def limit(value: int, low: int, high: int) -> int:
 
 
 def fix(value: float, fraction_bits: int) -> int:
-    """`value`·2ⁿ truncated toward zero, as the firmware converts constants. Not for use in kernels: it is called on
-    import."""
+    """`value`·2ⁿ truncated toward zero, as the firmware converts constants. Called on import, so not for kernels."""
     return int(value * (1 << fraction_bits))
 
 

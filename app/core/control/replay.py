@@ -30,8 +30,7 @@ class LoopTrace:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Result of comparing the replica with a trace: rows replayed, and the largest |difference| of each output
-    column."""
+    """Comparison of the replica with a trace: rows replayed, and the largest |difference| of each output column."""
 
     rows: int
     largest_difference: Mapping[str, int]

@@ -1,5 +1,4 @@
-"""Interface of an experiment for strategies, figures and pages. A new one needs one file and one line in the
-registry."""
+"""Interface of an experiment. A new one needs one file and one line in the registry."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -88,10 +87,10 @@ def informed_parameters(parameters: Sequence[ModelParameter], mean: Vector, sd: 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Prior scatter of the errors of repeated flights: a standard deviation in the error's unit, counted as
-    `degrees_of_freedom` repeats.
+    """Prior scatter of the errors of repeated flights.
 
-    If it is not `measured`, but taken from another autopilot, it gives an order of magnitude only and decides nothing.
+    `sd` is a standard deviation in the error's unit, counted as `degrees_of_freedom` repeats. If it is not `measured`,
+    but taken from another autopilot, it gives an order of magnitude only and decides nothing.
     """
 
     sd: float
@@ -178,8 +177,7 @@ class ModelledExperiment(Experiment, Protocol):
     """An experiment with a simple model of its vehicle."""
 
     def informed(self, mean: Vector, sd: Vector) -> Self:
-        """The experiment with another vehicle's fitted model as its nominal one: mean and standard deviation, shape
-        (m,)."""
+        """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd` have shape (m,)."""
         ...
 
     @property

@@ -1,5 +1,4 @@
-"""The paper's F-16 experiment: track a sine in pitch for a minute, on a model with errors in every element of A and
-B."""
+"""The paper's F-16 experiment: track a sine in pitch for a minute, with a model that is off in every element."""
 
 from collections.abc import Mapping
 from typing import Final, Self
@@ -184,8 +183,11 @@ class PitchTracking:
         return track_batch(gains, self._moves(model), _SAMPLES)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
-        """Difference of every recorded step from the model's, shape (3000, 5) plus a row of zeros, in the source's
-        units; zero once the run has diverged. None if the record lacks a state or a command."""
+        """Difference of every recorded step from the model's, shape (3001, 5), in the source's units.
+
+        The last row is zero, and so are all rows once the run has diverged. None if the record lacks a state or a
+        command.
+        """
         flown = states_and_commands(trajectory, self.grid_s)
         if flown is None:
             return None

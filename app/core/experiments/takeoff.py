@@ -85,8 +85,10 @@ class Sketches:
 
 
 class Takeoff:
-    """Takeoff with the paper's autopilot. Gains are the loop's integers; above 1073 for ki and 409 for kd a product can
-    wrap at 32 bits."""
+    """Takeoff with the paper's autopilot.
+
+    Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits.
+    """
 
     name: Final = "takeoff"
     title: Final = "Takeoff to 3 m"
@@ -164,10 +166,10 @@ class Takeoff:
         return fly_disturbed(_counts(gains), self._models(model, len(gains)), _TARGET, disturbances)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
-        """Check products that can wrap, exactly, and altitude, divergence, oscillation and aborts of simulated
-        takeoffs.
+        """Check for products that can wrap, exactly, and simulate takeoffs.
 
-        Takes a tenth of a second; repeated questions are answered from a cache.
+        The takeoffs are checked for altitude, divergence, oscillation and aborts. Takes a tenth of a second; repeated
+        questions are answered from a cache.
         """
         safe_gains = self.space.vector(envelope.safe_gains)
         return _hazards(
@@ -175,8 +177,7 @@ class Takeoff:
         )
 
     def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
-        """Simulate every policy on every model until `until_s` only, which must exceed 5 s: gains (c, 3), models (k,
-        m)."""
+        """Simulate every policy on every model until `until_s`, which must exceed 5 s: gains (c, 3), models (k, m)."""
         samples = round(until_s * RATE_HZ)
         runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
         altitude = fly_batch(*runs, _TARGET, samples)[:, ::_SKETCH_EVERY]

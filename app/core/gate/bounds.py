@@ -14,8 +14,7 @@ NUMBERS: Final = "numbers"
 
 
 def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
-    """Return a refusal for each gain that is not a finite number, or not a 32-bit integer where the controller needs
-    one."""
+    """Return a refusal for each gain that is not finite, or not a 32-bit integer where the controller needs one."""
     return tuple(
         Check(
             NUMBERS, False, f"{gain.name} {reason}.", worst=_outside(gain, gains[gain.name]), limit=0.0, gain=gain.name
@@ -44,8 +43,7 @@ def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
 
 
 def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
-    """Check the largest change of a gain from the nearest of `references`, as a share of its range, against
-    `fraction`."""
+    """Check the largest change of a gain from the nearest of `references`, a share of its range, against `fraction`."""
     nearest = min(references, key=lambda reference: max(space.change(gains, reference).values()))
     name, worst = max(space.change(gains, nearest).items(), key=lambda item: item[1])
     base = space.vector(nearest)

@@ -60,16 +60,14 @@ class Runs:
 
 
 def abort_steps(models: int) -> Counts:
-    """Abort times in steps, shape (models, 6), increasing in each row; over the models they fill each interval
-    evenly."""
+    """Abort times in steps, shape (models, 6), increasing in each row; they cover each interval evenly."""
     edges = np.array(ABORTS_BETWEEN_S)
     shares = (np.arange(models)[:, np.newaxis] + 1.0) * _GOLDEN % 1.0
     return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
 
 
 def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, target: int, steps: int) -> Runs:
-    """Simulate a takeoff to `target` (8 fractional bits) on each model, each aborted to `safe_gains` at its own
-    times."""
+    """Simulate a takeoff to `target` (8 fractional bits) on each model, and its aborts to `safe_gains`."""
     reports = np.empty((len(models), REPORT_SIZE))
     aborts = np.empty((*aborts_at.shape, 2))
     scratch, curves = np.empty((2, STATE_SIZE), dtype=np.int64), np.empty((4, steps))

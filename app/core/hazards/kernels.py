@@ -97,11 +97,11 @@ def fly_leg(
     heights: Samples,
     climbs: Samples,
 ) -> int:
-    """Continue a flight as `app.core.plants.vertical.rollout` does, writing height and climb rate before each step,
-    shape (n,).
+    """Continue a flight as `app.core.plants.vertical.rollout` does.
 
-    Stops early above `LOST_M`, or when a vehicle that `lands` has touched down. Returns the steps flown; `state`,
-    `plant` and `past` then hold the values after them.
+    Writes height and climb rate before each step to `heights` and `climbs`, shape (n,). Stops early above `LOST_M`, or
+    when a vehicle that `lands` has touched down. Returns the steps flown; `state`, `plant` and `past` then hold the
+    values after them.
     """
     kp, ki, kd = gains[0], gains[1], gains[2]
     share, hover, lag, drag = model[QUADRATIC_SHARE], model[HOVER_THROTTLE], model[MOTOR_LAG_S], model[DRAG_1_S]
@@ -154,8 +154,10 @@ def _abort(
 
 @kernel
 def report_heights(heights: Samples, set_point: float, third: int, report: Samples) -> None:
-    """Report the highest altitude, the return to the ground, and the distances from the set point; up to 3 thirds of a
-    flight."""
+    """Report the highest altitude, the return to the ground, and the distances from the set point.
+
+    The flight may end before its three thirds are complete.
+    """
     near = False
     for i in range(len(heights)):
         height = heights[i]

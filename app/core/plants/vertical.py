@@ -87,8 +87,10 @@ def sensed(history: Samples, step: int, delay_steps: float) -> float:
 
 @kernel
 def decay(x: float) -> float:
-    """exp(−x) for x ≥ 0, accurate to 1e-13: multiplications only, so identical on every machine and vectorisable over
-    runs."""
+    """exp(−x) for x ≥ 0, accurate to 1e-13.
+
+    Multiplications only, so identical on every machine, and vectorisable over runs.
+    """
     part = max(-x, -64.0) * (1 / 128)
     power = 1.0 + part * (1.0 + part * (1 / 2 + part * (1 / 6 + part * (1 / 24 + part * (1 / 120 + part * (1 / 720))))))
     power *= power
@@ -104,8 +106,7 @@ def decay(x: float) -> float:
 def lift_of(
     thrust: float, altitude: float, seconds: float, share: float, ground: float, sag: float, hover_force: float
 ) -> float:
-    """Thrust of the rotors in units of weight; `hover_force` is the force at hover throttle, as a share of full
-    force."""
+    """Thrust of the rotors in units of weight; `hover_force` is the force at hover throttle, a share of full force."""
     ratio = ((1.0 - share) * thrust + share * thrust * thrust) / hover_force
     if ground > 0.0:
         ratio *= 1.0 + ground * decay(altitude * (1.0 / GROUND_EFFECT_HEIGHT_M))

@@ -39,7 +39,7 @@ ALTITUDE: Final = 0
 CLIMB_RATE: Final = 1
 ENTERED: Final = 2
 COLUMNS: Final = 3
-"""Columns of the disturbances: of altitude (m) and climb rate (m/s) in the following step, and whether the loop is
+"""Columns of the disturbances: of altitude (m) and climb rate (m/s) in the next step, and whether the loop is
 entered."""
 
 _NEVER: Final = 1 << 30

@@ -1,5 +1,4 @@
-"""Simultaneous takeoffs of the simple vertical model: bit for bit the same as `vertical.rollout`, in a third of the
-time.
+"""Simultaneous takeoffs of the simple vertical model: bit for bit as `vertical.rollout`, in a third of the time.
 
 All runs take a step before the next step begins, so that the inner loops run over the lanes and can be vectorised. Two
 properties make this possible. The loop's reference and feed-forward depend on the target alone, and come from a table.
@@ -130,8 +129,7 @@ def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samp
 
 
 def _fly(gains: Counts, models: Samples, guide: Samples) -> tuple[Samples, Samples]:
-    """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs, padded with the last to a multiple of
-    four."""
+    """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs, padded to a multiple of four."""
     k = len(gains)
     filled = np.minimum(np.arange(-(-k // 4) * 4), k - 1)
     altitude, fastest_m_s = np.empty((k, guide.shape[1])), np.empty(k)

@@ -66,12 +66,12 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """The next gain set. Kind `none` means that the strategy has nothing better to offer, `manual` that the operator
-    chooses; `gains` is then the best flown.
+    """The next gain set.
 
-    `predicted` is the corrected model's output for these gains on the experiment's grid; with a band it has two more
-    channels, named by `band_channels`. `interval` is the predicted interval of the flight's error, scatter included.
-    `spread` is the vehicle's parameter distribution if the strategy has computed it, which is expensive.
+    Kind `none` means that the strategy has nothing better to offer, `manual` that the operator chooses; `gains` is then
+    the best flown. `predicted` is the corrected model's output for these gains on the experiment's grid; with a band it
+    has two more channels, named by `band_channels`. `interval` is the predicted interval of the flight's error, scatter
+    included. `spread` is the vehicle's parameter distribution if the strategy has computed it, which is expensive.
     """
 
     kind: Kind

@@ -39,8 +39,10 @@ class CorrectedModel:
 
 @dataclass(frozen=True, slots=True)
 class DisturbedModel(CorrectedModel):
-    """The model with a flight's disturbances added to its state at the same times, inside the control loop (Abbeel et
-    al. 2006, the paper's step 4); `bias` is zero."""
+    """The model with a flight's disturbances added to its state at the same times, inside the control loop.
+
+    Abbeel et al. 2006, the paper's step 4; `bias` is zero.
+    """
 
     disturbances: Matrix
 

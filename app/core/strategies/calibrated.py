@@ -125,8 +125,7 @@ def _choose(
 
 
 def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
-    """∂error/∂gain at the best flight by central differences, averaged as in the robust optimum; zero for a pinned
-    gain."""
+    """∂merit/∂gain at the best flight by central differences; zero for a pinned gain."""
     steps = np.diag(np.maximum(np.rint(_DIFFERENCE * takeoff.space.scale), 1.0))
     above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
     errors = merit(takeoff, np.concatenate((above, below)), models)

@@ -31,8 +31,10 @@ _GUST_VARIATION: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class FlightPrediction:
-    """Predicted curve with its band, predicted error with its interval, and the models used: (k, m), with their errors
-    (k,)."""
+    """Prediction of a flight: its curve with a band, and its error with an interval.
+
+    `models` are the models used, (k, m), with their `errors` (k,).
+    """
 
     trajectory: Trajectory
     error: float

@@ -70,8 +70,10 @@ def propose(
 
 
 def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
-    """The errors of the model identified from all flights, or of the nominal model if no flight recorded the required
-    channels."""
+    """The errors of the model identified from all flights.
+
+    Those of the nominal model if no flight recorded the required channels.
+    """
     assert isinstance(experiment, PitchTracking)
     found = identify(experiment, flights, _fit_of(definition))
     if found is None:

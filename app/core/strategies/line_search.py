@@ -12,8 +12,10 @@ from app.core.strategies.bias import CorrectedModel
 
 @dataclass(frozen=True, slots=True)
 class SearchLine:
-    """Flyable gains along `direction` (gains per unit of length) from `base`, each limited to `low` … `high`; all of
-    shape (n,)."""
+    """Flyable gains along `direction` (gains per unit of length) from `base`, each limited to `low` … `high`.
+
+    All have shape (n,).
+    """
 
     space: PolicySpace
     base: Vector

@@ -30,8 +30,10 @@ def _first_steps(search: SimplexSearch, space: PolicySpace, start: Vector) -> Ve
 
 @dataclass(frozen=True, slots=True)
 class Optimum:
-    """Result of a search on the model: gains of shape (n,), the model's error there, and the evaluations used; `course`
-    is the lowest error after each iteration."""
+    """Result of a search on the model.
+
+    `gains` have shape (n,), `error` is the model's there; `course` is the lowest error after each iteration.
+    """
 
     gains: Vector
     error: float
@@ -82,8 +84,10 @@ def model_optimum(experiment: ModelledExperiment, space: PolicySpace, start: Vec
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """Propose the nominal model's optimum, limited by the step limit around the best flight. At least one flight must
-    be valid."""
+    """Propose the nominal model's optimum, within the step limit around the best flight.
+
+    At least one flight must be valid.
+    """
     start = space.vector(definition.start.gains) if definition.start.gains else space.nearest(space.default)
     optimum = model_optimum(experiment, space, start)
     base = best_flight(flights)
