@@ -11,16 +11,18 @@ PlotlyJson = Mapping[str, object]
 CardState = Literal["ready", "waiting", "failed"]
 
 CHECKED_ITEMS: Final = 20
-"""Number of items validated per list of a trace: a list is as long as there are flights or samples, with items of one
-kind."""
+"""Items validated per list of a trace: lists are as long as there are flights or samples, with items of one kind."""
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a data table; `digits` is the number of decimals, None for text and for numbers of any size, which
-    are shown with four significant digits."""
+    """One column of a data table.
+
+    `digits` is the number of decimals, None for text and for numbers of any size, which are shown with four significant
+    digits.
+    """
 
     name: str
     title: str
@@ -68,8 +70,7 @@ class Figure(Protocol):
 
 
 def card_of(figure: Figure) -> Card:
-    """Compute the figure's card; one that is not ready, or raises, yields a card that reports this, never an
-    exception."""
+    """Compute the figure's card; one that is not ready, or raises, yields a card that reports it, not an exception."""
     try:
         if (missing := figure.not_ready()) is not None:
             return Card(name=figure.name, title=figure.title, state="waiting", reason=missing)

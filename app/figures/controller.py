@@ -13,8 +13,10 @@ Curve = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overlaid:
-    """One signal over time, recorded and from the replica, of equal length; and time and value of each mark where the
-    recorded one differs."""
+    """One signal over time, recorded and from the replica, of equal length.
+
+    `differing_s` and `differing` are time and value of each mark where the recorded signal differs.
+    """
 
     label: str
     digits: int
@@ -27,8 +29,10 @@ class Overlaid:
 
 @dataclass(frozen=True, slots=True)
 class ControllerFigure:
-    """One panel per signal over a common time axis. Traces as in `PanelsFigure`, with the roles `recorded`, `replica`
-    and `differs`."""
+    """One panel per signal over a common time axis.
+
+    Traces as in `PanelsFigure`, with the roles `recorded`, `replica` and `differs`.
+    """
 
     signals: Sequence[Overlaid]
     heading: str

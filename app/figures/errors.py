@@ -76,8 +76,7 @@ class ErrorsFigure:
         )
 
     def _span(self) -> RobustRange:
-        """Range up to the first flight's error, every other one that is not an outlier, and the next flight's
-        interval."""
+        """Range up to the first flight's error, every other one that is no outlier, and the next flight's interval."""
         errors = [flight.error for flight in self.history.flights if flight.error is not None]
         first = [flight.error for flight in self.history.valid[:1] if flight.error is not None]
         proposal = self.history.proposal
@@ -182,8 +181,10 @@ class ErrorsFigure:
         ]
 
     def _intervals(self, palette: Palette, top: float) -> list[dict[str, object]]:
-        """Predicted interval of each flight's error, or only the next one's if there are many: a bar behind its
-        diamond, cut at the edge."""
+        """Predicted interval of each flight's error, or only the next one's if there are many.
+
+        A bar behind the diamond of the prediction, cut at the edge.
+        """
         known = self._expected()
         if not known:
             return []
@@ -233,8 +234,7 @@ class ErrorsFigure:
         ]
 
     def _without_error(self, palette: Palette, height: float) -> list[dict[str, object]]:
-        """Marks at the bottom, clear of the axis labels, for flights that have no meaningful error, or were not
-        reviewed yet."""
+        """Marks at the bottom, clear of the axis labels, for flights without a meaningful error or without a review."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet judged"}]
         unjudged = [flight for flight in flights if flight.outcome == "not yet judged"]

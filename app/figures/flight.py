@@ -19,8 +19,10 @@ TABLE_ROWS: Final = 34
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecordData:
-    """One recorded flight. `inputs` are further channels by title (Thrust, Feed-forward, …), all in the unit named in
-    `inputs_title`."""
+    """One recorded flight.
+
+    `inputs` are further channels by title (Thrust, Feed-forward, …), all in the unit named in `inputs_title`.
+    """
 
     number: int
     output_title: str

@@ -38,8 +38,7 @@ class Range:
         return self.low <= value <= self.high
 
     def slice_of(self, rising: Samples) -> tuple[int, int]:
-        """First index and end of the part of `rising`, shape (n,), inside the range, with one more sample on either
-        side."""
+        """First index and end of the part of `rising`, shape (n,), inside the range, plus one sample on each side."""
         first = max(0, int(np.searchsorted(rising, self.low, "left")) - 1)
         return first, min(len(rising), int(np.searchsorted(rising, self.high, "right")) + 1)
 
@@ -84,8 +83,7 @@ class NextFlight:
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Several valid flights with the same gains: their numbers, and the mean of their errors with its standard
-    error."""
+    """Several valid flights with the same gains: their numbers, and their mean error with its standard error."""
 
     numbers: tuple[int, ...]
     mean: float
@@ -94,8 +92,11 @@ class Repeats:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Scatter of the errors: `sd` of a single flight, the repeated flights, and the range in which another flight of
-    the best gains would lie with 90 % probability."""
+    """Scatter of the errors.
+
+    `sd` is that of a single flight, `repeats` are the repeated flights, `around_best` is the range in which another
+    flight of the best gains would lie with 90 % probability.
+    """
 
     sd: float
     repeats: tuple[Repeats, ...] = ()

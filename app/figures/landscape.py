@@ -26,8 +26,7 @@ _TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
 _GROUND: Final = "ground"
 _GAP: Final = 0.09
 _STAR_PX: Final = 17
-"""Size of the best flight's own invisible mark, equal to the star over it, so that its number is placed clear of the
-star."""
+"""Size of the star, and of the best flight's own invisible mark under it, which keeps its number clear of the star."""
 _STACK_GAP: Final = 0.085
 
 
@@ -41,8 +40,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """How the next gains were found: the gradient of the error, the direction of the line, and the steps evaluated on
-    it."""
+    """How the next gains were found: the error's gradient, the direction of the line, and the steps evaluated on it."""
 
     gradient: Gains
     direction: Gains
@@ -293,8 +291,7 @@ class LandscapeFigure:
 
 
 def scale_of(slices: Sequence[Slice]) -> Scale:
-    """A common scale of all slices: from the lowest error to the 80 % quantile of their points, in steps of 1, 2 or
-    5."""
+    """Common scale of all slices: from the lowest error to the 80 % quantile of their points, in steps of 1, 2 or 5."""
     errors = np.array([error for one in slices for row in one.errors for error in row if error is not None])
     low, high = float(errors.min()), float(np.quantile(errors, SHOWN_SHARE))
     step = _nice(max(high - low, 1e-3 * max(abs(high), 1e-9)) / LEVELS)

@@ -1,5 +1,7 @@
-"""Marks of flights whose error exceeds the scale: triangles at the upper edge, so that an outlier does not compress the
-others."""
+"""Marks of flights whose error exceeds the scale: triangles at the upper edge.
+
+This keeps the other flights readable when one is an outlier.
+"""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -14,8 +16,10 @@ PRINT: Final = 0.18
 def off_scale_traces(
     palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
 ) -> list[dict[str, object]]:
-    """Marks at height `top` of an axis that ends with flight `last`; if there are few flights, with the errors that
-    have room."""
+    """Marks at height `top` of an axis that ends with flight `last`.
+
+    If there are few flights, with the errors that have room.
+    """
     if crowded:
         return [_together(palette, flights, top, unit)] if flights else []
     printed = set(_with_room([flight.number for flight in flights], PRINT * last))

@@ -54,10 +54,10 @@ def robust_span(curves: Sequence[Samples], *, low: float, high: float) -> tuple[
 def thinned(
     time_s: Samples, values: Samples, points: int, window: Range | None = None
 ) -> tuple[list[float], list[float]]:
-    """At most `points` samples that preserve the curve's shape and extremes, rounded to 0.1 ms and four decimals; five
-    decimals for a curve that stays below 1.
+    """At most `points` samples that preserve the curve's shape and extremes.
 
-    With a `window` of seconds, as many again inside it, up to its edges and just past them.
+    Times are rounded to 0.1 ms, values to four decimals, or five if the curve stays below 1. With a `window` of
+    seconds, as many again inside it, up to its edges and just past them.
     """
     chosen = select_samples(time_s, values, points)
     if window is not None:
