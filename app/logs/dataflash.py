@@ -117,8 +117,7 @@ def read_tables(data: Contents, wanted: frozenset[str]) -> dict[str, Table]:
 
 
 def _define(body: bytes, lengths: list[int], kinds: dict[int, _Kind], wanted: frozenset[str]) -> None:
-    """Register the type defined by an FMT message: type, length, name[4], format[16], columns[64]. Invalid ones are
-    ignored."""
+    """Register the type in an FMT message: type, length, name[4], format[16], columns[64]; ignore invalid ones."""
     number, length = body[0], body[1]
     if number == _FMT or length < 3 or lengths[number]:
         return

@@ -1,9 +1,8 @@
-"""Reader of Paparazzi's ground logs: a .data file with one message per line, and its .log companion, XML, with the
-airframe and the settings.
+"""Reader of Paparazzi's ground logs.
 
-A line contains the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks.
-VERT_LOOP contains the complete state of the vertical loop, in its own integers; without it the altitude comes from
-ROTORCRAFT_FP.
+A log is a .data file with one message per line, and its .log companion, XML, with the airframe and the settings. A line
+contains the time in seconds, the aircraft's number, the message's name and its fields, separated by blanks. VERT_LOOP
+contains the complete state of the vertical loop, in its own integers; without it the altitude comes from ROTORCRAFT_FP.
 """
 
 import re
@@ -78,10 +77,9 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
 
 
 def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[LoopLog, dict[str, float] | None]:
-    """Read the samples of the vertical loop and its last gains, from companion and messages; the gains are None if
-    incomplete.
+    """Read the samples of the vertical loop and its last gains, from companion and messages.
 
-    Raises TrajectoryError if there is no VERT_LOOP.
+    The gains are None if incomplete. Raises TrajectoryError if there is no VERT_LOOP.
     """
     lines = _read(stream)
     if not len(lines.loop_time_s):
@@ -218,8 +216,7 @@ def _ends(log: LoopLog) -> list[LogEvent]:
 
 @dataclass(slots=True)
 class _Configuration:
-    """Gains in the .log companion: those built into the airframe, and the numbers by which DL_VALUE identifies
-    settings."""
+    """Gains in the .log companion: those of the airframe, and the numbers by which DL_VALUE identifies settings."""
 
     _built_in: dict[str, float] = field(default_factory=dict)
     _numbers: dict[int, str] = field(default_factory=dict)

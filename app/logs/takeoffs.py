@@ -186,8 +186,7 @@ def _where_looked(log: FlightLog) -> str:
 
 
 def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:
-    """Indices of the last sample on the ground before each flight, and of the first one down again, or the last of
-    all."""
+    """Indices of the last sample on the ground before each flight, and of the first one down again (or the last)."""
     if log.in_air is not None:
         yield from _flights_in_air(time_s, altitude_m, log.in_air)
         return
@@ -256,8 +255,7 @@ def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[LogE
 def _kept(
     log: FlightLog, time_s: Samples, begin: LogEvent, held: "_GainsAt", stood: int, down: int
 ) -> tuple[slice, LogEvent]:
-    """The samples of the record, and the event that ends it; without a description if that is the landing or the log's
-    end.
+    """The samples of the record, and the event that ends it; without a description for the landing or the log's end.
 
     Commands end a flight only in the air: a mode reported by a heartbeat may be a second old.
     """

@@ -81,8 +81,10 @@ _AUTOPILOTS: Final[Mapping[int, _Autopilot]] = MappingProxyType(
         12: _Autopilot("PX4", "v20.common", PX4_SETS, _own_names(PX4_SETS), from_ground=True, has_takeoff_mode=True),
     }
 )
-"""By the autopilot number in the heartbeat. Paparazzi's altitude is above its local origin, that of the others above
-the ground."""
+"""By the autopilot number in the heartbeat.
+
+Paparazzi's altitude is above its local origin, that of the others above the ground.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,8 +197,7 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Telemetry:
-    """The exchange between ground station and vehicle, in the vehicle's time; messages are dated by the last
-    position."""
+    """Messages of ground station and vehicle, in the vehicle's time, dated by the last position."""
 
     autopilot: _Autopilot
     system: int

@@ -245,8 +245,7 @@ def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent
 
 
 def _in_air(topics: Mapping[str, Topic]) -> list[Span] | None:
-    """Intervals from each lift-off to the touchdown, as reported by the land detector, with the motors armed if that is
-    known.
+    """Intervals from each lift-off to the touchdown, from the land detector, with the motors armed if that is known.
 
     A lift-off in a descending mode, or within two seconds of a touchdown (a bounce), is not counted. None without the
     land detector.
@@ -299,8 +298,7 @@ def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:
 
 
 def _missing(topics: Mapping[str, Topic]) -> Iterator[str]:
-    """Notes on missing topics that distinguish a takeoff from a jump of the altitude, and on the method used without
-    them."""
+    """Notes on missing topics, needed to tell a takeoff from a jump of the altitude, and on the method used instead."""
     has_status = any(True for _ in _rows(topics, _STATUS, "arming_state", "nav_state"))
     if not any(True for _ in _rows(topics, _LANDED, "landed")):
         how = "while it was armed" if has_status else "armed or not"
