@@ -1,5 +1,4 @@
-"""The paper's F-16 experiment over many inaccurate models: which methods find the true optimum, and in how many
-flights."""
+"""The paper's F-16 experiment over many inaccurate models: which methods find the true optimum, and how fast."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -248,8 +247,11 @@ def _definition(method: Method, perturbation: float, seed: int, max_flights: int
 
 
 def _flown(definition: Definition, method: Method, *, until_near: bool) -> Iterator[Flight]:
-    """Fly the campaign until a flight is within 5 % of the optimum (with `until_near`), nothing is proposed, or the
-    budget is used up."""
+    """Fly a campaign.
+
+    It ends when a flight is within 5 % of the optimum (with `until_near`), nothing is proposed, or the budget is used
+    up.
+    """
     flights: list[Flight] = []
     while len(flights) < definition.stop.max_flights:
         proposal = next_proposal(definition, flights)

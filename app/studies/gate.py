@@ -21,8 +21,7 @@ def judge_takeoff(gains: Gains) -> GateResult:
 
 
 def overruled_for(gains: Gains, vehicle: str) -> str:
-    """The reason for flying these gains on a vehicle of this kind despite the gate's refusal; empty if it does not
-    refuse.
+    """The reason for flying these gains on this kind of vehicle despite the gate's refusal; empty without a refusal.
 
     Raises GainsError if the refusal cannot be overruled.
     """

@@ -48,8 +48,11 @@ class ReproductionSummary(BaseModel):
 
 
 class ReproductionRow(BaseModel):
-    """One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is the target value of this
-    program. `overruled` is the reason for flying gains that the gate refuses."""
+    """One number of a result.
+
+    `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
+    this program. `overruled` is the reason for flying gains that the gate refuses.
+    """
 
     group: str
     label: str

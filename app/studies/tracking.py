@@ -39,11 +39,12 @@ EXPECTED: Final = {
     "identified": (1.0, 2.0),
     "simplex": (1.0, 26.0),
 }
-"""Results of a prototype by method: the share of 50 models at ±45 % for which it came near, and its median flights
-then."""
+"""Results of a prototype by method: the share of 50 models at ±45 % for which it came near, and its median flights."""
 EXPECTED_NOISY: Final = {"identified-noisy": (0.55, 2.0), "map-noisy": (1.0, 2.0)}
-"""The same with noisy logs; least squares came near for 50 to 60 %. The flights were not reported: two are the value
-without noise."""
+"""The same with noisy logs; least squares came near for 50 to 60 %.
+
+The flights with noise were not reported: two is the value without noise.
+"""
 AT_LEAST_SECOND: Final = 0.98
 """Required share of models, 49 of 50, for which the identified model comes near by the second flight."""
 NOISY_FLIGHTS: Final = 5

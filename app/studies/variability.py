@@ -1,5 +1,4 @@
-"""The paper's Fig. 12: one policy flown repeatedly on one battery, to measure the scatter of its errors and any trend
-over the battery.
+"""The paper's Fig. 12: one policy flown repeatedly on one battery, for the scatter and trend of its errors.
 
 The paper flew one battery with each of two gain sets. Here many batteries are flown on the twin, to separate the
 scatter of σ between batteries from σ itself: σ is pooled over the groups, √(Σ (e − ē)² / Σ (n − 1)).

@@ -1,5 +1,4 @@
-"""Random vehicles for testing tuning methods: their flights, a safety criterion, and the best achievable error of
-each."""
+"""Random vehicles for testing tuning methods: their flights, a safety criterion, and each one's best error."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -128,10 +127,10 @@ _DRAWS: Final[Mapping[str, Callable[[int, np.random.Generator], SampledVehicle]]
 
 
 def fly(vehicle: SampledVehicle, gains: Gains, seed: int) -> Trajectory:
-    """Fly one takeoff, with the same result as through the vehicle interface, in one call: for the twin 1.5 ms instead
-    of 30.
+    """Fly one takeoff in one call, with the same result as through the vehicle interface.
 
-    Gains are 32-bit integers. A flight that diverges numerically has non-finite altitudes.
+    For the twin this takes 1.5 ms instead of 30. Gains are 32-bit integers. A flight that diverges numerically has
+    non-finite altitudes.
     """
     rows = _rows(vehicle, gains, seed)
     rows[:, SET_POINT] = TAKEOFF_ALTITUDE_M
@@ -147,8 +146,7 @@ def noise_free_error(vehicle: SampledVehicle, gains: Gains) -> float:
 
 
 def is_unsafe(trajectory: Trajectory) -> bool:
-    """Whether a flight rose above 3.75 m, was below 2.25 m later than 5 s after the command, or has non-finite
-    altitudes."""
+    """Whether a flight rose above 3.75 m, was below 2.25 m after the first 5 s, or has non-finite altitudes."""
     altitude: Samples = trajectory["altitude_m"]
     if not np.isfinite(altitude).all():
         return True
@@ -228,8 +226,7 @@ def _descend(error: Callable[[Vector], float], start: Vector, step: float, evalu
 
 
 def _polish(error: Callable[[Vector], float], start: Vector, coarsest: float, finest: float) -> Vector:
-    """Coordinate search with steps from `coarsest` down to `finest` of each gain's scale, halved when no step
-    improves."""
+    """Coordinate search with steps from `coarsest` to `finest` of each gain's scale, halved when no step improves."""
     space = _TAKEOFF.space
     best, lowest, share = start, error(start), coarsest
     while share >= finest:
