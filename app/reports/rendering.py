@@ -39,8 +39,10 @@ _STATES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """The file, and the content security policy with which a server must send it: inline scripts by hash, no network,
-    no origin."""
+    """The file, and the content security policy with which a server must send it.
+
+    The policy allows inline scripts by hash, no network, and no origin.
+    """
 
     html: str
     policy: str
@@ -110,8 +112,10 @@ def _data(report: Report) -> Markup:
 
 
 def _policy(*scripts: Markup) -> str:
-    """The content security policy. The chart library writes its own style rules, so inline styles cannot be allowed by
-    hash."""
+    """The content security policy.
+
+    The chart library writes its own style rules, so inline styles cannot be allowed by hash.
+    """
     hashes = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()}'" for each in scripts
     )

@@ -9,8 +9,10 @@ from app.db.models import TrialPhotoRow, TrialRow
 
 
 def photos(session: Session, campaign_id: int) -> Sequence[tuple[TrialPhotoRow, int]]:
-    """The photos of all trials of a campaign with their sizes in bytes, in the order they were added; the image data is
-    loaded on access."""
+    """The photos of all trials of a campaign with their sizes in bytes, in the order they were added.
+
+    The image data is loaded on access.
+    """
     wanted = (
         select(TrialPhotoRow, func.length(TrialPhotoRow.data))
         .join(TrialPhotoRow.trial)
