@@ -19,8 +19,10 @@ TrialIds = Annotated[
 
 @router.get("")
 def compare_flights(session: Reader, trial: TrialIds) -> FlightComparison:
-    """Compare flights of any campaigns, in the order given: their gains, settings and errors, what differs, and which
-    of each two is better."""
+    """Compare flights of any campaigns, in the order given.
+
+    Returns their gains, settings and errors, what differs, and which of each two is better.
+    """
     return service.compare_flights(session, trial)
 
 

@@ -26,9 +26,11 @@ class FlightSetting(BaseModel):
 
 
 class ComparedFlight(BaseModel):
-    """One of the flights. `label` is its letter in the figure, `name` its name in sentences; `group` is the mean of all
-    valid flights with its gains in its campaign, `scatter` the standard deviation of one such flight, null while it is
-    not known."""
+    """One of the flights.
+
+    `label` is its letter in the figure, `name` its name in sentences; `group` is the mean of all valid flights with its
+    gains in its campaign, `scatter` the standard deviation of one such flight, null while it is not known.
+    """
 
     trial_id: int
     label: str
@@ -49,8 +51,11 @@ class ComparedFlight(BaseModel):
 
 
 class FlightDifference(BaseModel):
-    """A gain or setting that is not the same in all flights: its value in each, in order, null if a flight does not
-    have it, and its change from the first flight's value, if both are numbers."""
+    """A gain or setting that is not the same in all flights.
+
+    `values` are in the order of the flights, null if a flight does not have it; `changes` are relative to the first
+    flight's value, if both are numbers.
+    """
 
     title: str
     unit: str
@@ -66,8 +71,11 @@ class FurtherFlights(BaseModel):
 
 
 class FlightPair(BaseModel):
-    """One flight's gains compared with another's, each with all their flights. `difference` is trial − against;
-    `confidence` is that of the likelier direction, or, for `repeats` in one campaign, that anything has changed."""
+    """One flight's gains compared with another's, each with all their flights.
+
+    `difference` is trial − against; `confidence` is that of the likelier direction, or, for `repeats` in one campaign,
+    that anything has changed.
+    """
 
     trial_id: int
     against_id: int
@@ -81,8 +89,11 @@ class FlightPair(BaseModel):
 
 
 class FlightComparison(BaseModel):
-    """A comparison of flights, in the order in which they were named; in each pair the later one is compared with the
-    earlier. `sentence` is the overall verdict: the lowest compared with the first one, or with the next lowest."""
+    """A comparison of flights, in the order in which they were named.
+
+    In each pair the later flight is compared with the earlier. `sentence` is the overall verdict: the lowest compared
+    with the first one, or with the next lowest.
+    """
 
     error_unit: str
     verdict: Verdict | None

@@ -15,8 +15,7 @@ from app.vehicles.open import VEHICLE_KINDS
 
 
 def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
-    """Vehicle, experiment and strategy with their settings, the battery, and the other settings recorded with the
-    flight."""
+    """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
     row, campaign = side.row, side.campaign
     kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
     strategy = STRATEGIES[campaign.strategy]

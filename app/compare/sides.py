@@ -43,8 +43,10 @@ class ComparisonFlight:
 
 
 def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFlight]:
-    """The flights in the given order. Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be
-    compared."""
+    """Collect the flights in the given order.
+
+    Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared.
+    """
     found = repository.trials_by_id(session, trial_ids)
     campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
     experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
@@ -82,8 +84,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
 
 
 def population_of(campaign: CampaignRow) -> str:
-    """A key common to campaigns whose flights differ only in their gains: one vehicle with the same settings, one
-    experiment.
+    """A key common to campaigns whose flights differ only in their gains: same vehicle, settings and experiment.
 
     For flights made elsewhere the vehicle is not known, so such a campaign is a population of its own.
     """

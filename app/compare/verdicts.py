@@ -1,5 +1,4 @@
-"""Verdicts on pairs of flights, and on several flights in one sentence: whose gains are better, or why there is no
-verdict.
+"""Verdicts on pairs of flights, and on several flights in one sentence.
 
 Each flight counts with all valid flights of its gains in its campaign, and the scatter is that of its population, so
 flights of one campaign have the same verdict as in that campaign. Between populations there is no verdict, because
@@ -46,8 +45,7 @@ def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidate
 
 
 def overall_verdict(sides: Sequence[ComparisonFlight]) -> tuple[Verdict | None, str]:
-    """Compare the gains with the lowest mean (plus its standard error, as in a campaign) with those of the first
-    flight.
+    """Compare the gains with the lowest mean plus its standard error, as in a campaign, with the first flight's.
 
     If they are the first flight's, they are compared with the next lowest.
     """
