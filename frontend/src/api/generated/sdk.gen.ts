@@ -588,14 +588,14 @@ export const listReproductions = <ThrowOnError extends boolean = false>(options?
 /**
  * Get Reproduction
  *
- * One of them with the rows of its newest result: measured, published, and their ratio.
+ * One reproduction with the rows of its newest result: measured, published, and their ratio.
  */
 export const getReproduction = <ThrowOnError extends boolean = false>(options: Options<GetReproductionData, ThrowOnError>): RequestResult<GetReproductionResponses, GetReproductionErrors, ThrowOnError> => (options.client ?? client).get<GetReproductionResponses, GetReproductionErrors, ThrowOnError>({ url: '/api/reproductions/{name}', ...options });
 
 /**
  * Run Reproduction
  *
- * Have it run. While it waits or runs already, the answer is that job.
+ * Request a run. If one is queued or running already, its job is returned.
  */
 export const runReproduction = <ThrowOnError extends boolean = false>(options: Options<RunReproductionData, ThrowOnError>): RequestResult<RunReproductionResponses, RunReproductionErrors, ThrowOnError> => (options.client ?? client).post<RunReproductionResponses, RunReproductionErrors, ThrowOnError>({
     url: '/api/reproductions/{name}/run',
@@ -665,22 +665,23 @@ export const getControllerCheckFigure = <ThrowOnError extends boolean = false>(o
 /**
  * Compare Flights
  *
- * Flights of any campaigns side by side, in the order given: their gains, settings and errors, what differs, and
- * which of each two is better.
+ * Compare flights of any campaigns, in the order given.
+ *
+ * Returns their gains, settings and errors, what differs, and which of each two is better.
  */
 export const compareFlights = <ThrowOnError extends boolean = false>(options: Options<CompareFlightsData, ThrowOnError>): RequestResult<CompareFlightsResponses, CompareFlightsErrors, ThrowOnError> => (options.client ?? client).get<CompareFlightsResponses, CompareFlightsErrors, ThrowOnError>({ url: '/api/compare', ...options });
 
 /**
  * Get Comparison Figure
  *
- * Their curves over the set point, and below them how each differs from the first.
+ * Their curves over the set point, and below them the difference of each from the first.
  */
 export const getComparisonFigure = <ThrowOnError extends boolean = false>(options: Options<GetComparisonFigureData, ThrowOnError>): RequestResult<GetComparisonFigureResponses, GetComparisonFigureErrors, ThrowOnError> => (options.client ?? client).get<GetComparisonFigureResponses, GetComparisonFigureErrors, ThrowOnError>({ url: '/api/compare/figure', ...options });
 
 /**
  * Get Comparison Csv
  *
- * Their curves on one grid of time, every 0.02 s; each flight's own CSV has the record as it was stored.
+ * Their curves on a common time grid of 0.02 s; each flight's own CSV contains the record as stored.
  */
 export const getComparisonCsv = <ThrowOnError extends boolean = false>(options: Options<GetComparisonCsvData, ThrowOnError>): RequestResult<GetComparisonCsvResponses, GetComparisonCsvErrors, ThrowOnError> => (options.client ?? client).get<GetComparisonCsvResponses, GetComparisonCsvErrors, ThrowOnError>({ url: '/api/compare/curves.csv', ...options });
 
@@ -694,7 +695,7 @@ export const getReport = <ThrowOnError extends boolean = false>(options: Options
 /**
  * Get Report As Pdf
  *
- * The same, printed by a Chromium on the server; 503 where there is none, or it is printing already.
+ * The same as PDF, printed by Chromium on the server; 503 if it is not installed or already busy printing.
  */
 export const getReportAsPdf = <ThrowOnError extends boolean = false>(options: Options<GetReportAsPdfData, ThrowOnError>): RequestResult<GetReportAsPdfResponses, GetReportAsPdfErrors, ThrowOnError> => (options.client ?? client).get<GetReportAsPdfResponses, GetReportAsPdfErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/report.pdf', ...options });
 

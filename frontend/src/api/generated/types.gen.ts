@@ -616,9 +616,10 @@ export type Clone = {
 /**
  * ComparedFlight
  *
- * One of the flights. `label` is its letter in the figure, `name` what sentences call it; `group` is the mean of
- * all valid flights of its gains in its campaign, `scatter` the standard deviation of one such flight, null while
- * nobody knows it.
+ * One of the flights.
+ *
+ * `label` is its letter in the figure, `name` its name in sentences; `group` is the mean of all valid flights with its
+ * gains in its campaign, `scatter` the standard deviation of one such flight, null while it is not known.
  */
 export type ComparedFlight = {
     /**
@@ -1095,10 +1096,10 @@ export type ExperimentInfo = {
 /**
  * Explanation
  *
- * Why these gains: sentences for a person, and the numbers behind them.
+ * Why these gains were chosen: sentences for a person, and the numbers behind them.
  *
- * `lesson` says what the flight is expected to teach; `fitted` is empty for strategies that fit nothing;
- * `trust_fraction` is the share of each gain's range that the step was allowed, None without a trust region.
+ * `lesson` is what the flight is expected to show; `fitted` is empty for strategies without a fit; `trust_fraction` is
+ * the allowed step as a share of each gain's range, None without a trust region.
  */
 export type Explanation = {
     /**
@@ -1271,8 +1272,7 @@ export type FittedNumber = {
 /**
  * FittedParameter
  *
- * A number of the model as the flights have it, with its standard error; `nominal` and `prior_sd` are what was
- * known before them.
+ * A fitted parameter with its standard error; `nominal` and `prior_sd` are its prior.
  */
 export type FittedParameter = {
     /**
@@ -1356,8 +1356,10 @@ export type FlightBrief = {
 /**
  * FlightComparison
  *
- * Flights side by side, in the order in which they were named; every later one of each pair stands against the
- * earlier. `sentence` is the verdict on all of them: the lowest against the first one, or against the next lowest.
+ * A comparison of flights, in the order in which they were named.
+ *
+ * In each pair the later flight is compared with the earlier. `sentence` is the overall verdict: the lowest compared
+ * with the first one, or with the next lowest.
  */
 export type FlightComparison = {
     /**
@@ -1403,8 +1405,10 @@ export type FlightComparison = {
 /**
  * FlightDifference
  *
- * A gain or setting that is not the same in all flights: its value in each, in their order, null where a flight has
- * no such thing, and its change against the first flight's, where both are numbers.
+ * A gain or setting that is not the same in all flights.
+ *
+ * `values` are in the order of the flights, null if a flight does not have it; `changes` are relative to the first
+ * flight's value, if both are numbers.
  */
 export type FlightDifference = {
     /**
@@ -1440,8 +1444,10 @@ export type FlightOrder = {
 /**
  * FlightPair
  *
- * One flight's gains against another's, each with all their flights. `difference` is trial − against; `confidence`
- * that of the likelier direction, for `repeats` in one campaign that anything has changed.
+ * One flight's gains compared with another's, each with all their flights.
+ *
+ * `difference` is trial − against; `confidence` is that of the likelier direction, or, for `repeats` in one campaign,
+ * that anything has changed.
  */
 export type FlightPair = {
     /**
@@ -1484,7 +1490,7 @@ export type FlightPair = {
 /**
  * FlightSetting
  *
- * Something that a flight was flown with.
+ * A setting with which a flight was flown.
  */
 export type FlightSetting = {
     /**
@@ -1546,7 +1552,7 @@ export type FlyingTrial = {
 /**
  * FurtherFlights
  *
- * Further flights of the gains of each after which the difference, if it stays, would be decided.
+ * Further flights with the gains of each that would decide the comparison, if the difference stays the same.
  */
 export type FurtherFlights = {
     /**
@@ -1928,8 +1934,10 @@ export type JobState = 'queued' | 'running' | 'done' | 'failed' | 'cancelled';
 /**
  * LadderStep
  *
- * One step size tried along the search line: length in the strategy's own metric, gains flown on the model, and
- * the predicted error there; `clipped` names the gains that a bound or step limit stopped.
+ * One step size evaluated along the search line.
+ *
+ * `length` is in the strategy's own metric, `gains` are those simulated; `clipped` names the gains limited by a bound
+ * or the step limit.
  */
 export type LadderStep = {
     /**
@@ -1955,7 +1963,7 @@ export type LadderStep = {
 /**
  * LatestRun
  *
- * The newest finished run; its job says when it was started.
+ * The newest finished run; its job records when it was started.
  */
 export type LatestRun = {
     /**
@@ -2597,7 +2605,7 @@ export type Reproduction = {
 /**
  * ReproductionFigure
  *
- * A drawing of a reproduction, and what the paper calls it.
+ * A figure of a reproduction, and its title in the paper.
  */
 export type ReproductionFigure = {
     /**
@@ -2613,8 +2621,10 @@ export type ReproductionFigure = {
 /**
  * ReproductionRow
  *
- * One number: `measured` here, `paper` as published, `ratio` of the two; `reference` is what this program is held
- * to. `overruled` says why gains were flown that the gate refuses.
+ * One number of a result.
+ *
+ * `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of
+ * this program. `overruled` is the reason for flying gains that the gate refuses.
  */
 export type ReproductionRow = {
     /**
@@ -2676,9 +2686,9 @@ export type ReproductionRow = {
 /**
  * ReproductionSummary
  *
- * One experiment, table or figure of the paper. `line` says what is done here, `paper` what the paper shows.
+ * One experiment, table or figure of the paper. `line` describes what is done here, `paper` what the paper shows.
  *
- * `job` is the newest run that waits, runs, or failed after the `latest` one.
+ * `job` is the newest run that is queued or running, or that failed or was cancelled after the `latest` one.
  */
 export type ReproductionSummary = {
     /**
