@@ -48,7 +48,7 @@ SEEN_ALIKE = [
     ("px4", "an hour ahead", Stage.RECORD, "completed", ""),
     ("ardupilot", "deaf", Stage.RECORD, "invalid", "The vehicle began to land by itself"),
     ("px4", "mocap nan", Stage.RECORD, "invalid", "The second source of altitude did not see it"),
-    ("px4", "pilot for 1 s", Stage.RECORD, "completed", ""),
+    ("px4", "pilot for 1 s", Stage.RECORD, "invalid", "A person may have flown the vehicle"),
     ("ardupilot", "twin 3600 s older", Stage.RECORD, "invalid", "Two vehicles speak under one system id"),
 ]
 """Further ones, for the complete ring."""
