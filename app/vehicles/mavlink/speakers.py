@@ -22,6 +22,8 @@ _PEAK_OVER_S: Final = 10.0
 _AT_ONCE: Final = 16
 _LATE: Final = 100
 """A number that lies so little behind the latest, and was not used yet, is of a packet that was held up."""
+_LOST: Final = 3
+"""Numbers that may pass from one packet to the next at any rate; further ones take their time."""
 _OF_A_ROUND: Final = 0.9
 """The share of a round of sequence numbers after which one may come again."""
 
@@ -43,6 +45,7 @@ class DuplicateDetector:
         self._rate = _Rate()
         self._passed = 0
         self._latest: int | None = None
+        self._latest_s: float | None = None
         self._clocks: dict[int, tuple[float, float]] = {}
         self._clock = 0
         self._doubled_numbers: deque[float] = deque(maxlen=PIECES)
@@ -76,7 +79,9 @@ class DuplicateDetector:
         ahead = 0 if self._latest is None else (number - self._latest) % NUMBERS
         if ahead < NUMBERS // 2:
             self._latest = number
-            self._passed += ahead
+            since_s = 0.0 if self._latest_s is None else now_s - self._latest_s
+            self._passed += min(ahead, _LOST + int(self._rate.number_hz * since_s))
+            self._latest_s = now_s
             self._rate.pass_on(ahead, now_s)
         behind = NUMBERS - ahead
         is_late = behind <= _LATE and not is_taken
