@@ -12,6 +12,8 @@ NUMBERS: Final = 256
 WITHIN_S: Final = 2.0
 PIECES: Final = 6
 """So many pieces of evidence within that time, and it is certain."""
+LASTS_S: Final = 0.12
+"""Evidence that comes within less than this is one stream's that began fast: its rate is not known yet."""
 REMEMBERED_S: Final = 5.0
 """How long it stays certain once the evidence is gone."""
 
@@ -22,18 +24,14 @@ _PEAK_OVER_S: Final = 10.0
 _AT_ONCE: Final = 16
 _LATE: Final = 100
 """A number that lies so little behind the latest, and was not used yet, is of a packet that was held up."""
-_LOST: Final = 3
-"""Numbers that may pass from one packet to the next at any rate; further ones take their time."""
 _OF_A_ROUND: Final = 0.9
 """The share of a round of sequence numbers after which one may come again."""
 
 
 @dataclass(slots=True)
 class _Used:
-    """When a number was used, and how many numbers had passed by then."""
-
     at_s: float
-    passed: int
+    count: int
     frame: bytes
 
 
@@ -43,13 +41,12 @@ class DuplicateDetector:
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
         self._rate = _Rate()
-        self._passed = 0
-        self._latest: int | None = None
-        self._latest_s: float | None = None
+        self._count = 0
+        self._latest = -1
         self._clocks: dict[int, tuple[float, float]] = {}
         self._clock = 0
-        self._doubled_numbers: deque[float] = deque(maxlen=PIECES)
-        self._doubled_clocks: deque[float] = deque(maxlen=PIECES)
+        self._doubled_numbers: deque[float] = deque()
+        self._doubled_clocks: deque[float] = deque()
         self._certain_s: float | None = None
         self._why = ""
 
@@ -68,25 +65,25 @@ class DuplicateDetector:
         return self._why if is_recent else ""
 
     def _is_certain(self, evidence: deque[float], now_s: float) -> bool:
-        return len(evidence) == PIECES and now_s - evidence[0] < WITHIN_S
+        while evidence and now_s - evidence[0] >= WITHIN_S:
+            evidence.popleft()
+        return len(evidence) >= PIECES and evidence[-1] - evidence[0] >= LASTS_S
 
     def _hear_number(self, frame: bytes, number: int, now_s: float) -> bool:
         """Whether the packet came in its turn: not once more, nor later than others that were sent after it."""
+        self._count += 1
         used = self._used.get(number)
         is_taken = used is not None and self._is_of_this_round(used, now_s)
         if used is not None and is_taken and used.frame == frame:
             return False
-        ahead = 0 if self._latest is None else (number - self._latest) % NUMBERS
+        ahead = (number - self._latest) % NUMBERS
         if ahead < NUMBERS // 2:
             self._latest = number
-            since_s = 0.0 if self._latest_s is None else now_s - self._latest_s
-            self._passed += min(ahead, _LOST + int(self._rate.number_hz * since_s))
-            self._latest_s = now_s
             self._rate.pass_on(ahead, now_s)
         behind = NUMBERS - ahead
         is_late = behind <= _LATE and not is_taken
         late = behind if is_late else 0
-        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._passed - late, frame)
+        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late, frame)
         if is_taken:
             self._doubled_numbers.append(now_s)
         return not is_late
@@ -94,7 +91,7 @@ class DuplicateDetector:
     def _is_of_this_round(self, used: _Used, now_s: float) -> bool:
         """Whether the numbers cannot have come round since it was used."""
         round_s = _OF_A_ROUND * NUMBERS / self._rate.number_hz
-        return self._passed - used.passed < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
+        return self._count - used.count < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
 
     def _hear_clock(self, offset_s: float, now_s: float) -> None:
         """Evidence is a return: from another clock to one that was heard a moment ago."""
