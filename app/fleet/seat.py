@@ -122,14 +122,14 @@ class VehicleProcess:
 
     def _finish_order(self) -> None:
         """Nobody listens any more: a vehicle that was told to land, or to stop its motors, is told so while it has not
-        obeyed, is armed and is heard."""
+        obeyed and was armed when it was last heard."""
         until_s = self._call.clock.now_s() + STANDING_ORDER_TIMEOUT_S
         while self._is_disobeyed() and self._call.clock.now_s() < until_s:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
 
     def _is_disobeyed(self) -> bool:
         status = self._status()
-        return self._vehicle.has_standing_order and status.armed is True and status.state == "connected"
+        return self._vehicle.has_standing_order and status.armed is True
 
     def close(self) -> None:
         self._vehicle.close()

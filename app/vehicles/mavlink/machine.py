@@ -139,6 +139,8 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, asked_s=now_s)
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
+    if isinstance(event, ActionRefused):
+        return fail(_with_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
     if finding := findings.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(_with_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
@@ -205,9 +207,7 @@ def _disagreement(trial: Trial, now_s: float) -> Finding | None:
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
     why = ""
-    if isinstance(event, ActionRefused):
-        why = event.why
-    elif trial.armed_s is not None and watching.is_disarmed(trial.watch, trial.plan.limits):
+    if trial.armed_s is not None and watching.is_disarmed(trial.watch, trial.plan.limits):
         why = "It disarmed itself."
     elif trial.armed_s is None:
         late = trial.asked_s is not None and event.now_s - trial.asked_s > ARMED_WITHIN_S
@@ -417,7 +417,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     return (
         _taken_over(trial)
         or findings.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
-        or findings.find_interrupted_climb(watch, plan.limits)
+        or (findings.find_interrupted_climb(watch, plan.limits) if _modes(trial) else None)
         or findings.find_doubled(watch)
         or findings.find_link(watch, plan.limits, now_s)
         or findings.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
@@ -447,11 +447,19 @@ def _changed(trial: Trial) -> Finding | None:
 
 
 def _modes(trial: Trial) -> frozenset[str]:
-    """The modes that the vehicle may be in; any (empty) until a heartbeat that has certainly seen the command, and for
-    one that has not followed it: it stands in its mode from before."""
+    """The modes that the vehicle may be in; any (empty) until a heartbeat that has certainly seen what it was told, and
+    while it stays in its mode from before: it has not followed."""
     limits, watch = trial.plan.limits, trial.watch
-    has_stayed = not watch.lifted and watch.mode == trial.commanded_in
-    if trial.commanded_s is None or watch.heartbeat_s - trial.commanded_s < _MODE_KNOWN_S or has_stayed:
+    if trial.commanded_s is not None:
+        told_s = trial.commanded_s
+        has_stayed = not watch.lifted and watch.mode_since_s <= told_s + _MODE_KNOWN_S
+        has_stayed = has_stayed and watch.mode == trial.commanded_in
+    elif trial.state is State.ABORT_LAND:
+        told_s = trial.since_s
+        has_stayed = watch.mode_since_s <= told_s
+    else:
+        return frozenset()
+    if has_stayed or watch.heartbeat_s - told_s < _MODE_KNOWN_S:
         return frozenset()
     return limits.flying_modes | limits.landing_modes
 

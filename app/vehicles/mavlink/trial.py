@@ -8,13 +8,14 @@ from app.vehicles.base import Sample, ShouldStop, StopRequest
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import UNHEEDED
-from app.vehicles.mavlink.limits import DESCENDING_M_S, UNHEEDED_S
+from app.vehicles.mavlink.limits import UNHEEDED_S
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.measurements import Position
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.signals import (
     AbortRequested,
     Action,
+    ActionRefused,
     Command,
     DuplicateVehicleDetected,
     Event,
@@ -34,8 +35,12 @@ from app.vehicles.mavlink.watch import TrialObservation
 
 LISTEN_S: Final = 0.01
 """How long the loop is deaf to an abort, at the most."""
+SINKS_M: Final = 0.3
+"""A vehicle that has come down by less in five seconds does not land."""
 STALL_S: Final = 0.2
 """When this program itself stood still for so long, what came meanwhile is heard before silence is judged."""
+LONGEST_STALL_S: Final = 1.0
+"""When it stood still for longer before the take-off command, what was wanted then may not be wanted now."""
 _SAMPLE_EVERY_S: Final = 0.015
 """Of telemetry; records keep every sample."""
 
@@ -82,7 +87,8 @@ class TrialRunner:
         self._conversation: CommandSequence | None = None
         self._error: BaseException | None = None
         self._shown_s = float("-inf")
-        self._listened_s = radio.clock.now_s()
+        self._listened_s = self._sank_s = radio.clock.now_s()
+        self._sank_to_m = float("inf")
         self._trial, commands = begin(plan, watch, radio.clock.now_s())
         self._begin_with = commands
 
@@ -99,11 +105,16 @@ class TrialRunner:
     def trouble(self) -> str:
         """That it does not land, though it was told to; empty where there is nothing to say."""
         trial, now_s = self._trial, self._radio.clock.now_s()
-        last = trial.watch.last
-        if trial.state not in LANDING or now_s - trial.since_s < UNHEEDED_S or last is None:
+        if trial.state not in LANDING or now_s - self._sank_s < UNHEEDED_S:
             return ""
-        airborne = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-        return UNHEEDED if airborne and last.climb_rate_m_s >= DESCENDING_M_S else ""
+        return UNHEEDED if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m) else ""
+
+    def _note_sinking(self) -> None:
+        """Since when it has not come down by so much that it shows."""
+        trial, last = self._trial, self._trial.watch.last
+        altitude_m = float("inf") if last is None else last.altitude_m
+        if trial.state not in LANDING or altitude_m < self._sank_to_m - SINKS_M:
+            self._sank_s, self._sank_to_m = self._radio.clock.now_s(), altitude_m
 
     def fly(self) -> TrialResult:
         """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
@@ -124,9 +135,13 @@ class TrialRunner:
     def _listen(self) -> None:
         heard = self._radio.receive(LISTEN_S)
         now_s = self._radio.clock.now_s()
-        if now_s - self._listened_s > STALL_S:
+        stalled_s = now_s - self._listened_s
+        if stalled_s > STALL_S:
             heard += self._radio.receive(LISTEN_S)
         self._listened_s = now_s
+        if self._trial.state is State.ARM and stalled_s > LONGEST_STALL_S * self._radio.timeout_factor:
+            why = f"This program stood still for {stalled_s:.0f} s, so the take-off was not commanded."
+            self._advance(ActionRefused(Action.ARM, why, now_s))
         for each in in_order(heard, self._look()):
             if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):
                 self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
@@ -144,6 +159,7 @@ class TrialRunner:
             wanted = MotorsOffRequested if stop.motors_off else AbortRequested
             self._advance(wanted(stop.reason, self._radio.clock.now_s()))
         self._advance(Tick(self._radio.clock.now_s()))
+        self._note_sinking()
 
     def _wanted(self) -> StopRequest | None:
         """A failure of the program lands the vehicle; motors off counts more, also afterwards."""

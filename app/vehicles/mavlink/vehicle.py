@@ -84,6 +84,7 @@ class MavlinkVehicle:
         self._datum_m = 0.0
         self._flight: TrialRunner | None = None
         self._order: RepeatedCommand | None = None
+        self._gives_back = False
         self._lookout = None if source is None else AlignedAltitudeSource(source)
         overhear = None if source is None else source.on_message
         self._on_wait = on_wait
@@ -354,9 +355,14 @@ class MavlinkVehicle:
             self._why = f"{self._why} {change}"
 
     def _while_waiting(self, heard: list[PacketReceived]) -> None:
-        """What takes time keeps no order waiting, neither one that stands nor one that comes."""
+        """What takes time keeps no order waiting, neither one that stands nor one that comes. Giving the safe gains
+        back goes to its end all the same."""
         self._repeat_order(heard)
-        self._on_wait()
+        try:
+            self._on_wait()
+        except VehicleError:
+            if not self._gives_back:
+                raise
 
     def _repeat_order(self, heard: list[PacketReceived]) -> None:
         if self._order is not None:
@@ -453,12 +459,15 @@ class MavlinkVehicle:
         that is armed by now keeps what it has, and is observed."""
         if self._state in QUARANTINE_STATES:
             return
+        self._gives_back = True
         try:
             self.restore()
         except VehicleError as error:
             if self._state not in QUARANTINE_STATES:
                 self._enter(State.QUARANTINE)
                 self._why = f"Its safe gains could not be verified: {error}"
+        finally:
+            self._gives_back = False
 
     # ---- records
 
@@ -486,7 +495,7 @@ class MavlinkVehicle:
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
             reason=" ".join(
-                part for part in (reason, _KEPT_LANDING if self._order is not None else "", both.remark) if part
+                part for part in (reason, _KEPT_LANDING if self._asked == _KEPT_LANDING else "", both.remark) if part
             ),
             settings={**self._options, **both.settings},
         )

@@ -242,6 +242,42 @@ def test_a_vehicle_that_stays_on_the_ground_in_its_mode_from_before_did_not_lift
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
 
 
+def test_a_px4_that_stays_on_the_ground_in_hold_did_not_lift_off() -> None:
+    walk = TrialDriver(mode="hold", plan=PX4).arm().pass_s(1.6)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
+    assert not walk.trial.doubt
+    walk = TrialDriver(mode="hold", plan=replace(PX4, lift_off_s=8.0)).arm().pass_s(8.1)
+    assert (walk.state, walk.trial.failure, walk.trial.doubt) == (State.DISARM, Failure.NO_LIFT_OFF, "")
+
+
+def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
+    """Seen: it was lifted by a gust as it was armed; Land was sent against its pilot for 40 s."""
+    walk = TrialDriver(mode="64")
+    walk.give(ActionDone(Action.ARM, walk.now_s))
+    walk.armed = True
+    while walk.trial.armed_s is None:
+        walk.pass_s(STEP_S)
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(0.4)
+    walk.climb_rate_m_s = 0.0
+    while walk.state is not State.ABORT_LAND or not walk.when(Action.LAND):
+        walk.pass_s(STEP_S)
+    walk.mode = "land"
+    walk.pass_s(1.0)
+    heartbeat_of_a_pilot(walk)
+    told = len(walk.when(Action.LAND))
+    walk.pass_s(1.1)
+    assert (walk.state, len(walk.when(Action.LAND))) == (State.QUARANTINE, told)
+
+
+def test_a_pilot_who_took_a_vehicle_on_the_ground_and_brings_back_its_first_mode_has_it() -> None:
+    walk = TrialDriver(mode="64", plan=replace(PLAN, lift_off_s=8.0)).arm().pass_s(2.0)
+    walk.mode = "4"
+    walk.pass_s(1.1)
+    heartbeat_of_a_pilot(walk).pass_s(1.1)
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
+
+
 def test_a_pilot_who_takes_a_vehicle_on_the_ground_has_it() -> None:
     walk = TrialDriver(plan=replace(PLAN, lift_off_s=4.0)).arm()
     walk.mode = "64"

@@ -1,10 +1,13 @@
 """How a vehicle's motors are stopped, and how it comes down when it is told to land in its first seconds."""
 
+from contextlib import closing
+
 import pytest
 
 from app.vehicles.base import FlightOptions, FlightRecord, StopRequest
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import number
+from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.simdrone.autopilots.base import Autopilot
 from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
@@ -164,3 +167,51 @@ def aborted(vehicle: MavlinkVehicle, at_s: float) -> FlightRecord:
     watcher = Watcher(abort_at_s=at_s)
     vehicle.stage(TUNED)
     return vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
+
+
+class StallingRig(LockstepRig):
+    """The program stands still for five seconds as it listens for the first time to the armed vehicle."""
+
+    stalled = False
+
+    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        if self.drone.autopilot.armed and not self.stalled:
+            self.stalled = True
+            self.wait_s(5.0)
+        return super().read(timeout_s)
+
+
+def test_a_program_that_stood_still_while_it_armed_commands_no_take_off() -> None:
+    """Seen: it went through what had come meanwhile, took off five seconds late, and read the abort then."""
+    with StallingRig() as rig, connected(rig) as vehicle:
+        vehicle.stage(TUNED)
+        with pytest.raises(VehicleError, match="stood still for 5 s, so the take-off was not commanded") as failed:
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert failed.value.not_flown
+        assert rig.stalled
+        assert not rig.drone.autopilot.took_off
+        assert (vehicle.concern, vehicle.read_gains()) == ("", SAFE)
+
+
+def test_giving_back_the_safe_gains_goes_to_its_end_though_an_order_comes() -> None:
+    """Seen: the vehicle kept the trial's gains, and was quarantined, when Land was ordered in these two seconds."""
+    with LockstepRig() as rig:
+        waits: list[float] = []
+
+        def order() -> None:
+            if waits:
+                raise InterruptedByOrderError("It was interrupted: land was ordered.", hint="")
+
+        with closing(
+            MavlinkVehicle(rig.options(), SAFE, is_real=False, clock=rig, transport=rig, on_wait=order)
+        ) as vehicle:
+            vehicle.stage(TUNED)
+
+            def refuse() -> StopRequest | None:
+                waits.append(rig.now_s())
+                return StopRequest("not now")
+
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=refuse)
+            assert waits
+            waits.clear()
+            assert (vehicle.concern, vehicle.read_gains()) == ("", SAFE)
