@@ -1,4 +1,4 @@
-"""From a record to a classed trial: stored once, scored as stored, classed by the program where it may."""
+"""Capture of a flight: store its record, score it as stored, and classify it where the program may."""
 
 from dataclasses import asdict
 
@@ -26,13 +26,13 @@ def capture(
     reason: str = "",
     on_request: bool = False,
 ) -> None:
-    """Store a flight's record and class it: one that was `aborted` as that, with its `reason`, else by the program
-    where it may.
+    """Store a flight's record and classify the flight.
 
-    A flight of a real vehicle stays captured until a person has classed it, with the reason as a suggestion where the
-    measurement is `invalid`; and so does one with glitches in its record that can be scored. One that was broken off
-    `on_request` counts against its gains only once a person says that the vehicle behaved badly. Raises TrajectoryError
-    when the record cannot be stored.
+    An `aborted` flight is classified as that, with its `reason`; others are classified by the program where it may. A
+    flight of a real vehicle stays captured until a person classifies it, with the reason as a suggestion where the
+    measurement is `invalid`. A flight that can be scored but has glitches in its record stays captured too. A flight
+    that was aborted `on_request` counts against its gains only once a person says that the vehicle behaved badly.
+    Raises TrajectoryError when the record cannot be stored.
     """
     stored = history.store_trajectory(session, trajectory)
     row.trajectory = stored
@@ -56,7 +56,7 @@ def capture(
     if ending == "aborted":
         set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
         return
-    row.error = judged.error  # told before somebody classes the flight; classing scores it again
+    row.error = judged.error  # shown before a person classifies the flight, which scores it again
     if fleet.is_classed_automatically(campaign.vehicle):
         _classify(row, reason or "the measurement is no good" if ending == "invalid" else judged.refusal)
 

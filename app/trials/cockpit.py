@@ -1,8 +1,8 @@
-"""A process that flies: it opens one vehicle at a time, for the worker, which keeps the books.
+"""Flight process: opens one vehicle at a time and flies it for the worker, which keeps the database.
 
-A flight has a process of its own because JSBSim holds the interpreter's lock while it computes, cannot run on two
-threads at once, and must not take the worker with it when it breaks. The process never touches the database. When the
-worker dies, the pipe between them breaks: the flight is then aborted, its vehicle left with its safe gains.
+A flight has a process of its own because JSBSim holds the interpreter lock while it computes, cannot run in two threads
+at once, and must not take the worker down when it crashes. The process never touches the database. When the worker
+dies, the pipe between them breaks; the flight is then aborted and the vehicle left with its safe gains.
 """
 
 import math
@@ -38,12 +38,14 @@ from app.vehicles.jsbsim.kind import prepare
 from app.vehicles.open import open_vehicle
 
 LOCK_TIMEOUT_S: Final = 10.0
-"""How long a flight waits for another process that still has the vehicle (one whose worker was killed, landing)."""
+"""How long a flight waits for another process that still holds the vehicle, such as one that is landing it after its
+worker was killed."""
 SHUTDOWN_TIMEOUT_S: Final = 5.0
 
 
 class FlightProcess:
-    """The worker's handle of one such process. `stand_down` may be called from any thread and from signal handlers."""
+    """The worker's handle of one flight process. `cancel_flight` may be called from any thread and from signal
+    handlers."""
 
     def __init__(self) -> None:
         context = process_context()
@@ -54,9 +56,9 @@ class FlightProcess:
         theirs.close()
 
     def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        """What the process says, until it is free again; the caller answers Staged by `take_off` or `decline`.
+        """Send the request and yield the process's messages until it is free again.
 
-        Raises VehicleError when the process dies.
+        The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
         """
         try:
             self._send(orders)
@@ -71,7 +73,7 @@ class FlightProcess:
         return self._process.is_alive()
 
     def take_off(self) -> None:
-        self._tell(TakeOffCommand(by_s=math.inf))  # a simulation that begins late endangers nobody
+        self._tell(TakeOffCommand(by_s=math.inf))  # a late start of a simulation is harmless
 
     def cancel_take_off(self) -> None:
         self._tell(CancelTakeOff())
@@ -80,7 +82,7 @@ class FlightProcess:
         self._tell(CancelFlight(trial_id, reason))
 
     def close(self) -> None:
-        """Let the process end; it is killed when it does not."""
+        """Let the process end; kill it if it does not."""
         self._pipe.close()
         self._process.join(SHUTDOWN_TIMEOUT_S)
         if self._process.is_alive():
@@ -88,7 +90,7 @@ class FlightProcess:
             self._process.join()
 
     def _tell(self, message: TakeOffCommand | CancelTakeOff | CancelFlight) -> None:
-        with suppress(OSError):  # it is dead, which whoever listens to `fly` learns
+        with suppress(OSError):  # the process is dead: the caller of `fly` gets the error
             self._send(message)
 
     def _send(self, message: FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight) -> None:
@@ -97,7 +99,7 @@ class FlightProcess:
 
 
 class FlightProcessPool:
-    """Idle flight processes, so that a flight finds one with everything loaded. Thread-safe."""
+    """Pool of idle flight processes with everything imported. Thread-safe."""
 
     def __init__(self, *, spare: int = 1) -> None:
         self._spare = spare
@@ -109,7 +111,7 @@ class FlightProcessPool:
             return self._waiting.pop() if self._waiting else FlightProcess()
 
     def release(self, process: FlightProcess) -> None:
-        """One that is free again; of too many, one is closed."""
+        """Return a free process to the pool; it is closed when the pool is full."""
         with self._lock:
             if len(self._waiting) < self._spare:
                 self._waiting.append(process)
@@ -124,13 +126,15 @@ class FlightProcessPool:
 
 
 def _work(pipe: Connection) -> None:
-    """The process: one flight after the other, until the worker closes the pipe or dies. Until the first is there, it
-    loads what the usual vehicle needs."""
+    """Main loop of the process: one flight after another, until the worker closes the pipe or dies.
+
+    Imports what the most common vehicle needs while it waits for the first request.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     try:
         if not pipe.poll():
-            with suppress(GainlineError, ImportError):  # a flight that needs it says so
+            with suppress(GainlineError, ImportError):  # reported by the flight that needs it
                 prepare()
         while True:
             if isinstance(orders := pipe.recv(), FlightRequest):
@@ -157,7 +161,7 @@ def _fly(pipe: Connection, orders: FlightRequest) -> None:
         pipe.send(failure_from(error))
     except (EOFError, OSError):
         raise
-    except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
+    except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, the trial must get a definite end
         pipe.send(internal_error(error))
 
 
@@ -174,8 +178,10 @@ def _take_off(pipe: Connection, orders: FlightRequest, vehicle: Vehicle, standin
 
 
 def _listener(pipe: Connection, trial_id: int, standing_down: str | None, asked: set[str]) -> ShouldStop:
-    """Looks into the pipe, which takes microseconds, unless the flight is standing down already; why it is to end goes
-    into `asked`."""
+    """Return a stop callback that polls the pipe, which takes microseconds, and adds the reason to stop to `asked`.
+
+    With `standing_down` it stops the flight at once.
+    """
 
     def should_stop() -> StopRequest | None:
         stop = heard()

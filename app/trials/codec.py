@@ -1,7 +1,7 @@
-"""How a trajectory is stored: single-precision columns, bytes shuffled, compressed; readable for ever by its version.
+"""Storage format of a trajectory: single-precision columns, byte-shuffled and compressed, with a version number.
 
-Version 1: the columns (time first) as little-endian float32, shape (columns, samples); the four bytes of the numbers of
-each column are gathered plane by plane, because neighbouring samples share their high bytes; zstd level 3 over all.
+Version 1: the columns (time first) as little-endian float32, shape (columns, samples). The four bytes of each column's
+numbers are gathered plane by plane, because neighbouring samples share their high bytes; then zstd level 3 over all.
 The checksum is the SHA-256 of the column names, a NUL, and the plain float32 bytes.
 """
 
@@ -27,7 +27,7 @@ Table = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Packed:
-    """A trajectory as it goes into the database."""
+    """A trajectory as stored in the database."""
 
     codec: int
     columns: list[str]
@@ -40,7 +40,10 @@ class Packed:
 
 
 def pack(trajectory: Trajectory) -> Packed:
-    """Raises TrajectoryError when single precision cannot hold it: too large a number, or time stamps that collapse."""
+    """Pack a trajectory for storage.
+
+    Raises TrajectoryError when single precision cannot hold it: a number is too large, or time stamps collapse.
+    """
     columns = [_TIME, *trajectory.channels]
     with np.errstate(over="ignore"):
         table = np.vstack([trajectory.time_s, *trajectory.channels.values()]).astype("<f4")
@@ -60,7 +63,7 @@ def pack(trajectory: Trajectory) -> Packed:
 
 
 def unpack(packed: Packed) -> Trajectory:
-    """The trajectory, every number as single precision holds it. Raises StorageError when the record is damaged."""
+    """Unpack a stored trajectory in single precision. Raises StorageError when the record is damaged."""
     if packed.codec != VERSION:
         raise StorageError(
             f"A flight record has the unknown version {packed.codec}.",

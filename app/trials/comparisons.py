@@ -1,4 +1,4 @@
-"""A flight's gains against the best before it and against the first ones, with the scatter of repeats allowed for."""
+"""Comparison of a flight's gains with the best before it and with the first, given the scatter of repeated flights."""
 
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,9 +16,9 @@ CONFIDENCE: Final = 0.9
 
 
 class ReferenceFlights:
-    """The valid flights that a campaign's trials are held against, each found without a search however many there are.
+    """The valid flights that a campaign's trials are compared with, indexed for constant or logarithmic lookup.
 
-    `valid` holds them in their order, `prior` is the experiment's scatter.
+    `valid` are the flights in their order, `prior` is the experiment's scatter.
     """
 
     def __init__(self, valid: Sequence[Flight], prior: Scatter) -> None:
@@ -31,26 +31,28 @@ class ReferenceFlights:
         self.scatter: Final[PooledScatter | None] = pool_scatter(groups, prior) if groups else None
 
     def best_before(self, number: int) -> tuple[float, int] | None:
-        """Error and number of the best flight before that one."""
+        """Error and number of the best flight before the given one."""
         before = bisect_left(self._numbers, number)
         return self._best_so_far[before - 1] if before else None
 
     def first_before(self, number: int) -> int | None:
-        """The first flight, where it was before that one."""
+        """Number of the first flight, if it is before the given one."""
         return self._numbers[0] if self._numbers and self._numbers[0] < number else None
 
     def group_of(self, number: int) -> Group | None:
-        """All flights with the gains of that flight."""
+        """All flights with the gains of the given flight."""
         return self._by_number.get(number)
 
     def group_with(self, gains: Gains) -> Group | None:
-        """All flights of those gains."""
+        """All flights of the given gains."""
         return self._by_gains.get(_key(gains))
 
 
 def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]:
-    """Against the best flight before it, then against the first; without those of the same gains. Each side counts with
-    all its flights."""
+    """Comparisons with the best flight before this one, then with the first; flights of the same gains are left out.
+
+    Each side counts with all flights of its gains.
+    """
     own = field.group_of(row.number)
     if own is None or field.scatter is None:
         return []

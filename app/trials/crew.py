@@ -1,9 +1,9 @@
-"""What the worker and a process that flies say to each other, whoever that process is.
+"""Messages between the worker and a process that flies a vehicle, whichever kind of process that is.
 
     worker    FlightRequest →             → TakeOffCommand | CancelTakeOff →
     process                   GainsStaged →   Telemetry … FlightLanded → SafeGainsRestored → FlightFinished
 
-`CancelFlight` may come at any moment; in place of what is missing comes `FlightFailure`.
+`CancelFlight` may come at any moment; `FlightFailure` takes the place of the messages that do not come.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -22,8 +22,10 @@ from app.vehicles.errors import SafeGainsError, VehicleError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRequest:
-    """Everything the process needs to know of one flight. `lock` is held while it has the vehicle; a vehicle that can
-    keeps a log of its link in `tlog`."""
+    """Everything the process needs for one flight.
+
+    `lock` is held while the process has the vehicle; `tlog` is where a vehicle that supports it logs its link.
+    """
 
     campaign_id: int
     trial_id: int
@@ -39,27 +41,29 @@ class FlightRequest:
 
 @dataclass(frozen=True, slots=True)
 class GainsStaged:
-    """Said by the process, which then waits for TakeOffCommand or CancelTakeOff."""
+    """From the process, which then waits for TakeOffCommand or CancelTakeOff."""
 
     read_back: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class TakeOffCommand:
-    """Said to the process: the gains are right and the lift-off is recorded; not to be carried out after `by_s` of this
-    computer's monotonic clock."""
+    """To the process: the gains are verified and the lift-off is recorded.
+
+    Not to be carried out after `by_s` of this computer's monotonic clock, s.
+    """
 
     by_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class CancelTakeOff:
-    """Said to the process: this flight does not take place."""
+    """To the process: this flight does not take place."""
 
 
 @dataclass(frozen=True, slots=True)
 class CancelFlight:
-    """Said to the process at any moment: end this flight now. One that was to take off ends on the ground."""
+    """To the process, at any moment: end this flight now. A vehicle that has not taken off stays on the ground."""
 
     trial_id: int
     reason: str
@@ -67,22 +71,24 @@ class CancelFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlightLanded:
-    """Said by the process: the flight's record."""
+    """From the process: the flight's record."""
 
     record: FlightRecord
 
 
 @dataclass(frozen=True, slots=True)
 class SafeGainsRestored:
-    """Said by the process, however the flight ended: the vehicle was given its safe gains and holds these."""
+    """From the process, however the flight ended: the safe gains were written, and these were read back."""
 
     held: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class FlightFailure:
-    """Said by the process: what went wrong; `unsafe` when the safe gains could not be verified afterwards, `not_flown`
-    when the vehicle was never told to take off."""
+    """From the process: what went wrong.
+
+    `unsafe`: the safe gains could not be verified afterwards. `not_flown`: no take-off command was sent to the vehicle.
+    """
 
     what: str
     unsafe: bool
@@ -91,7 +97,7 @@ class FlightFailure:
 
 @dataclass(frozen=True, slots=True)
 class FlightFinished:
-    """Said by the process: this flight is over, the next one may come."""
+    """From the process: this flight is over, and the process is free for the next."""
 
 
 FlightMessage = (
@@ -106,9 +112,9 @@ class FlightBackend(Protocol):
     def alive(self) -> bool: ...
 
     def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        """What the process says, until it is free again; the caller answers Staged by `take_off` or `decline`.
+        """Send the request and yield the process's messages until it is free again.
 
-        Raises VehicleError when the process dies.
+        The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
         """
         ...
 
@@ -116,13 +122,13 @@ class FlightBackend(Protocol):
     def cancel_take_off(self) -> None: ...
     def cancel_flight(self, trial_id: int, reason: str) -> None: ...
     def close(self) -> None:
-        """Let the process end: what flies is aborted and left with its safe gains."""
+        """Let the process end: a running flight is aborted and the vehicle left with its safe gains."""
         ...
 
 
 def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
-    """The record; it says so where the flight was broken off for one of these reasons that were given from here, and
-    not for a limit."""
+    """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
+    by the worker, and not for a limit."""
     said = record.reason.removeprefix(MOTORS_OFF_ASKED)
     asked = record.ending == "aborted" and any(said.startswith(reason) for reason in reasons)
     return replace(record, on_request=asked)
@@ -136,21 +142,24 @@ def process_died_error(exit_code: int | None) -> VehicleError:
 
 
 def failure_from(error: GainlineError) -> FlightFailure:
-    """What went wrong, as the error tells it; first why it was not flown, where the error followed upon that."""
+    """Build the failure message of an error.
+
+    If the error followed from a refusal to fly, the refusal comes first.
+    """
     refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
     what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
     return FlightFailure(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """The error, and those that were being handled when it was raised."""
+    """The error and its chain of contexts: those that were being handled when it was raised."""
     while error is not None:
         yield error
         error = error.__context__
 
 
 def internal_error(error: Exception) -> FlightFailure:
-    """What the program did wrong, for a truthful end of the trial."""
+    """Failure message of an internal error, so that the trial gets a definite end."""
     return FlightFailure(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False)
 
 
@@ -158,8 +167,11 @@ def internal_error(error: Exception) -> FlightFailure:
 def hold_vehicle_lock(
     lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True, clock: Clock = REAL_TIME
 ) -> Iterator[None]:
-    """The vehicle is this process's alone; one whose worker was killed may still be landing it, and is waited for while
-    that is `wanted`. Raises VehicleError."""
+    """Hold the vehicle's lock, so that this process has the vehicle to itself.
+
+    Another process whose worker was killed may still be landing the vehicle: waits for its lock for at most `within_s`
+    seconds and while `wanted()`. Raises VehicleError when the lock is not free by then.
+    """
     deadline_s = clock.now_s() + within_s
     try:
         with exclusive(lock, keep_waiting=lambda: wanted() and clock.now_s() < deadline_s, clock=clock):

@@ -1,16 +1,17 @@
-"""A flight's way through the database, for the worker that carries it out.
+"""States of a flight in the database, as the worker that carries it out records them.
 
     claim_flight → record_staged → record_lift_off → record_landing
                        │                  ├→ record_loss
-                       │                  └→ record_failure   (never told to take off: it would not arm)
-                       ├→ record_failure      (not flown: the vehicle refused, or took other gains)
-                       └→ record_withdrawal   (not flown: somebody ended it before lift-off)
+                       │                  └→ record_failure   (no take-off command was sent: it would not arm)
+                       ├→ record_failure      (not flown: the vehicle refused, or read back other gains)
+                       └→ record_withdrawal   (not flown: it was ended before lift-off)
 
 A flight of mode `stage` waits between record_staged and record_lift_off, for `take_off_wanted` or `stand_down_wanted`.
-`record_restored` says that the safe gains are back, whatever came before. `give_up_flight` serves wherever the flight
-stands: before lift-off it was not flown, afterwards it is lost.
+`record_restored` records that the safe gains were read back, whatever came before. `give_up_flight` may be called at
+any stage: before lift-off the flight was not flown, after it the flight is lost.
 
-What the vehicle is asked stands in the flight row before it is sent; what it answers, as soon as it is known.
+What is sent to the vehicle is stored in the flight row before it is sent; what the vehicle answers, as soon as it is
+known.
 """
 
 from collections.abc import Mapping
@@ -34,7 +35,7 @@ from app.trials.states import FlightMode, FlightState, TrialState
 from app.vehicles.base import FlightRecord, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
-"""How old a request may be when a worker takes it."""
+"""Maximum age of a request when a worker claims it."""
 
 _WORKER_ENDED: Final = {True: "the worker ended while it flew", False: "the worker ended before lift-off"}
 _NOT_VERIFIED: Final = "whoever had it ended before its safe gains were read back, so nobody knows which gains it holds"
@@ -42,8 +43,10 @@ _NOT_VERIFIED: Final = "whoever had it ended before its safe gains were read bac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightTask:
-    """Everything that a worker needs for one flight, apart from the database. One of mode `stage` waits, once its gains
-    are read back, until `take_off_wanted` or `stand_down_wanted`."""
+    """Everything that a worker needs for one flight besides the database.
+
+    A flight of mode `stage` waits, once its gains are read back, for `take_off_wanted` or `stand_down_wanted`.
+    """
 
     flight_id: int
     trial_id: int
@@ -60,9 +63,9 @@ class FlightTask:
 
 
 def claim_flight(session: Session, worker: str) -> FlightTask | None:
-    """The flight that has waited longest, now this worker's; None when none waits.
+    """Claim the oldest requested flight for this worker; None when there is none.
 
-    A flight begins when its operator expects it or not at all: one that could not be begun at once is withdrawn.
+    A flight must begin when its operator expects it: a request older than REQUEST_TIMEOUT is withdrawn.
     """
     while (flight := repository.first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
@@ -72,7 +75,8 @@ def claim_flight(session: Session, worker: str) -> FlightTask | None:
 
 
 def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
-    """At a worker's start: nothing takes off that was asked for while there was nobody to fly it. Gives their ids."""
+    """Withdraw all requested flights at a worker's start, because nothing may take off that was requested while no
+    worker ran. Returns their ids."""
     withdrawn: list[int] = []
     while (flight := repository.first_requested(session)) is not None:
         _withdraw(flight, reason)
@@ -108,7 +112,7 @@ def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightTask:
 
 
 def record_staged(session: Session, flight_id: int, read_back: dict[str, float]) -> None:
-    """The vehicle has answered with the gains that it holds. Raises ConflictError when the trial was cancelled."""
+    """Record the gains that the vehicle read back. Raises ConflictError when the trial was cancelled."""
     flight = _running(session, flight_id)
     flight.read_back = flight.trial.read_back = read_back
     fleet.hold_gains(flight.vehicle, read_back)
@@ -117,16 +121,20 @@ def record_staged(session: Session, flight_id: int, read_back: dict[str, float])
 
 
 def take_off_wanted(session: Session, flight_id: int) -> bool:
-    """Whether the operator of a staged flight has asked for its take-off, within the last 10 s: nothing takes off later
-    than its operator expects it. False also for a flight that is to stand down, or no longer runs."""
+    """Whether the operator of a staged flight has requested its take-off within REQUEST_TIMEOUT (10 s).
+
+    Nothing takes off later than its operator expects. False also for a flight that is to stand down or is not running.
+    """
     flight = repository.get_flight(session, flight_id)
     return _may_take_off(flight) and stand_down_wanted(session, flight_id) is None
 
 
 def stand_down_wanted(session: Session, flight_id: int) -> str | None:
-    """Why a staged flight is not to take place: unstaged, its trial cancelled, or a take-off that was asked for and
-    could not be begun in time; None while it may. The worker then restores the safe gains and calls
-    `record_withdrawal` with this reason."""
+    """Why a staged flight is not to take place; None while it may.
+
+    Reasons: it was unstaged, its trial was cancelled, or its take-off was requested and could not begin in time. The
+    worker then restores the safe gains and calls `record_withdrawal` with this reason.
+    """
     flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return f"the flight is {flight.state}"
@@ -146,11 +154,11 @@ def _may_take_off(flight: FlightRow) -> bool:
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:
-    """The vehicle is about to be told to take off; from here on a landing or a loss follows, or word that it was never
-    told.
+    """Record that the take-off command is about to be sent.
 
-    Raises ConflictError when the trial was cancelled or unstaged, when the gains read back are not the trial's, or when
-    a staged flight lacks its operator's word.
+    After this the flight lands, is lost, or fails because the command was not sent after all. Raises ConflictError when
+    the trial was cancelled or unstaged, when the gains read back are not the trial's, or when the operator of a staged
+    flight has not requested the take-off.
     """
     flight = _running(session, flight_id)
     trial = flight.trial
@@ -169,9 +177,9 @@ def record_lift_off(session: Session, flight_id: int) -> None:
 
 
 def record_landing(session: Session, flight_id: int, record: FlightRecord) -> None:
-    """Store the record, class the flight (a simulated one at once), and have the next gains computed.
+    """Store the record, classify the flight (a simulated one at once), and have the next gains computed.
 
-    Doing it twice is harmless. Raises TrajectoryError when the record cannot be stored.
+    Idempotent. Raises TrajectoryError when the record cannot be stored.
     """
     flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
@@ -184,7 +192,7 @@ def record_landing(session: Session, flight_id: int, record: FlightRecord) -> No
 
 
 def record_loss(session: Session, flight_id: int, problem: str) -> None:
-    """Nobody knows how the flight ended. A real vehicle is quarantined; the operator decides what becomes of it."""
+    """Record that it is unknown how the flight ended. A real vehicle is quarantined; the operator decides about it."""
     flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
@@ -195,37 +203,45 @@ def record_loss(session: Session, flight_id: int, problem: str) -> None:
 
 
 def record_failure(session: Session, flight_id: int, problem: str) -> None:
-    """It was not flown: the vehicle could not be opened, refused, took other gains, or was never told to take off. The
-    trial is as planned."""
+    """Record that the flight did not take place; its trial is planned again.
+
+    The vehicle could not be opened, refused, read back other gains, or was sent no take-off command.
+    """
     _not_flown(session, flight_id, FlightState.FAILED, problem)
 
 
 def record_withdrawal(session: Session, flight_id: int, reason: str) -> None:
-    """It was not flown: somebody ended it before lift-off. The trial is as planned."""
+    """Record that the flight was ended before lift-off; its trial is planned again."""
     _not_flown(session, flight_id, FlightState.CANCELLED, reason)
 
 
 def quarantine_vehicle(session: Session, flight_id: int, concern: str) -> None:
-    """After a flight whose safe gains could not be verified. The vehicle flies nothing until a person releases it."""
+    """Quarantine the vehicle after a flight whose safe gains could not be verified; it stays grounded until a person
+    releases it."""
     fleet.set_state_after_flight(repository.get_flight(session, flight_id).vehicle, concern=concern)
 
 
 def doubt_vehicle(session: Session, flight_id: int) -> None:
-    """After a flight at whose end nobody said that the safe gains are restored. A real vehicle is quarantined; a
-    simulated one starts afresh with every flight."""
+    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored.
+
+    A simulated vehicle starts afresh with every flight.
+    """
     if repository.get_flight(session, flight_id).vehicle.is_real:
         quarantine_vehicle(session, flight_id, _NOT_VERIFIED)
 
 
 def record_restored(session: Session, flight_id: int, held: Mapping[str, float]) -> None:
-    """After a flight, however it ended: the vehicle was given its safe gains, and holds these."""
+    """Record the safe gains that the vehicle read back after a flight, however the flight ended."""
     flight = repository.get_flight(session, flight_id)
     flight.restored, flight.restored_at = dict(held), utc_now()
     fleet.hold_gains(flight.vehicle, held)
 
 
 def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
-    """Nothing more is heard of a flight: it is lost, or was not flown if it had not lifted off. Whether it is lost."""
+    """End a flight that no more messages will come from: lost if it had lifted off, else not flown.
+
+    Returns whether it is lost.
+    """
     lifted_off = repository.get_flight(session, flight_id).trial.state == TrialState.FLYING
     if lifted_off:
         record_loss(session, flight_id, problem)
@@ -236,7 +252,10 @@ def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
 
 
 def lose_running_flights(session: Session) -> list[int]:
-    """At a worker's start: what flew is lost, what was only staged is planned again. Gives the lost trials' ids."""
+    """End the flights that were running when the previous worker ended; called at a worker's start.
+
+    Those in the air are lost; the trials of those only staged are planned again. Returns the ids of the lost trials.
+    """
     return [
         flight.trial_id
         for flight in repository.running(session)
@@ -245,7 +264,7 @@ def lose_running_flights(session: Session) -> list[int]:
 
 
 def recover_record(session: Session, flight_id: int, record: FlightRecord) -> None:
-    """The record of a flight that was given up for lost has been found. Harmless when it is stored already.
+    """Store the record of a flight that had been given up as lost. Idempotent.
 
     Raises TrajectoryError when it cannot be stored.
     """

@@ -1,4 +1,4 @@
-"""What a flight shows of itself while it lasts, and how it is told to end: all in memory, nothing waits."""
+"""Live telemetry of a flight and requests to abort it, all in memory so that nothing blocks."""
 
 from collections.abc import Callable
 from typing import Final
@@ -16,34 +16,35 @@ Publish = Callable[[PublishedMessage], None]
 
 
 class AbortFlag:
-    """Put up once, from any thread; whoever flies is told at once."""
+    """Request to end one flight. Set once, from any thread; the listener is notified at once."""
 
     def __init__(self) -> None:
         self.reason: str | None = None
         self._tell: Callable[[str], None] = lambda _reason: None
 
     def set(self, reason: str) -> None:
-        """The first reason counts."""
+        """Set the flag; only the first reason counts."""
         if self.reason is None:
             self.reason = reason or "aborted"
             self._tell(self.reason)
 
     def add_listener(self, tell: Callable[[str], None]) -> None:
-        """Who is to be told: of what comes, or of what is there already."""
+        """Set the listener; it is called at once if the flag is set already."""
         self._tell = tell
         if self.reason is not None:
             tell(self.reason)
 
 
 class AbortRegistry:
-    """The flights of this process, by trial. Safe from any thread and from signal handlers: it takes no lock."""
+    """Abort flags of the flights of this process, by trial. Lock-free: safe from any thread and from signal
+    handlers."""
 
     def __init__(self) -> None:
         self._flags: dict[int, AbortFlag] = {}
         self._closed: str | None = None
 
     def register(self, trial_id: int) -> AbortFlag:
-        """The trial's flag; it is set already in a closed registry."""
+        """Return the trial's flag; in a closed registry it is set already."""
         flag = self._flags.setdefault(trial_id, AbortFlag())
         if self._closed is not None:
             flag.set(self._closed)
@@ -53,14 +54,14 @@ class AbortRegistry:
         self._flags.pop(trial_id, None)
 
     def abort(self, trial_id: int, reason: str) -> bool:
-        """Whether that trial is being flown here, and so ends now."""
+        """Abort the trial's flight. Returns whether that trial is being flown here."""
         if (flag := self._flags.get(trial_id)) is None:
             return False
         flag.set(reason)
         return True
 
     def abort_all(self, reason: str) -> None:
-        """End every flight, and those to come."""
+        """End every flight, and every flight registered later."""
         self._closed = reason
         for flag in tuple(self._flags.values()):
             flag.set(reason)
@@ -70,10 +71,10 @@ class AbortRegistry:
 
 
 class FlightMonitor:
-    """Gathers one flight's samples and publishes them in at most 25 messages a second, with the error so far.
+    """Collects one flight's samples and publishes them in at most 25 messages a second, with the error so far.
 
     The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral
-    where the experiment's error is one), and no further than the experiment scores; the flight's own error is computed
+    where the experiment's error is one), within the time that the experiment scores. The flight's own error is computed
     from its full-rate record.
     """
 
@@ -108,7 +109,7 @@ class FlightMonitor:
             self.flush()
 
     def flush(self) -> None:
-        """Send what has been gathered."""
+        """Publish the collected samples."""
         if self._rows:
             rows, self._rows = self._rows, []
             self._publish(

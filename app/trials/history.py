@@ -1,4 +1,4 @@
-"""A campaign's trials as others read them: the flights a proposal is computed from, the best, the stored records."""
+"""Queries on a campaign's trials: the flights that a proposal is computed from, the best trial, the stored records."""
 
 import hashlib
 import json
@@ -27,7 +27,7 @@ FLOWN: Final = frozenset(
 
 
 BEST_ERROR: Final = repository.BEST_ERROR
-"""For the list of campaigns: the lowest error of a campaign's valid trials, as an expression on its row."""
+"""Lowest error of a campaign's valid trials, as an SQL expression on the campaign's row; for the list of campaigns."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -36,12 +36,12 @@ def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
 
 
 def list_gate_results(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
-    """Of each trial its number, its state, and whether the gate passed its gains; by number."""
+    """Number, state, and whether the gate passed the gains, of each trial; by number."""
     return repository.gated(session, campaign_id)
 
 
 def curves_of(session: Session, trials: Sequence[TrialRow]) -> Mapping[int, list[list[float]]]:
-    """The coarse curves of those of the trials that have one, as [time_s, value] pairs by trial."""
+    """Coarse curves of those of the trials that have one, as [time_s, value] pairs by trial id."""
     return repository.curves(session, [row.id for row in trials])
 
 
@@ -56,8 +56,11 @@ def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
 
 
 def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight | None:
-    """The flight a warm start comes from: valid and scored from its record, whatever it is classed as now, since what
-    is computed from it may depend on nothing else. None when the record is not the one the checksum names."""
+    """The flight that a warm start begins from; None when its record does not match the checksum.
+
+    Valid and scored from its record, whatever its present class, because the computed start may depend on the record
+    alone.
+    """
     rows = [row for row in trials_of(session, donor.campaign_id) if row.number == donor.trial_number]
     if not rows or rows[0].trajectory is None or rows[0].trajectory.checksum != donor.checksum:
         return None
@@ -67,12 +70,12 @@ def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight |
 
 
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
-    """The same flights with nothing in their trajectories, for checks that look at gains only."""
+    """The flights without samples, for checks that look at gains only."""
     return tuple(_flight(row, _NOTHING) for row in in_history(trials))
 
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
-    """The scored ones in their order, with nothing but their gains and errors: quickly read, however many."""
+    """The scored flights in their order, with gains and errors only, so that many are read quickly."""
     return tuple(
         Flight(number=number, gains=gains, trajectory=_NOTHING, error=error, outcome="valid")
         for number, gains, error in repository.scored(session, campaign_id)
@@ -80,12 +83,13 @@ def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
 
 
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
-    """The trials that are history: valid and aborted."""
+    """The valid and the aborted trials."""
     return [row for row in trials if row.state in HISTORY]
 
 
 def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
-    """The voltage, V, at which the trial that flew last ended, whatever it is classed as; None where nothing told it.
+    """Battery voltage, V, at the end of the most recently flown trial, whatever its class; None when it was not
+    measured.
 
     Trials need not fly in the order of their numbers.
     """
@@ -94,9 +98,11 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 
 
 def history_digest(session: Session, campaign_id: int, definition: Definition, trials: Sequence[TrialRow]) -> str:
-    """SHA-256 over everything that a proposal is computed from, the checksums of the trials' records among it; differs
-    as soon as any of it does. Whether an abort counts against its gains stands in it only where it does not, so that
-    digests from before that was known still hold."""
+    """SHA-256 over everything that a proposal is computed from, including the checksums of the trials' records.
+
+    Whether an abort counts against its gains is included only where it does not count, so that digests made before that
+    was recorded stay the same.
+    """
     checksums = repository.checksums(session, campaign_id)
     flights = [
         [
@@ -117,45 +123,45 @@ def history_digest(session: Session, campaign_id: int, definition: Definition, t
 
 
 def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:
-    """The campaign's flight that is asked for or running."""
+    """The campaign's flight that is requested or running."""
     return repository.flight_of_campaign_under_way(session, campaign_id)
 
 
 def any_flight_under_way(session: Session) -> FlightRow | None:
-    """A flight of any campaign that is asked for, staged or flying."""
+    """A flight of any campaign that is requested or running."""
     return repository.first_under_way(session)
 
 
 def has_begun_flight(session: Session, campaign_id: int) -> bool:
-    """Whether a worker has begun any flight of the campaign, so that its vehicle's ledger needs it."""
+    """Whether a worker has claimed any flight of the campaign; its vehicle's ledger then refers to it."""
     return repository.has_claimed_flight(session, campaign_id)
 
 
 def drop_unbegun_flights(session: Session, campaign_id: int) -> None:
-    """Flights that were asked for and withdrawn; no vehicle ever heard of them."""
+    """Delete flights that were requested and withdrawn; nothing was ever sent to a vehicle for them."""
     repository.delete_unclaimed_flights(session, campaign_id)
 
 
 def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
-    """The valid trial with the lowest error, the earliest of equals."""
+    """The valid trial with the lowest error; the earliest one of equal errors."""
     valid = [(row.error, row.number, row) for row in trials if row.state == TrialState.VALID and row.error is not None]
     return min(valid, key=lambda found: found[:2])[2] if valid else None
 
 
 def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:
-    """The captured flight that waits for its class, which blocks the next proposal."""
+    """The captured trial that waits for its review, which blocks the next proposal."""
     return next((row for row in trials if row.state == TrialState.CAPTURED), None)
 
 
 def record_of(session: Session, row: TrialRow) -> Trajectory:
-    """A trial's whole record. Raises NotFoundError when it has none, StorageError when it is damaged."""
+    """Full record of a trial. Raises NotFoundError when it has none, StorageError when it is damaged."""
     if row.trajectory_id is None:
         raise NotFoundError("record of trial", row.id, hint=f"The trial is {row.state}; only flights leave a record.")
     return _recorded(row, repository.samples_of(session, [row.trajectory_id])[row.trajectory_id])
 
 
 def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
-    """A stored trajectory, checked against its checksum."""
+    """A stored trajectory, verified against its checksum."""
     return unpacked(repository.samples_of(session, [trajectory_id])[trajectory_id])
 
 
@@ -165,7 +171,7 @@ def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[i
 
 
 def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
-    """The same without those that are damaged, for what can do without them."""
+    """Several stored trajectories, by id, without the damaged ones."""
     found: dict[int, Trajectory] = {}
     for identity, row in repository.samples_of(session, trajectory_ids).items():
         with suppress(StorageError):
@@ -174,7 +180,10 @@ def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, 
 
 
 def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
-    """Written once; the database refuses any change. Raises TrajectoryError when single precision cannot hold it."""
+    """Store a trajectory; the database refuses any later change.
+
+    Raises TrajectoryError when single precision cannot hold it.
+    """
     packed = pack(trajectory)
     row = TrajectoryRow(
         codec=packed.codec,
@@ -192,7 +201,7 @@ def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
 
 
 def unpacked(row: TrajectoryRow) -> Trajectory:
-    """A stored record, checked against its checksum. Raises StorageError when it is damaged."""
+    """A stored record, verified against its checksum. Raises StorageError when it is damaged."""
     return unpack(
         Packed(
             codec=row.codec,
@@ -208,7 +217,7 @@ def unpacked(row: TrajectoryRow) -> Trajectory:
 
 
 def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
-    """Raises StorageError naming the trial when its record is damaged."""
+    """Unpack a trial's record. Raises StorageError that names the trial when the record is damaged."""
     try:
         return unpacked(record)
     except StorageError as error:
@@ -232,7 +241,7 @@ def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
 
 
 def _is_against_gains(row: TrialRow) -> bool:
-    """Of an aborted trial; one that was not says nothing here."""
+    """Whether an aborted trial counts against its gains; True for every other trial."""
     return row.state != TrialState.ABORTED or row.abort_cause not in NOT_AGAINST_GAINS
 
 

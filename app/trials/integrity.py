@@ -1,4 +1,4 @@
-"""Whether what is stored of the flights is still what was written: every record against its own checksum."""
+"""Integrity of stored flight records: every record is verified against its checksum."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -18,7 +18,7 @@ _AT_ONCE: Final = 20
 
 
 def is_intact(row: TrajectoryRow) -> bool:
-    """Whether its samples are those that its checksum was made of."""
+    """Whether the record's samples match its checksum."""
     try:
         history.unpacked(row)
     except StorageError:
@@ -27,12 +27,12 @@ def is_intact(row: TrajectoryRow) -> bool:
 
 
 def damaged_trials(session: Session, campaign_id: int | None = None) -> list[TrialRow]:
-    """The trials of one campaign, or of all, whose record is damaged, in the order of campaigns and numbers."""
+    """Trials of one campaign, or of all, whose record is damaged; by campaign and number."""
     return [row for row, record in _recorded(session, campaign_id) if not is_intact(record)]
 
 
 def require_intact(database_file: Path) -> None:
-    """Raises StorageError naming every trial whose record is damaged in this database."""
+    """Verify all records of a database. Raises StorageError that names every trial whose record is damaged."""
     with closing(Database(database_file)) as database, database.read() as session:
         damaged = damaged_trials(session)
         if damaged:
@@ -40,7 +40,7 @@ def require_intact(database_file: Path) -> None:
 
 
 def refused_for(damaged: Sequence[TrialRow], what: str) -> StorageError:
-    """What was not done, because of the damaged records of these trials."""
+    """Error that says what was not done because these trials' records are damaged."""
     names = [f"trial {row.number} of campaign {row.campaign_id}" for row in damaged]
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     records = "the record of" if len(names) == 1 else f"{len(names)} records are damaged, those of"
@@ -54,7 +54,7 @@ def refused_for(damaged: Sequence[TrialRow], what: str) -> StorageError:
 
 
 def _recorded(session: Session, campaign_id: int | None) -> Iterator[tuple[TrialRow, TrajectoryRow]]:
-    """Trials with their records, a few at a time: all of them need not fit into memory."""
+    """Trials with their records, loaded in batches because all of them may not fit into memory."""
     rows = repository.recorded(session, campaign_id)
     for first in range(0, len(rows), _AT_ONCE):
         some = rows[first : first + _AT_ONCE]

@@ -1,4 +1,4 @@
-"""The gate before a trial: gains of one's own and proposals through it, and refusals that an operator overrules."""
+"""The gate before a trial, for a person's own gains and for proposals, and refusals that an operator overrules."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,10 @@ from app.vehicles.open import get_kind
 
 @dataclass(frozen=True, slots=True)
 class GateDecision:
-    """Gains, complete and in order, that may fly: the gate's answer as it is stored, and why it was overruled, empty
-    where it let them pass."""
+    """Gains that may fly, complete and in order.
+
+    `gate` is the gate's result as stored; `overrule_reason` is why a refusal was overruled, empty if the gate passed.
+    """
 
     gains: dict[str, float]
     gate: JsonObject
@@ -28,25 +30,25 @@ class GateDecision:
 def check_own_gains(
     session: Session, campaign: CampaignRow, asked: Gains, *, overrule: str | None = None
 ) -> GateDecision:
-    """Gains of one's own, judged over what was known of the vehicle when the latest proposal was computed.
+    """Check a person's own gains, given what was known of the vehicle when the latest proposal was computed.
 
-    Takes a tenth of a second. Raises GainsError naming what is refused, with what would pass.
+    Takes about 0.1 s. Raises GainsError that names what is refused and what would pass.
     """
     gains, gate = _asked(session, campaign, asked)
     return _judged(campaign, gains, gate, overrule)
 
 
 def check_flown_gains(session: Session, campaign: CampaignRow, flown: Gains) -> GateDecision:
-    """Gains that have flown elsewhere: what the gate says of them, whether or not it would have let them fly.
+    """Check gains that were flown elsewhere; returns the gate's result whether or not they pass.
 
-    Raises GainsError when they are none of the campaign's.
+    Raises GainsError when they are not the campaign's gains.
     """
     gains, gate = _asked(session, campaign, flown)
     return GateDecision(gains, proposing.gate_json(gate), "")
 
 
 def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
-    """The gains, complete and in order, and the gate's answer."""
+    """The gains, complete and in order, and the gate's result."""
     definition = definition_of(campaign)
     experiment, space = experiment_of(definition), proposing.space_of(definition)
     gains = space.complete(asked)
@@ -65,7 +67,10 @@ def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[
 
 
 def check_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> GateDecision:
-    """A proposal that still holds: it was judged on this very history. Raises GainsError as `check_own_gains` does."""
+    """Decide on a fresh proposal by its stored gate result, which was computed on the same history.
+
+    Raises GainsError as `check_own_gains` does.
+    """
     return _judged(campaign, proposal.gains, proposing.gate_of(proposal.gate), overrule)
 
 

@@ -1,4 +1,4 @@
-"""The moves of trials and flights, by their tables and by nothing else."""
+"""State changes of trials and flights; only those in the transition tables are possible."""
 
 from collections.abc import Iterable
 
@@ -9,14 +9,17 @@ from app.trials.states import ACTIVE_STATES, FLIGHT_TRANSITIONS, TRANSITIONS, UN
 
 
 def set_trial_state(row: TrialRow, to: TrialState, *, reason: str | None = None) -> None:
-    """Raises ConflictError when the states' table does not lead there. A reason replaces the one before."""
+    """Change a trial's state; a given reason replaces the previous one.
+
+    Raises ConflictError when the transition is not in the table.
+    """
     row.state = check_transition(TRANSITIONS, row.state, to, f"Trial {row.number}")
     if reason is not None:
         row.reason = reason
 
 
 def set_flight_state(row: FlightRow, to: FlightState, *, problem: str = "") -> None:
-    """Raises ConflictError when the states' table does not lead there."""
+    """Change a flight's state. Raises ConflictError when the transition is not in the table."""
     row.state = check_transition(FLIGHT_TRANSITIONS, row.state, to, f"Flight {row.id}")
     row.problem = problem
     if to not in ACTIVE_STATES:
@@ -24,9 +27,9 @@ def set_flight_state(row: FlightRow, to: FlightState, *, problem: str = "") -> N
 
 
 def cancel_unflown(trials: Iterable[TrialRow], flight: FlightRow | None, reason: str) -> None:
-    """Give up whatever has not flown, with `flight`, where it belongs to one of them and no worker has begun it.
+    """Cancel all trials that have not flown, and `flight` if it belongs to one of them and is not claimed yet.
 
-    A worker that has begun it finds its trial cancelled before the lift-off, and stands down.
+    A worker that has claimed the flight finds its trial cancelled before lift-off and stands down.
     """
     for row in trials:
         if row.state in UNFLOWN:

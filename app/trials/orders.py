@@ -1,5 +1,4 @@
-"""Asking for flights, from their request to the operator's last word before the take-off. The worker's side is in
-`flights`."""
+"""Requests for flights, from the first to the operator's take-off request. The worker's side is in `flights`."""
 
 from collections.abc import Collection
 from contextlib import suppress
@@ -26,26 +25,28 @@ from app.trials.views import trial_view
 
 
 def warm_gate_cache(session: Session, trial_id: int) -> None:
-    """Let the gate simulate before `fly_trial` and `stage_trial` ask it within their transaction."""
+    """Run the gate's simulations before the transaction of `fly_trial` or `stage_trial` needs the results."""
     with suppress(GainlineError):
         row = repository.get_one(session, trial_id)
         check_own_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
 
 
 def fly_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext) -> Trial:
-    """Ask for the flight of a planned trial in one go; the worker carries it out.
+    """Request the flight of a planned trial without staging; the worker carries it out.
 
-    Raises ConflictError for an unclassed flight, a spent budget, a campaign that is over or not ready, a vehicle that
-    is not ready or in somebody else's control; GainsError naming what the gate refuses, unless that was overruled;
-    BusyError when the vehicle has a flight already; NotAllowedError for a real vehicle.
+    Raises ConflictError for an unclassified flight, a spent budget, a campaign that is over or not ready, a vehicle
+    that is not ready or under another operator's control; GainsError that names what the gate refuses, unless that was
+    overruled; BusyError when the vehicle has a flight already; NotAllowedError for a real vehicle.
     """
     return _request_trial_flight(session, trial_id, "fly", order.speed, context)
 
 
 def stage_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
-    """Have a registered vehicle take the gains of a planned trial, and wait with them for its operator's word.
+    """Request that a registered vehicle takes the gains of a planned trial and waits for its operator's take-off
+    request.
 
-    Raises as `fly_trial` does; NotAllowedError for who may not command the vehicle."""
+    Raises as `fly_trial` does, and NotAllowedError when the client may not command the vehicle.
+    """
     return _request_trial_flight(session, trial_id, "stage", None, context)
 
 
@@ -71,7 +72,7 @@ def request_flight(
     mode: FlightMode = "fly",
     speed: float | None = None,
 ) -> None:
-    """The order to the vehicle, for the worker to find. Raises as `fly_trial` does."""
+    """Add the flight row that the worker claims. Raises as `fly_trial` does."""
     vehicle = campaign.vehicle
     if mode == "stage" and not vehicle.registered:
         raise ConflictError(f"{vehicle.name} is flown in one go.", hint="Fly it; only registered vehicles are staged.")
@@ -103,11 +104,11 @@ def request_flight(
 
 
 def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
-    """The operator's own act, after which a staged vehicle takes off. For a real one it has to come from a page of
-    ours in an unlocked browser on this computer, with the token of who is in control.
+    """Request the take-off of a staged vehicle: the operator's own act.
 
-    Raises ConflictError when nothing is staged, the word was given already, somebody else is in control, or the
-    rehearsal does not stand any more; NotAllowedError otherwise.
+    For a real vehicle the request has to come from Gainline's own page in an unlocked browser on this computer, with
+    the token of the operator in control. Raises ConflictError when nothing is staged, the take-off was requested
+    already, another operator is in control, or the rehearsal is no longer satisfied; NotAllowedError otherwise.
     """
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "take-off", row.state, f"Trial {row.number}")
@@ -117,7 +118,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> 
     vehicle = campaign.vehicle
     if fleet.needs_staging(vehicle):
         require_control(vehicle, context)
-        rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may have been found bad while staged
+        rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may be reclassified while staged
     else:
         require_may_command(vehicle, context)
         require_not_controlled_by_other(vehicle, context)
@@ -126,8 +127,10 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> 
 
 
 def unstage_trial(session: Session, trial_id: int) -> Trial:
-    """Have a staged vehicle's safe gains restored; its trial is planned again once they are. Raises ConflictError when
-    nothing is staged."""
+    """Request that a staged vehicle's safe gains are restored; its trial is then planned again.
+
+    Raises ConflictError when nothing is staged.
+    """
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "unstage", row.state, f"Trial {row.number}")
     _staged(session, row).stand_down = "unstaged by the operator"
@@ -146,8 +149,10 @@ def _staged(session: Session, row: TrialRow) -> FlightRow:
 
 
 def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer:
-    """Abort a flight that no worker has begun; one that is over needs none. Raises ConflictError when none was asked
-    for, or its worker does not answer."""
+    """Abort a flight that no worker has claimed; a flight that is over is left as it is.
+
+    Raises ConflictError when no flight was requested, or when the worker that flies it does not answer.
+    """
     row = repository.get_one(session, trial_id)
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
@@ -167,7 +172,7 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
 
 
 def cancel_trial(session: Session, trial_id: int) -> Trial:
-    """Give up a trial before its lift-off. Raises ConflictError when it is too late for that."""
+    """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
     row = repository.get_one(session, trial_id)
     check_action(ACTIONS, "cancel", row.state, f"Trial {row.number}")
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
@@ -178,7 +183,7 @@ def cancel_trial(session: Session, trial_id: int) -> Trial:
 
 
 def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
-    """Raises ConflictError unless the campaign can take another trial now; those in `spent_by` use up its budget."""
+    """Raise ConflictError unless the campaign can take another trial now; trials in `spent_by` use up its budget."""
     check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
     trials = history.trials_of(session, campaign.id)
     budget = definition_of(campaign).stop.max_flights

@@ -1,4 +1,4 @@
-"""Photos of flights, kept as they were handed in."""
+"""Photos of flights, stored as uploaded."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -13,7 +13,7 @@ from app.trials.schemas import TrialPhoto
 MAX_BYTES: Final = 10 * 2**20
 MAX_PER_TRIAL: Final = 20
 ENDINGS: Final = {"image/jpeg": "jpg", "image/png": "png", "image/webp": "webp"}
-"""Media types that every browser shows, and the endings of their files' names."""
+"""File extensions by media type; every browser shows these types."""
 _JPEG: Final = b"\xff\xd8\xff"
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 _RIFF, _WEBP = b"RIFF", b"WEBP"
@@ -21,7 +21,7 @@ _RIFF, _WEBP = b"RIFF", b"WEBP"
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A photo's bytes, and the name it is handed out under."""
+    """A photo's bytes and its file name for download."""
 
     media_type: str
     data: bytes
@@ -29,7 +29,7 @@ class Picture:
 
 
 def media_type_of(content: bytes) -> str | None:
-    """What a picture is by its first bytes, whatever it is called; None where it is none that is taken."""
+    """Media type of a picture by its first bytes, whatever its file name; None if it is not an accepted type."""
     if content.startswith(_JPEG):
         return "image/jpeg"
     if content.startswith(_PNG):
@@ -40,8 +40,11 @@ def media_type_of(content: bytes) -> str | None:
 
 
 def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
-    """Raises NotFoundError; TooLargeError, MediaTypeError or InputError for what is no photo; ConflictError when the
-    trial has as many as it may have."""
+    """Add a photo to a trial.
+
+    Raises NotFoundError; TooLargeError, MediaTypeError or InputError when the content is not an acceptable photo;
+    ConflictError when the trial has the maximum number of photos.
+    """
     trial = repository.get_one(session, trial_id)
     if len(content) > MAX_BYTES:
         size = f"{MAX_BYTES / 2**20:g} MiB"
@@ -70,7 +73,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
 
 
 def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:
-    """In the order in which they were added. Raises NotFoundError."""
+    """Photos of a trial in the order in which they were added. Raises NotFoundError."""
     return [_view(row) for row in repository.photos(session, repository.get_one(session, trial_id).id)]
 
 

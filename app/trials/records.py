@@ -1,4 +1,4 @@
-"""Records of flights made elsewhere: the gains that a log says it was flown with, held against those of the trial."""
+"""Gains in an imported log, compared with those of its trial."""
 
 import math
 from collections.abc import Mapping
@@ -13,16 +13,15 @@ from app.logs.takeoffs import Takeoff
 from app.trials.judging import check_flown_gains
 
 _SINGLE_PRECISION: Final = 1e-6
-"""Logs carry gains as single-precision numbers."""
+"""Logs store gains as single-precision numbers."""
 
 
 def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
-    """Have the trial say what the log does about its gains.
+    """Set the trial's gains to what the log says.
 
-    A log without gains leaves them as planned. Where both differ and that is `confirmed`, the trial becomes one of the
-    gains that were flown, without the prediction for the others; gains under other names are kept beside it.
-
-    Raises UnconfirmedError naming both sets, GainsError when what was flown is outside the campaign's bounds.
+    A log without gains leaves them as planned. Where the sets differ and that is `confirmed`, the trial takes the gains
+    that were flown and loses the prediction for the planned ones; gains under other names are stored as read back only.
+    Raises UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
     """
     if not flown.gains:
         return
@@ -44,7 +43,7 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
 
 
 def _alike(planned: Gains, flown: Gains) -> bool:
-    """Whether both sets name the same gains."""
+    """Whether both sets have the same gain names."""
     return planned.keys() == flown.keys()
 
 

@@ -16,7 +16,7 @@ BEST_ERROR: Final = (
     .correlate(CampaignRow)
     .scalar_subquery()
 )
-"""The lowest error of a campaign's valid trials, as an expression on the campaign's row."""
+"""Lowest error of a campaign's valid trials, as an SQL expression on the campaign's row."""
 
 
 def get_one(session: Session, trial_id: int) -> TrialRow:
@@ -27,8 +27,11 @@ def get_one(session: Session, trial_id: int) -> TrialRow:
 
 
 def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[TrialRow]:
-    """Their trials in the order of their numbers. What is large and seldom wanted of all of them (the gate's word,
-    curves, settings, the records' descriptions) is read when it is asked for."""
+    """Trials of the campaigns, by campaign and number.
+
+    Large columns that are seldom needed for all trials (gate result, curve, settings, read-back gains) are loaded on
+    access.
+    """
     return session.scalars(
         select(TrialRow)
         .where(TrialRow.campaign_id.in_(campaign_ids))
@@ -38,33 +41,33 @@ def of_campaigns(session: Session, campaign_ids: Collection[int]) -> Sequence[Tr
 
 
 def checksums(session: Session, campaign_id: int) -> Mapping[int, str]:
-    """Of those trials that left a record its checksum, by trial."""
+    """Checksums of the trials' records, by trial id."""
     wanted = select(TrialRow.id, TrajectoryRow.checksum).join(TrialRow.trajectory)
     return dict(session.execute(wanted.where(TrialRow.campaign_id == campaign_id)).all())
 
 
 def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
-    """Of each trial its number, its state, and whether the gate passed its gains; by number."""
+    """Number, state, and whether the gate passed the gains, of each trial; by number."""
     wanted = select(TrialRow.number, TrialRow.state, TrialRow.gate["passed"].as_boolean())
     found = session.execute(wanted.where(TrialRow.campaign_id == campaign_id).order_by(TrialRow.number))
     return [(number, state, bool(passed)) for number, state, passed in found]
 
 
 def curves(session: Session, trial_ids: Collection[int]) -> Mapping[int, list[list[float]]]:
-    """The coarse curves of those trials that have one, by trial."""
+    """Coarse curves of those trials that have one, by trial id."""
     wanted = select(TrialRow.id, TrialRow.curve).where(TrialRow.id.in_(trial_ids), TrialRow.curve.is_not(None))
     return {identity: curve for identity, curve in session.execute(wanted) if curve}
 
 
 def page(session: Session, campaign_id: int, *, after_number: int, limit: int) -> tuple[Sequence[TrialRow], int]:
-    """The trials after that number, one more than `limit`, and the number of all."""
+    """The next `limit` + 1 trials after the given number, and the total count."""
     total = session.scalar(select(func.count()).where(TrialRow.campaign_id == campaign_id)) or 0
     rows = session.scalars(
         select(TrialRow)
         .where(TrialRow.campaign_id == campaign_id, TrialRow.number > after_number)
         .options(
             defer(TrialRow.curve),
-            # It is stored behind the samples: SQLite would walk through all their pages to it.
+            # This column is stored behind the samples: to read it, SQLite would walk through all their pages.
             joinedload(TrialRow.trajectory).defer(TrajectoryRow.created_at),
         )
         .order_by(TrialRow.number)
@@ -74,7 +77,7 @@ def page(session: Session, campaign_id: int, *, after_number: int, limit: int) -
 
 
 def scored(session: Session, campaign_id: int) -> Sequence[tuple[int, GainsJson, float]]:
-    """Number, gains and error of every valid trial, in their order."""
+    """Number, gains and error of every valid trial; by number."""
     wanted = select(TrialRow.number, TrialRow.gains, TrialRow.error).where(
         TrialRow.campaign_id == campaign_id, TrialRow.state == TrialState.VALID, TrialRow.error.is_not(None)
     )
@@ -97,7 +100,7 @@ def next_number(session: Session, campaign_id: int) -> int:
 
 
 def recorded(session: Session, campaign_id: int | None = None) -> Sequence[TrialRow]:
-    """The trials of one campaign, or of all, that left a record, by campaign and number."""
+    """Trials of one campaign, or of all, that have a record; by campaign and number."""
     wanted = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
     if campaign_id is not None:
         wanted = wanted.where(TrialRow.campaign_id == campaign_id)
@@ -108,7 +111,7 @@ def recorded(session: Session, campaign_id: int | None = None) -> Sequence[Trial
 
 
 def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
-    """The records with their samples, by id."""
+    """Records with their samples, by id."""
     rows = session.scalars(
         select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids)).options(undefer(TrajectoryRow.data))
     )
@@ -116,7 +119,7 @@ def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int
 
 
 def photos(session: Session, trial_id: int) -> Sequence[TrialPhotoRow]:
-    """Without what they show, in the order in which they were added."""
+    """Photos without their picture data, in the order in which they were added."""
     return session.scalars(
         select(TrialPhotoRow).where(TrialPhotoRow.trial_id == trial_id).order_by(TrialPhotoRow.id)
     ).all()
@@ -143,12 +146,12 @@ def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRo
 
 
 def first_under_way(session: Session) -> FlightRow | None:
-    """Of whatever vehicle."""
+    """The first active flight of any vehicle."""
     return session.scalar(select(FlightRow).where(FlightRow.state.in_(ACTIVE_STATES)).order_by(FlightRow.id).limit(1))
 
 
 def first_requested(session: Session) -> FlightRow | None:
-    """The flight that has waited longest."""
+    """The oldest requested flight."""
     return session.scalar(
         select(FlightRow).where(FlightRow.state == FlightState.REQUESTED).order_by(FlightRow.id).limit(1)
     )
@@ -159,13 +162,13 @@ def running(session: Session) -> Sequence[FlightRow]:
 
 
 def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:
-    """The last flight of each trial that has one, by trial."""
+    """The last flight of each trial that has one, by trial id."""
     last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
     return {row.trial_id: row for row in session.scalars(select(FlightRow).where(FlightRow.id.in_(last)))}
 
 
 def flight_ids(session: Session, trial_id: int) -> Sequence[int]:
-    """The newest first."""
+    """Flight ids of a trial, newest first."""
     return session.scalars(
         select(FlightRow.id).where(FlightRow.trial_id == trial_id).order_by(FlightRow.id.desc())
     ).all()

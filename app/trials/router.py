@@ -46,7 +46,7 @@ def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: Cur
 
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
 def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: NewTrial) -> Trial:
-    """Plan a trial of the proposal or of gains of one's own, and fly it at once if asked to."""
+    """Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once."""
     return act(
         Trial,
         lambda session: service.create_trial(session, campaign_id, body, asking),
@@ -67,8 +67,8 @@ def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
 
 @router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
 def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: FlightOrder | None = None) -> Trial:
-    """Ask for the flight of a planned trial in one go. A vehicle that has a flight already refuses a second one, and a
-    real one refuses every one: it is staged."""
+    """Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
+    for a real vehicle, which has to be staged."""
     return act(
         Trial,
         lambda session: orders.fly_trial(session, trial_id, body or FlightOrder(), asking),
@@ -78,7 +78,7 @@ def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body
 
 @router.post("/trials/{trial_id}/stage", status_code=status.HTTP_202_ACCEPTED)
 def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
-    """Have a registered vehicle take the gains of a planned trial, read them back, and wait for its operator."""
+    """Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator."""
     return act(
         Trial,
         lambda session: orders.stage_trial(session, trial_id, asking),
@@ -94,14 +94,14 @@ def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
 
 @router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
 def take_off_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
-    """The operator's own act: a staged vehicle takes off. For a real one it is taken only from the dashboard's own
-    page, on this computer, with the token of who is in control."""
+    """Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
+    own page on this computer, with the token of the operator in control."""
     return act(Trial, lambda session: orders.take_off_trial(session, trial_id, asking))
 
 
 @router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)
 async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body: Abort | None = None) -> AbortAnswer:
-    """End a flight now. Goes straight to the worker and waits for no storage; asking again is harmless."""
+    """End a flight now. Goes straight to the worker without waiting for storage; may be repeated."""
     reason = (body or Abort()).reason
     if live.worker_running and (await live.abort(trial_id, reason)).accepted:
         return AbortAnswer(
@@ -117,26 +117,26 @@ def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAns
 
 @router.post("/trials/{trial_id}/cancel")
 def cancel_trial(act: IdempotentPost, trial_id: Id) -> Trial:
-    """Give up a trial that has not flown."""
+    """Cancel a trial that has not flown."""
     return act(Trial, lambda session: orders.cancel_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/classify")
 def classify_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: Classification) -> Trial:
-    """Say what a finished flight is worth; whatever was computed from it is computed again."""
+    """Classify a finished flight as valid, aborted or invalid; whatever was computed from it is recomputed."""
     return act(Trial, lambda session: service.classify_trial(session, trial_id, body, asking))
 
 
 @router.post("/trials/{trial_id}/judge-abort")
 def judge_abort(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: AbortJudgement) -> Trial:
-    """Say why the operator broke a flight off. It counts against its gains only if the vehicle behaved badly; whatever
-    was computed from it is computed again."""
+    """Record why the operator aborted a flight. It counts against its gains only if the vehicle behaved badly; whatever
+    was computed from it is recomputed."""
     return act(Trial, lambda session: service.judge_abort(session, trial_id, body, asking))
 
 
 @router.get("/trials/{trial_id}/trajectory")
 def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(ge=10, le=20_000)] = 1000) -> Trajectory:
-    """The record thinned to at most so many points, peaks kept."""
+    """The record, thinned to at most `points` samples with peaks kept."""
     return service.get_trajectory(session, trial_id, points)
 
 
@@ -153,7 +153,7 @@ def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(g
     },
 )
 def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
-    """The whole record, every number exactly as it is stored (single precision, nine digits)."""
+    """The full record as CSV, every number exactly as stored (single precision, nine digits)."""
     export = service.export_trajectory(session, trial_id)
     return Response(
         export.csv,
@@ -171,7 +171,8 @@ def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
     responses={200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}},
 )
 def get_telemetry_log(session: Reader, settings: CurrentSettings, trial_id: Id) -> FileResponse:
-    """Everything that went over the link in the trial's last flight, both ways, as ground stations write it (.tlog)."""
+    """The .tlog of the trial's last flight: all messages over the link in both directions, in the format of ground
+    stations."""
     log = service.find_telemetry_log(session, trial_id, settings.data_dir)
     return FileResponse(log.file, media_type="application/octet-stream", filename=log.name)
 
@@ -188,7 +189,7 @@ def list_photos(session: Reader, trial_id: Id) -> list[TrialPhoto]:
     responses={200: {"content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in photos.ENDINGS}}},
 )
 def get_photo(session: Reader, trial_id: Id, photo_id: Id) -> Response:
-    """A picture as it was handed in; opened by itself it may run nothing and load nothing."""
+    """A picture as uploaded. Its headers keep it from running or loading anything when it is opened by itself."""
     picture = photos.get_picture(session, trial_id, photo_id)
     return Response(
         picture.data,
@@ -207,7 +208,7 @@ def delete_photo(session: Writer, trial_id: Id, photo_id: Id) -> None:
 
 
 records = APIRouter(prefix="/api", tags=["trials"])
-"""Apart from the rest, because what comes in here is no JSON."""
+"""A router of its own, because the request bodies are not JSON."""
 
 
 @records.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
@@ -220,11 +221,11 @@ def upload_trajectory(
         bool, Query(description="take a log that was flown with other gains; the trial then has those")
     ] = False,
 ) -> Trial:
-    """Hand in the record of a flight made elsewhere, or the recovered one of a lost flight.
+    """Upload the record of a flight made elsewhere, or the recovered record of a lost flight.
 
     A log (MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data, with its .log as the form field `companion`), in
     which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
-    and optionally the other channels, at most 200 000 rows. It is scored and classed at once.
+    and optionally the other channels, at most 200 000 rows. It is scored and classified at once.
     """
     flown = service.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(
@@ -234,7 +235,8 @@ def upload_trajectory(
 
 @records.post("/trials/{trial_id}/photos", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)
 def add_photo(upload: Record, trial_id: Id) -> TrialPhoto:
-    """Add a photo (JPEG, PNG or WebP, told by its content; at most 10 MiB) to a flight, as the form field `file`."""
+    """Add a photo (JPEG, PNG or WebP, detected by its content; at most 10 MiB) to a flight, as the form field
+    `file`."""
     upload.file.seek(0)
     content = upload.file.read(photos.MAX_BYTES + 1)
     return upload.once(TrialPhoto, lambda session: photos.add_photo(session, trial_id, content))

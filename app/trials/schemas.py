@@ -1,4 +1,4 @@
-"""What trials and trajectories look like from outside."""
+"""API schemas of trials and trajectories."""
 
 from datetime import datetime
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000
 
 
 class FlightOrder(Request):
-    """How a simulated flight is to run: simulated time over wall time, null as fast as possible."""
+    """Speed of a simulated flight: simulated time over wall time; null: as fast as possible."""
 
     speed: Speed | None = 10.0
 
@@ -22,8 +22,8 @@ Variant = Literal["smaller step", "repeat", "baseline"]
 
 
 class NewTrial(Request):
-    """A trial of a proposal, of gains of one's own, or of a variant: exactly one of the three. With `fly` it is flown
-    at once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
+    """A trial of a proposal, of your own gains, or of a variant: exactly one of the three. With `fly` it is flown at
+    once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
     `baseline`, the first flight's gains again."""
 
     proposal_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)] | None = None
@@ -38,7 +38,7 @@ class NewTrial(Request):
 
 
 class TrialEdit(Request):
-    """A person's note."""
+    """A change of a trial's note."""
 
     version: Version
     note: Text
@@ -54,7 +54,7 @@ class TrialPhoto(BaseModel):
 
 
 class Classification(Request):
-    """A person's word on a finished flight."""
+    """A person's review of a finished flight."""
 
     version: Version
     outcome: Literal["valid", "aborted", "invalid"]
@@ -62,21 +62,21 @@ class Classification(Request):
 
 
 class AbortJudgement(Request):
-    """The operator's word on a flight that they broke off: whether it counts against its gains."""
+    """The operator's reason for aborting a flight, which decides whether it counts against its gains."""
 
     version: Version
     cause: Literal["behaved badly", "something else"]
 
 
 class Abort(Request):
-    """Why the flight is to end now."""
+    """Why the flight is to be aborted."""
 
     reason: Annotated[str, Field(max_length=500)] = "aborted by the operator"
 
 
 class AbortAnswer(BaseModel):
-    """`accepted` is true when the worker has taken the abort, or the flight is over without it; the flight's end is
-    reported by its events."""
+    """Answer to an abort. `accepted` is true when the worker has accepted the abort, or the flight is over already; the
+    flight's end is reported by its events."""
 
     trial_id: int
     accepted: bool
@@ -84,8 +84,8 @@ class AbortAnswer(BaseModel):
 
 
 class RecordBrief(BaseModel):
-    """The stored record of a flight, without its samples. `ending`: whether the flight was broken off, or its
-    measurement is no good."""
+    """The stored record of a flight, without its samples. `ending`: whether the flight was completed, was aborted, or
+    has an invalid measurement."""
 
     samples: int
     ending: Ending
@@ -98,8 +98,8 @@ class RecordBrief(BaseModel):
 
 
 class FlightBrief(BaseModel):
-    """The last order to the vehicle for this trial. `problem` says why it failed. One of mode `stage` waits with its
-    gains on the vehicle until its operator asks for the take-off."""
+    """The last flight requested for this trial. `problem` says why it failed. A flight of mode `stage` waits with its
+    gains on the vehicle until its operator requests the take-off."""
 
     id: int
     state: FlightState
@@ -113,8 +113,8 @@ class FlightBrief(BaseModel):
 
 
 class GroupBrief(BaseModel):
-    """The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
-    campaign, null while that is not known."""
+    """The valid flights of one gain set: their mean and its standard error, from the scatter pooled over the campaign;
+    null while that is not known."""
 
     mean: float
     standard_error: float | None
@@ -122,9 +122,9 @@ class GroupBrief(BaseModel):
 
 
 class TrialComparison(BaseModel):
-    """The flight's gains against those of another one, each with all their flights. `difference` is this − other;
-    `confidence` is that of the likelier direction, and decides from 90 % on; null, as the standard error is, while
-    nobody knows how much flights scatter."""
+    """The flight's gains compared with those of another one, each with all their flights. `difference` is this − other.
+    `confidence` is that of the likelier direction; 90 % or more decides. `confidence` and `standard_error` are null
+    while the scatter of flights is not known."""
 
     against: Literal["best before", "first"]
     trial_number: int
@@ -135,7 +135,7 @@ class TrialComparison(BaseModel):
 
 
 class Glitch(BaseModel):
-    """What the record cannot have seen: between the last good sample before it and the first good one after."""
+    """A part of the record that cannot be real, between the last good sample before it and the first good one after."""
 
     kind: Literal["acceleration", "frozen", "gap", "disagreement"]
     start_s: float
@@ -144,7 +144,7 @@ class Glitch(BaseModel):
 
 
 class Trial(BaseModel):
-    """One flight of one policy. `error` is the performance measure, lower is better."""
+    """One flight of one policy. `error` is the performance measure; lower is better."""
 
     id: int
     version: int
@@ -191,7 +191,7 @@ class Trial(BaseModel):
 
 
 class Trajectory(BaseModel):
-    """A flight's record, thinned to the asked number of points; every channel has as many values as `time_s`."""
+    """A flight's record, thinned to the requested number of points; every channel has as many values as `time_s`."""
 
     trial_id: int
     source: str

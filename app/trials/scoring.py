@@ -1,4 +1,4 @@
-"""What a flight's record says about the flight: its error, its overshoot, a coarse curve."""
+"""Score of a flight's record: its error, its overshoot, a coarse curve."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -13,7 +13,7 @@ CURVE_POINTS: Final = 48
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """`error` in the experiment's unit, or None and `refusal`, the reason why there is none."""
+    """Score of a record. `error` is in the experiment's unit, or None with the reason in `refusal`."""
 
     error: float | None
     refusal: str
@@ -22,7 +22,7 @@ class Score:
 
 
 def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool = False) -> Score:
-    """Judge a record as it is stored. With `accept_gaps` a person has said that its gaps do no harm."""
+    """Score a record as stored. `accept_gaps`: a person has decided that its gaps are harmless."""
     error, refusal = None, ""
     try:
         error = experiment.error(trajectory, accept_gaps=accept_gaps)
@@ -34,8 +34,10 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
 
 
 def _overshoot(experiment: Experiment, trajectory: Trajectory) -> float | None:
-    """How far the output went beyond its last set point; zero when it stayed below. None without samples, and where the
-    set point is zero: there is nothing to rise to."""
+    """Overshoot of the output over its last set point; zero when it stayed below.
+
+    None without samples, and where the set point is zero, because there is no rise.
+    """
     if experiment.output not in trajectory.channels:
         return None
     flown = trajectory[experiment.output][trajectory.time_s >= 0.0]

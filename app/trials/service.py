@@ -1,4 +1,4 @@
-"""What people and scripts do with trials. The worker's side of a flight is in `flights`."""
+"""Operations on trials for clients: people and scripts. The worker's side of a flight is in `flights`."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ from app.trials.views import trajectory_view, trial_view, trial_views
 
 
 def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
-    """In the order of their numbers. Raises NotFoundError, or InputError for a cursor that is none of this list's."""
+    """List trials by number. Raises NotFoundError, or InputError for a cursor of another list."""
     campaign = campaigns.get_row(session, campaign_id)
     after = 0 if cursor is None else decode_cursor("number", cursor, float)[1]
     rows, total = repository.page(session, campaign_id, after_number=after, limit=limit)
@@ -57,11 +57,11 @@ def get_trial(session: Session, trial_id: int) -> Trial:
 
 
 def create_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
-    """Plan a trial and, with `fly`, ask for its flight.
+    """Plan a trial and, with `fly`, request its flight.
 
-    Raises ConflictError for a stale proposal, an unclassed flight, a spent budget, a campaign that is over or not
-    ready; GainsError naming what the gate refuses, unless that is overruled; NotAllowedError for who may not command a
-    real vehicle; and what `fly_trial` raises.
+    Raises ConflictError for a stale proposal, an unclassified flight, a spent budget, a campaign that is over or not
+    ready; GainsError that names what the gate refuses, unless that is overruled; NotAllowedError when the client may
+    not command a real vehicle; and what `fly_trial` raises.
     """
     campaign = campaigns.get_row(session, campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
@@ -91,14 +91,16 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, context: Req
 
 
 def warm_gate_cache_for_new(session: Session, campaign_id: int, new: NewTrial) -> None:
-    """Let the gate simulate before `create_trial` asks it within its transaction: it remembers what it found. What is
-    wrong with the trial is said there."""
+    """Run the gate's simulations before the transaction of `create_trial` needs the results, which are cached.
+
+    Problems with the trial are reported by `create_trial`.
+    """
     with suppress(GainlineError):
         _chosen(session, campaigns.get_row(session, campaign_id), new)
 
 
 def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
-    """Raises ConflictError when somebody else was faster."""
+    """Change a trial's note. Raises ConflictError when another client changed the trial first."""
     row = repository.get_one(session, trial_id)
     check_version(edit.version, row.version, f"Trial {row.number}", {"note": (row.note, edit.note)})
     row.note = edit.note
@@ -107,10 +109,10 @@ def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
 
 
 def classify_trial(session: Session, trial_id: int, said: Classification, context: RequestContext = LOCAL_CLI) -> Trial:
-    """A person's word on a flight; the next gains are computed again from what counts now.
+    """Classify a flight by a person's decision; the next gains are computed again from what counts now.
 
-    Raises ConflictError when the states' table does not lead there or somebody else was faster, InputError when a
-    flight without a usable record is to count, NotAllowedError for who may not command a real vehicle.
+    Raises ConflictError when the transition is not in the table or another client changed the trial first, InputError
+    when a flight without a usable record is to count, NotAllowedError when the client may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
@@ -133,10 +135,10 @@ def classify_trial(session: Session, trial_id: int, said: Classification, contex
 
 
 def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: RequestContext = LOCAL_CLI) -> Trial:
-    """An operator's word on why they broke a flight off; the next gains are computed again from what counts now.
+    """Record why the operator aborted a flight; the next gains are computed again from what counts now.
 
-    Raises ConflictError unless the trial is aborted, and not for a limit that the program keeps, or when somebody else
-    was faster, NotAllowedError for who may not command a real vehicle.
+    Raises ConflictError when the trial is not aborted, when the program aborted it for a limit, or when another client
+    changed the trial first; NotAllowedError when the client may not command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
@@ -158,16 +160,18 @@ def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: 
 def read_record(
     stream: BinaryIO, *, name: str = "", takeoff: int | None = None, companion: BinaryIO | None = None
 ) -> Takeoff:
-    """A takeoff from a log of any kind. Raises TrajectoryError in words, naming the takeoffs to choose from where there
-    are several."""
-    from app.logs.readers import read_takeoff  # noqa: PLC0415 - every reader there is
+    """Read a takeoff from a log of any format.
+
+    Raises TrajectoryError; where the log holds several takeoffs, it names them.
+    """
+    from app.logs.readers import read_takeoff  # noqa: PLC0415 - imports every reader
 
     return read_takeoff(stream, name=name, number=takeoff, companion=companion)
 
 
 def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
-    """The same of a file that somebody has sent: in a process with limits. Raises InputError when it passes them."""
-    from app.logs.readers import read_content  # noqa: PLC0415 - every reader there is
+    """Read a takeoff from an uploaded file, in a process with limits. Raises InputError when it exceeds them."""
+    from app.logs.readers import read_content  # noqa: PLC0415 - imports every reader
 
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
@@ -175,10 +179,10 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
 def import_record(
     session: Session, trial_id: int, flown: Takeoff, context: RequestContext = LOCAL_CLI, *, confirmed: bool = False
 ) -> Trial:
-    """The record of a flight made elsewhere, or the recovered one of a lost flight; scored and classed at once.
+    """Import the record of a flight made elsewhere, or the recovered record of a lost flight; score and classify it.
 
     Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
-    nobody has `confirmed` that, TrajectoryError when the record cannot be stored, NotAllowedError for who may not
+    that is not `confirmed`, TrajectoryError when the record cannot be stored, NotAllowedError when the client may not
     command a real vehicle.
     """
     row = repository.get_one(session, trial_id)
@@ -208,10 +212,10 @@ def import_record(
 def import_into_campaign(
     session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool
 ) -> Trial:
-    """The record for the trial of that number, else for the one that waits for it; where none does, one is planned of
-    the proposal first. `campaign` is an id or a name.
+    """Import a record for the trial of the given number, else for the one that waits for a record.
 
-    Raises NotFoundError, InputError when several campaigns or trials are meant, and what `import_record` raises.
+    If no trial waits, one is planned from the proposal first. `campaign` is an id or a name. Raises NotFoundError,
+    InputError when several campaigns or trials match, and what `import_record` raises.
     """
     campaign_id = campaigns.find_by_id_or_name(session, campaign)
     row = campaigns.get_row(session, campaign_id)
@@ -237,14 +241,14 @@ def import_into_campaign(
 
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
-    """Thinned. Raises NotFoundError when there is no record, StorageError when it is damaged."""
+    """Thinned record of a trial. Raises NotFoundError when there is none, StorageError when it is damaged."""
     row = repository.get_one(session, trial_id)
     return trajectory_view(campaigns.get_row(session, row.campaign_id), row, history.record_of(session, row), points)
 
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """A whole record as CSV."""
+    """A full record as CSV."""
 
     file_name: str
     csv: str
@@ -252,7 +256,7 @@ class Export:
 
 
 def export_trajectory(session: Session, trial_id: int) -> Export:
-    """Every sample, nine digits, which give the stored single-precision number back exactly."""
+    """Export every sample with nine digits, which restore the stored single-precision number exactly."""
     row = repository.get_one(session, trial_id)
     record = history.record_of(session, row)
     assert row.trajectory is not None
@@ -265,15 +269,17 @@ def export_trajectory(session: Session, trial_id: int) -> Export:
 
 @dataclass(frozen=True, slots=True)
 class TelemetryLog:
-    """A flight's .tlog, and the name it is handed out under."""
+    """A flight's .tlog and its file name for download."""
 
     file: Path
     name: str
 
 
 def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> TelemetryLog:
-    """Of the trial's last flight that left one, else the one that came in with it from elsewhere. Raises NotFoundError
-    when there is none."""
+    """Telemetry log of the trial's last flight that has one, else the one imported with the trial.
+
+    Raises NotFoundError when there is none.
+    """
     row = repository.get_one(session, trial_id)
     flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
     for file in (*flown, log_of_trial(data_dir, trial_id)):
@@ -289,7 +295,7 @@ def _seen(session: Session, row: TrialRow) -> Trial:
 
 
 def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[GateDecision, ProposalRow | None]:
-    """Gains that may fly, and the proposal that they are from, if they are from one."""
+    """The gains that may fly, and the proposal that they come from, if any."""
     if sum(given is not None for given in (new.proposal_id, new.gains, new.variant)) != 1:
         raise InputError(
             "A trial flies a proposal, gains of one's own, or a variant.",
@@ -312,7 +318,8 @@ def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: Propo
 
 
 def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:
-    """The error of a flight that a person counts in spite of its gaps. One that was broken off never counts."""
+    """Error of a flight that a person counts in spite of its gaps. Raises InputError for an aborted or unscorable
+    flight."""
     if row.ending == "aborted":
         raise InputError(
             f"Trial {row.number} cannot count: its record ends where the flight was broken off.",

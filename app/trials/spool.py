@@ -1,6 +1,6 @@
 """Flight records on disk before they are in the database, so that neither a full disk nor a crash loses a flight.
 
-Room for the record is claimed before lift-off: a flight whose record would not fit does not start.
+Disk space for the record is reserved before lift-off: a flight whose record would not fit does not start.
 """
 
 import hashlib
@@ -19,27 +19,27 @@ from app.errors import StorageError
 from app.vehicles.base import Ending, FlightRecord, OptionValue
 
 RESERVED_BYTES: Final = 4 * 2**20
-"""Claimed before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
+"""Reserved before each flight; a takeoff at 512 Hz leaves about 0.6 MB."""
 _UNFINISHED: Final = ".claimed"
 _FINISHED: Final = ".flight"
 
 
 @dataclass(frozen=True, slots=True)
 class SpooledRecord:
-    """A flight record as the spool keeps it, and which flight row it belongs to."""
+    """A flight record in the spool, and the id of its flight row."""
 
     flight_id: int
     record: FlightRecord
 
 
 class Spool:
-    """The spool folder. One file a flight, complete or not there at all."""
+    """The spool folder: one file per flight, either complete or absent."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def reserve(self, flight_id: int) -> None:
-        """Take the room for one record. Raises StorageError when the disk has not got it."""
+        """Reserve the disk space for one record. Raises StorageError when there is not enough."""
         path = self._path(flight_id, _UNFINISHED)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -54,7 +54,8 @@ class Spool:
             ) from error
 
     def write(self, flight_id: int, record: FlightRecord) -> None:
-        """Write a record into its room, from where on it survives a crash. Raises StorageError when it does not fit."""
+        """Write a record into its reserved space; from then on it survives a crash. Raises StorageError when it does
+        not fit."""
         path = self._path(flight_id, _UNFINISHED)
         try:
             with path.open("r+b") as file:
@@ -70,11 +71,11 @@ class Spool:
             ) from error
 
     def flight_ids(self) -> list[int]:
-        """The flights whose records wait here."""
+        """Flights whose records are in the spool."""
         return sorted(int(path.stem) for path in self._folder.glob(f"*{_FINISHED}"))
 
     def read(self, flight_id: int) -> SpooledRecord:
-        """Raises StorageError when the file is damaged."""
+        """Read a record. Raises StorageError when the file is damaged."""
         path = self._path(flight_id, _FINISHED)
         try:
             return _unpack(path.read_bytes())
@@ -85,14 +86,16 @@ class Spool:
             ) from error
 
     def delete(self, flight_id: int) -> None:
-        """Give the room back: the record is in the database, or the flight never began. What cannot be removed now is
-        at the next start: to recover a record twice is harmless."""
+        """Free the space, because the record is in the database or the flight did not begin.
+
+        A file that cannot be removed now is removed at the next start; recovering a record twice is harmless.
+        """
         for suffix in (_UNFINISHED, _FINISHED):
             with suppress(OSError):
                 self._path(flight_id, suffix).unlink(missing_ok=True)
 
     def set_aside(self, flight_id: int) -> str | None:
-        """Put a record that cannot be used out of the way, without losing it; its new place, or None when it is not
+        """Rename a record that cannot be used, to keep it out of the way; returns its new path, or None if it is not
         here."""
         path = self._path(flight_id, _FINISHED)
         try:
@@ -101,7 +104,7 @@ class Spool:
             return None
 
     def delete_unfinished(self) -> None:
-        """Give back the rooms of flights that left no record. Only before anything flies."""
+        """Free the reserved space of flights that left no record. Call it only while nothing flies."""
         for path in self._folder.glob(f"*{_UNFINISHED}"):
             path.unlink(missing_ok=True)
 

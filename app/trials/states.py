@@ -1,41 +1,40 @@
-"""The life of a trial, and of the flight that a worker carries out for it."""
+"""States of a trial, and of the flight that a worker carries out for it."""
 
 from collections.abc import Mapping
 from enum import StrEnum
 from typing import Final, Literal
 
 TrialKind = Literal["start", "step", "shorter step", "repeat", "baseline", "manual"]
-"""Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, the first
-flight's again, a person."""
+"""Where a trial's gains come from: the strategy's first, its next, one of its shorter steps, flown before, those of the
+first flight, a person."""
 
 Ending = Literal["completed", "aborted", "invalid"]
-"""How a flight's record ends: where it should, where the flight was broken off, or with a measurement that is no
-good."""
+"""How a flight's record ends: completely, where the flight was aborted, or with an invalid measurement."""
 
 AbortCause = Literal["limit", "operator", "behaved badly", "something else"]
-"""Why a flight was broken off: a limit that the program keeps; the operator, who has not said yet why; and what the
-operator said. Unknown of flights from before it was recorded."""
+"""Why a flight was aborted: a limit that the program enforces; the operator, without a reason yet; or the operator's
+reason. Unknown for flights from before it was recorded."""
 
 NOT_AGAINST_GAINS: Final[frozenset[AbortCause]] = frozenset({"operator", "something else"})
-"""Aborts that say nothing about the gains, or not yet. All others do."""
+"""Aborts that do not count against the gains, or not yet. All others do."""
 
 FlightMode = Literal["fly", "stage"]
-"""Take off as soon as the gains are read back, or wait for an operator's own act."""
+"""Take off as soon as the gains are read back, or wait for the operator's own act."""
 
 
 class TrialState(StrEnum):
-    """One policy, flown once.
+    """States of one policy that is flown once.
 
-        planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
-           │  ↑───────┘ │        ├──→ aborted
-           │            │        ├──→ lost ──→ captured (record recovered) | invalid
-           │            │        └──→ planned (the vehicle was never told to take off)
-           ├────────────┴──→ cancelled
-           └──→ captured (flown elsewhere, imported)
+            planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
+               │  ↑───────┘ │        ├──→ aborted
+               │            │        ├──→ lost ──→ captured (record recovered) | invalid
+               │            │        └──→ planned (no take-off command was sent)
+               ├────────────┴──→ cancelled
+               └──→ captured (flown elsewhere, imported)
 
-    valid ↔ invalid and aborted ↔ invalid, with a reason; whatever was computed from the flight is computed again.
-    staged: every gain was written and read back. lost: nobody knows how the flight ended; it is never flown again by
-    itself.
+    valid ↔ invalid and aborted ↔ invalid, with a reason; whatever was computed from the flight is recomputed. staged:
+    every gain was written and read back. lost: it is unknown how the flight ended; it is never flown again
+    automatically.
     """
 
     PLANNED = "planned"
@@ -65,7 +64,7 @@ HISTORY: Final = frozenset({TrialState.VALID, TrialState.ABORTED})
 """The flights that a proposal is computed from, and that use up the budget."""
 
 UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED})
-"""Trials that may still fly, or be given up."""
+"""Trials that may still be flown or cancelled."""
 
 BUDGETED_STATES: Final = HISTORY | UNFLOWN | {TrialState.FLYING, TrialState.CAPTURED}
 """Trials that have used up, or may yet use up, a flight of the budget."""
@@ -84,11 +83,11 @@ ACTIONS: Final[Mapping[str, frozenset[TrialState]]] = {
     "judge abort": frozenset({TrialState.ABORTED}),
     "note": frozenset(TrialState),
 }
-"""What a person may do with a trial, and in which states."""
+"""Actions that a person may take on a trial, and in which states."""
 
 
 class FlightState(StrEnum):
-    """One order to a vehicle: the worker's queue, and the ledger of what the vehicle was given.
+    """States of one request to a vehicle: the worker's queue, and the ledger of the gains that the vehicle was given.
 
     requested ──→ running ──→ landed | aborted | failed | lost | cancelled
         └──→ cancelled

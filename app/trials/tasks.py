@@ -1,7 +1,7 @@
-"""Carrying out flights: the only way from a flight row to a vehicle, and back to the database.
+"""Execution of flights: the only path from a flight row to a vehicle and back to the database.
 
-What a flight was asked is stored before it is sent, what came of it when it is known. Between lift-off and landing
-nothing waits for the database; a record goes to the spool first, and from there into the database.
+A request is stored before it is sent, its outcome when it is known. Nothing waits for the database between lift-off and
+landing; a record goes to the spool first, and from there into the database.
 """
 
 import threading
@@ -31,7 +31,7 @@ from app.vehicles.open import get_kind
 
 RETRY_S: Final = 1.0
 STAGED_FOR_S: Final = 600.0
-"""How long a vehicle waits, with a trial's gains on it, for its operator's word."""
+"""How long a vehicle with a trial's gains on it waits for its operator's take-off request."""
 POLL_INTERVAL_S: Final = 0.05
 
 _log = structlog.get_logger(__name__)
@@ -39,11 +39,11 @@ _log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOutcome:
-    """How a flight ended, so far as this process knows.
+    """Outcome of a flight, as far as this process knows.
 
-    With a `record` it took place. Without one, `lifted_off` says whether the vehicle had been told to take off, and
-    `withdrawn` that somebody ended it before that. `concern`: the safe gains could not be verified afterwards;
-    `unheard`: whoever had the vehicle ended without saying whether they are restored; `restored`: they were read back.
+    With a `record` the flight took place. Without one, `lifted_off` says whether a take-off command was sent, and
+    `withdrawn` whether the flight was ended before that. `concern`: the safe gains could not be verified afterwards.
+    `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were read back.
     """
 
     record: FlightRecord | None = None
@@ -60,10 +60,10 @@ def _refuse_session(_vehicle_id: int) -> FlightBackend:
 
 
 class FlightRunner:
-    """Claims flights and carries them out. `closing` ends the waiting for a database that takes nothing.
+    """Claims flights and carries them out. `closing` ends the retries while the database accepts no writes.
 
-    `session(vehicle_id)` gives whoever has the link to a vehicle that keeps one between flights; others are opened for
-    each flight in a process of the pool.
+    `session(vehicle_id)` returns the backend of a vehicle that keeps its connection between flights; other vehicles are
+    opened for each flight in a process of the pool.
     """
 
     def __init__(
@@ -90,12 +90,15 @@ class FlightRunner:
         self._process_pool = FlightProcessPool()
 
     def close(self) -> None:
-        """When nothing flies any more."""
+        """Close the process pool. Call it only when nothing flies."""
         self._process_pool.close()
 
     def recover(self) -> None:
-        """After a start: what was flying is lost, unless its record is in the spool; what was asked for while nobody
-        could fly it is not flown. Raises StorageError."""
+        """Clean up after a start of the worker.
+
+        Flights that were running are lost unless their record is in the spool; requests from the time without a worker
+        are withdrawn. Raises StorageError.
+        """
         with self._database.write() as session:
             for flight_id in flights.withdraw_requested_flights(session, "the worker was away when it was asked for"):
                 _log.warning("flight withdrawn: it was asked for before this worker began", flight_id=flight_id)
@@ -106,23 +109,23 @@ class FlightRunner:
         self._spool.delete_unfinished()
 
     def claim(self) -> FlightTask | None:
-        """The flight that has waited longest, now this worker's; None when none waits. Raises StorageError."""
+        """Claim the oldest requested flight for this worker; None when there is none. Raises StorageError."""
         with ExitStack() as undo:
             with self._database.write() as session:
                 if (task := flights.claim_flight(session, self._worker)) is not None:
-                    self._abort_registry.register(task.trial_id)  # before anybody can see that it runs, and abort it
+                    self._abort_registry.register(task.trial_id)  # before a client can see that it runs, and abort it
                     undo.callback(self._abort_registry.unregister, task.trial_id)
             undo.pop_all()
         return task
 
     def carry_out(self, task: FlightTask) -> None:
-        """The whole flight, from opening the vehicle to the stored outcome. Raises nothing."""
+        """Carry out the whole flight, from opening the vehicle to the stored outcome. Raises nothing."""
         with structlog.contextvars.bound_contextvars(
             campaign_id=task.campaign_id, trial_id=task.trial_id, flight_id=task.flight_id
         ):
             try:
                 self._store_outcome(task, self._fly(task, self._abort_registry.register(task.trial_id)))
-            except Exception:  # noqa: BLE001 - the edge of the thread
+            except Exception:  # noqa: BLE001 - outermost frame of the thread
                 _log.exception("the end of a flight cannot be stored; the trial is lost at the next start")
             finally:
                 self._abort_registry.unregister(task.trial_id)
@@ -142,13 +145,14 @@ class FlightRunner:
             flag.add_listener(lambda _reason: None)
 
     def _acquire_backend(self, task: FlightTask) -> FlightBackend:
-        """Raises VehicleError when the vehicle keeps a link, and there is none."""
+        """Return the process that flies the vehicle. Raises VehicleError when the vehicle needs a connection and has
+        none."""
         if get_kind(task.vehicle_kind).connect is not None:
             return self._session(task.vehicle_id)
         return self._process_pool.acquire()
 
     def _fly_on_backend(self, backend: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
-        """The part that the vehicle takes part in; whatever happens, its process is let go, and there is an end."""
+        """Fly the vehicle; whatever happens, release its process and return an outcome."""
         ended = FlightOutcome()
         try:
             self._phase(task, "staging")
@@ -170,7 +174,7 @@ class FlightRunner:
                             concern=what if unsafe else "",
                             lifted_off=ended.lifted_off and not not_flown,
                         )
-        except Exception as error:  # noqa: BLE001 - a mistake of the program must not leave the trial without an end
+        except Exception as error:  # noqa: BLE001 - an internal error must not leave the trial without an end
             backend.close()
             return replace(ended, problem=_describe_error(error), unheard=True)
         if isinstance(backend, FlightProcess):
@@ -180,7 +184,7 @@ class FlightRunner:
     def _staged(
         self, task: FlightTask, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
     ) -> FlightOutcome:
-        """Take off if the vehicle holds what it was given and the database has taken note; else stand down."""
+        """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
         try:
             self._store(lambda session: flights.record_staged(session, task.flight_id, read_back))
@@ -199,7 +203,8 @@ class FlightRunner:
         return ended
 
     def _await_takeoff_clearance(self, task: FlightTask, flag: AbortFlag, backend: FlightBackend) -> str | None:
-        """None when the vehicle may take off, at once or at its operator's word; else why it is not to."""
+        """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or why it must
+        not."""
         if task.mode == "fly":
             return flag.reason
         self._phase(task, "staged")
@@ -239,14 +244,16 @@ class FlightRunner:
         self._publish(FlightPhase(campaign_id=task.campaign_id, trial_id=task.trial_id, phase=phase, note=note))
 
     def _store_outcome(self, task: FlightTask, ended: FlightOutcome) -> None:
-        """Store the outcome. What the database refuses is put aside, and the flight is given up in its place: nothing
-        but a worker's end leaves a flight running."""
+        """Store the outcome; if the database refuses it, set the record aside and give the flight up instead.
+
+        Only the end of the worker leaves a flight in state running.
+        """
         _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
         if ended.record is not None:
             self._spool_record(task, ended.record)
         try:
             stored = self._store_with_retry(task, lambda session: _record(session, task, ended))
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, the vehicle is not blocked by it
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, it must not block the vehicle
             problem = self._refused(task, ended, error)
             stored = self._store_with_retry(task, lambda session: _give_up(session, task, ended, problem))
         if stored:
@@ -261,7 +268,7 @@ class FlightRunner:
         return f"{why} The record is kept as {kept_as}." if kept_as else f"{why} The record could not be kept either."
 
     def _store_with_retry(self, task: FlightTask, work: Callable[[Session], None]) -> bool:
-        """Try until the database takes it; false when the worker closes meanwhile (the spool keeps the record)."""
+        """Retry until the database accepts it; False when the worker closes meanwhile (the spool keeps the record)."""
         while True:
             try:
                 self._store(work)
@@ -276,7 +283,7 @@ class FlightRunner:
     def _spool_record(self, task: FlightTask, record: FlightRecord) -> None:
         try:
             self._spool.write(task.flight_id, record)
-        except StorageError as error:  # it is still in memory, and goes into the database from there
+        except StorageError as error:  # the record is still in memory and is stored from there
             _log.error("record not spooled", why=str(error))
 
     def _store(self, work: Callable[[Session], None]) -> None:
@@ -284,7 +291,7 @@ class FlightRunner:
             work(session)
 
     def _recover_record(self, flight_id: int) -> None:
-        """Into the database with it; one that is damaged or refused is put aside. Raises StorageError."""
+        """Move a record from the spool into the database; set a damaged or refused one aside. Raises StorageError."""
         try:
             record = self._spool.read(flight_id).record
         except StorageError as error:
@@ -306,7 +313,7 @@ class FlightRunner:
 
 
 def describe_mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None:
-    """What differs between the gains sent and those read back, or None."""
+    """Sentence on the gains that were read back with other values than sent, or None."""
     wrong = [
         f"{name} is {read_back.get(name, 'missing')} instead of {value:g}"
         for name, value in asked.items()
@@ -316,7 +323,7 @@ def describe_mismatch(asked: dict[str, float], read_back: dict[str, float]) -> s
 
 
 def _describe_error(error: Exception) -> str:
-    """What went wrong, in words for the operator; what the program did wrong goes to the log in full."""
+    """Describe an error for the operator; an internal error is logged in full."""
     if isinstance(error, GainlineError):
         return str(error)
     _log.error("a mistake of the program", exc_info=error)

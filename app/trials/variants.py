@@ -1,4 +1,4 @@
-"""Gains that stand in some relation to the flights so far: a smaller step, the best again, the first again."""
+"""Gains relative to the flights so far: a smaller step, the best again, the first again."""
 
 from typing import Final
 
@@ -18,10 +18,11 @@ KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repea
 
 
 def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[str, float]:
-    """`repeat`: the best gains by all their flights; `baseline`: the first flight's; `smaller step`: half way from the
-    best to the present proposal. As the advice has it, flights outside the campaign's bounds take no part.
+    """Gains of a variant.
 
-    Raises ConflictError before the first valid flight inside them, and where half a step is none.
+    `repeat`: the best gains by all their flights; `baseline`: the first flight's; `smaller step`: half way from the
+    best to the present proposal. Like the advice, it ignores flights outside the campaign's bounds. Raises
+    ConflictError before the first valid flight inside the bounds, and where half a step rounds to none.
     """
     now = standing_within_bounds_of(campaign, history.trials_of(session, campaign.id))
     if now is None:

@@ -1,4 +1,4 @@
-"""How trials look from outside, and what they say of themselves."""
+"""API views of trials, and the sentences that describe them."""
 
 from collections.abc import Iterable, Sequence
 
@@ -22,12 +22,12 @@ from app.trials.states import ACTIONS, ACTIVE_STATES, FlightState, TrialState
 
 
 def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
-    """One trial; the errors of those before it are needed for its verdict."""
+    """View of one trial; the errors of earlier trials are loaded for its verdict."""
     return trial_views(session, campaign, [row])[0]
 
 
 def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow]) -> list[Trial]:
-    """Some trials of a campaign."""
+    """Views of some trials of a campaign."""
     session.flush()
     flights = repository.latest_flights(session, [row.id for row in rows])
     field = ReferenceFlights(history.valid_flights(session, campaign.id), get_experiment(campaign.experiment).scatter)
@@ -36,7 +36,7 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
 
 
 def trajectory_view(campaign: CampaignRow, row: TrialRow, trajectory: Trajectory, points: int) -> TrajectoryOut:
-    """A record thinned to at most `points` samples, chosen so that the scored output keeps its peaks."""
+    """View of a record, thinned to at most `points` samples such that the scored output keeps its peaks."""
     assert row.trajectory is not None
     output = get_experiment(campaign.experiment).output
     leading = trajectory.channels.get(output, trajectory.time_s)
@@ -111,7 +111,7 @@ def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
 
 
 def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
-    """The earlier flights of a trial that repeats their gains on purpose; none for any other trial."""
+    """Numbers of the earlier flights of a trial that repeats their gains on purpose; empty for any other trial."""
     same = field.group_with(row.gains)
     if same is None or row.kind not in {"baseline", "repeat"}:
         return []
@@ -119,8 +119,11 @@ def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
 
 
 def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
-    """The flight against the best before it and against its prediction, in a sentence. One that repeats the gains of
-    the flights `again` was not to be better than any, so it is not held against the best."""
+    """Sentence that compares the flight with the best before it and with its prediction.
+
+    A trial that repeats the gains of the flights `again` was not meant to be better, so it is not compared with the
+    best.
+    """
     match row.state:
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
@@ -144,7 +147,7 @@ def _once_more(again: Sequence[int]) -> str:
 
 
 def _glitches(row: TrialRow) -> str:
-    """What a person has to look at before classing the flight."""
+    """Note of the glitches that a person has to look at before classifying the flight."""
     if not row.glitches:
         return ""
     return f", with {len(row.glitches)} {'glitch' if len(row.glitches) == 1 else 'glitches'} in its record"
@@ -204,8 +207,8 @@ def _flight(row: FlightRow | None) -> FlightBrief | None:
 
 
 def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, rehearsed: bool) -> list[str]:
-    """The states' table, narrowed by what the vehicle can do, by a flight that is under way, and by a rehearsal that a
-    real vehicle lacks."""
+    """Allowed actions: those of the state table, less what the vehicle cannot do, what an active flight rules out, and
+    what a missing rehearsal of a real vehicle rules out."""
     vehicle = campaign.vehicle
     under_way = flight is not None and flight.state in ACTIVE_STATES
     impossible = set()
