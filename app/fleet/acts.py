@@ -1,12 +1,12 @@
-"""What a registered vehicle is asked beside its flights: a person asks, the worker that has its link carries it out.
+"""Acts: requests to a registered vehicle beside its flights. A person makes them; the worker carries them out.
 
     request_act → claim_act → finish_act
-                     └ in the same transaction what came of it: record_connected, record_disconnected,
+                     └ with the outcome, in the same transaction: record_connected, record_disconnected,
                        quarantine_vehicle, record_released, record_held, record_checks
 
-Landing and motors off go another way, past the database; `record_command` writes them down afterwards. At a worker's
-start: `withdraw_acts`, then `forget_connections`, then `request_reconnections`; later
-`list_vehicles_to_reconnect` gives those that are not connected yet, until `record_reconnected`.
+Land and motors off bypass the database; `record_command` records them afterwards. At a worker's start: `withdraw_acts`,
+then `forget_connections`, then `request_reconnections`. Later, `list_vehicles_to_reconnect` lists those that are not
+connected yet, until `record_reconnected`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -38,7 +38,7 @@ from app.moves import check_action, check_transition
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
-"""How old a request may be when a worker takes it."""
+"""Maximum age of a request when a worker claims it."""
 BY_WORKER: Final = "the worker"
 
 _WITHDRAWN: Final = {
@@ -46,12 +46,13 @@ _WITHDRAWN: Final = {
     ActState.RUNNING: "It was not finished: the worker ended.",
 }
 _READ_ONLY_ACTS: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
-"""Acts that change nothing on the vehicle, and so are open to everybody."""
+"""Acts that change nothing on the vehicle, so that every operator may request them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkedVehicle:
-    """What a worker needs to open the link to a vehicle; `identity` is the pinned one, None before the first time."""
+    """What a worker needs to open the link to a vehicle; `identity` is the pinned one, None before the first
+    connection."""
 
     vehicle_id: int
     name: str
@@ -73,8 +74,11 @@ class ActTask:
 
 
 def request_act(session: Session, vehicle_id: int, kind: ActKind, context: RequestContext) -> VehicleAct:
-    """What a person asks. Raises ConflictError in states in which it is not possible or while somebody else is in
-    control, BusyError while something else is under way, NotAllowedError for who may not command it."""
+    """Request an act.
+
+    Raises ConflictError in states in which it is not possible or while another operator is in control, BusyError while
+    a flight or another act is under way, NotAllowedError when the client may not command the vehicle.
+    """
     row = repository.get_one(session, vehicle_id)
     if not row.registered:
         raise ConflictError(
@@ -84,13 +88,17 @@ def request_act(session: Session, vehicle_id: int, kind: ActKind, context: Reque
 
 
 def require_may_stop_motors(session: Session, vehicle_id: int, context: RequestContext) -> None:
-    """Raises NotAllowedError for who may not command a real vehicle, NotFoundError."""
+    """Raise NotAllowedError when the client may not command a real vehicle, NotFoundError when there is no such
+    vehicle."""
     require_may(Permission.STOP, repository.get_one(session, vehicle_id), context)
 
 
 def release_vehicle(session: Session, vehicle_id: int, statement: str, context: RequestContext) -> Vehicle:
-    """Out of quarantine, on a person's word; a registered vehicle once the worker has seen it disarmed and holding its
-    safe gains. Raises as `request_act` does."""
+    """Release a vehicle from quarantine on a person's statement.
+
+    A registered vehicle is released once the worker has verified that it is disarmed and holds its safe gains. Raises
+    as `request_act` does.
+    """
     row = repository.get_one(session, vehicle_id)
     if row.registered:
         _requested(session, row, ActKind.RELEASE, context, reason=statement)
@@ -135,8 +143,10 @@ def _add(session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: s
 
 
 def claim_act(session: Session, worker: str) -> ActTask | None:
-    """The act that has waited longest, now this worker's; None when none waits. One that could not be begun within
-    10 s is given up: nothing happens later than its operator expects it."""
+    """Claim the oldest requested act for this worker; None when there is none.
+
+    A request older than REQUEST_TIMEOUT (10 s) is given up, because nothing may happen later than its operator expects.
+    """
     while (act := repository.first_requested_act(session)) is not None:
         if utc_now() - act.requested_at <= REQUEST_TIMEOUT:
             _move(act, ActState.RUNNING)
@@ -154,9 +164,11 @@ def finish_act(
     result: JsonObject | None = None,
     problem: str = "",
 ) -> None:
-    """What came of it; `problem` when it failed. By a connect, a vehicle that is not pinned, or was not read back, was
-    given nothing; one that is pinned is looked for when it failed: it may be off, or another has its port. Doing it
-    twice is harmless."""
+    """Record the outcome of an act; `problem` when it failed. Idempotent.
+
+    A connect wrote no gains to a vehicle that is not pinned or was not read back. If it fails for a pinned vehicle, the
+    worker keeps looking for the vehicle: it may be switched off, or another process may have its port.
+    """
     act = repository.get_act(session, act_id)
     if act.state != ActState.RUNNING:
         return
@@ -170,8 +182,7 @@ def finish_act(
 
 
 def withdraw_acts(session: Session) -> list[int]:
-    """At a worker's start: what was asked for or under way before is over, and not done by itself later. Gives their
-    ids."""
+    """End all requested and running acts at a worker's start; they are not carried out later. Returns their ids."""
     found = repository.acts_under_way(session)
     for act in found:
         _end(act, problem=f"{_WITHDRAWN[act.state]} Ask again if it is still wanted.")
@@ -179,18 +190,20 @@ def withdraw_acts(session: Session) -> list[int]:
 
 
 def forget_connections(session: Session) -> None:
-    """At a worker's start: nobody has a link to any vehicle. One that is quarantined stays so."""
+    """Set ready vehicles to disconnected at a worker's start, when no link is open; a quarantined vehicle stays
+    quarantined."""
     for row in repository.registered_in(session, VehicleState.READY):
         set_vehicle_state(row, VehicleState.DISCONNECTED)
 
 
 def request_reconnections(session: Session) -> list[int]:
-    """At a worker's start: the acts that connect again those vehicles that were wanted connected. Gives their ids."""
+    """Request connects, at a worker's start, for the vehicles that are wanted connected. Returns the ids of the
+    acts."""
     return [_add(session, row, ActKind.CONNECT, by=BY_WORKER).id for row in _wanted(session)]
 
 
 def list_vehicles_to_reconnect(session: Session) -> list[LinkedVehicle]:
-    """The vehicles that are wanted connected, and are asked nothing: whoever has no link to one may look for it."""
+    """Vehicles that are wanted connected and have neither an act nor a flight under way."""
     rows = _wanted(session)
     return [_linked(row) for row in rows if repository.flight_under_way(session, row.id) is None]
 
@@ -203,8 +216,10 @@ def _wanted(session: Session) -> list[VehicleRow]:
 def record_reconnected(
     session: Session, vehicle_id: int, identity: Identity, *, concern: str, held: Mapping[str, float]
 ) -> bool:
-    """A vehicle that was wanted connected is there again; False for one that is not wanted any more, and stays
-    disconnected."""
+    """Record that a vehicle was reconnected without a request.
+
+    Returns False, and leaves the vehicle disconnected, if it is no longer wanted connected.
+    """
     row = repository.get_one(session, vehicle_id)
     if not row.wanted_connected:
         return False
@@ -224,10 +239,12 @@ def record_connected(
     concern: str = "",
     held: Mapping[str, float] | None = None,
 ) -> None:
-    """The link is open. The vehicle is ready, or quarantined when there is a `concern`, be it one from before; its
-    identity is pinned the first time without a concern, its version and hardware id the first time that it tells them:
-    a vehicle that is not pinned is given nothing, for nobody has decided yet about the gains that it was found with.
-    `held`: its gains, where it said them."""
+    """Record an open link. The vehicle is ready, or quarantined when there is a `concern`, old or new.
+
+    Its identity is pinned at the first connection without a concern; version and hardware id are added when it first
+    reports them. No gains are written to a vehicle that is not pinned, because no person has decided yet about the
+    gains that it was found with. `held`: its gains, where it reported them.
+    """
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
     if not concern:
@@ -238,26 +255,26 @@ def record_connected(
 
 
 def pin_identity(session: Session, vehicle_id: int, identity: Identity) -> None:
-    """Who answers, where that is not known yet; some tell all of it only after a while."""
+    """Pin the identity, or add what was not known of it; some autopilots report all of it only after a while."""
     _pin(repository.get_one(session, vehicle_id), identity)
 
 
 def record_disconnected(session: Session, vehicle_id: int, *, concern: str = "") -> None:
-    """The link is closed. A concern outlives that: when it is connected again, the vehicle is quarantined."""
+    """Record a closed link. A concern is kept: the vehicle is quarantined when it is connected again."""
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
     _move_to(row, VehicleState.DISCONNECTED)
 
 
 def quarantine_vehicle(session: Session, vehicle_id: int, concern: str) -> None:
-    """Something could not be verified; `concern` says what."""
+    """Quarantine the vehicle; `concern` says what could not be verified."""
     row = repository.get_one(session, vehicle_id)
     row.concern = concern
     _move_to(row, VehicleState.QUARANTINED)
 
 
 def record_released(session: Session, vehicle_id: int, *, identity: Identity | None = None) -> None:
-    """A person's word is carried out. `identity`: who answers now, which that person has accepted."""
+    """End the quarantine. `identity`: the identity that answers now, which the person has accepted."""
     row = repository.get_one(session, vehicle_id)
     row.concern = ""
     if identity is not None:
@@ -266,18 +283,18 @@ def record_released(session: Session, vehicle_id: int, *, identity: Identity | N
 
 
 def record_held(session: Session, vehicle_id: int, held: Gains) -> None:
-    """The vehicle has said which gains it holds."""
+    """Record the gains that the vehicle reported."""
     hold_gains(repository.get_one(session, vehicle_id), held)
 
 
 def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]) -> None:
-    """What the preflight check found."""
+    """Record the results of the preflight check."""
     row = repository.get_one(session, vehicle_id)
     row.checks, row.checked_at = [asdict(check) for check in checks], utc_now()
 
 
 def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:
-    """After the fact: the vehicle was told to land, or its motors to stop."""
+    """Record a land or motors off command after it was sent; `problem` when it could not be sent."""
     row = repository.get_one(session, vehicle_id)
     act = record_act(session, row, kind, by="", reason=reason)
     if problem:
@@ -285,7 +302,7 @@ def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str
 
 
 def linked_vehicle(session: Session, vehicle_id: int) -> LinkedVehicle:
-    """Raises NotFoundError."""
+    """The registered vehicle with that id. Raises NotFoundError."""
     return _linked(repository.get_one(session, vehicle_id))
 
 
@@ -302,7 +319,7 @@ def _linked(row: VehicleRow) -> LinkedVehicle:
 
 
 def _was_given(row: VehicleRow, read_back: Gains | None) -> bool:
-    """Whether connecting gave it its safe gains: one that is armed, absent or not pinned is only looked at."""
+    """Whether connecting wrote the safe gains; on a vehicle that is armed, absent or not pinned nothing is written."""
     return row.identity is not None and read_back is not None
 
 
@@ -311,7 +328,7 @@ def _pinned(row: VehicleRow) -> Identity | None:
 
 
 def _pin(row: VehicleRow, identity: Identity) -> None:
-    """What is pinned stays so; what was not told until now is added."""
+    """Pin an identity: what is pinned stays; what was missing is added."""
     pinned = _pinned(row)
     row.identity = asdict(identity if pinned is None else pinned.completed_by(identity))
 

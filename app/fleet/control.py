@@ -1,6 +1,6 @@
-"""Who is in control of a vehicle: one operator at a time, by a lease that the browser renews; a take-over is visible.
+"""Control of a vehicle: one operator at a time, by a lease that the browser renews; a take-over is visible.
 
-The token that shows it is known to its browser alone; the row holds a digest.
+Only the operator's browser knows the lease's token; the row holds its digest.
 """
 
 import hashlib
@@ -22,13 +22,13 @@ from app.fleet.schemas import Control, Lease, LeaseRequest
 from app.fleet.states import ActKind, ActState
 
 LEASE: Final = timedelta(seconds=15)
-"""A browser renews it every 5 s; one that is gone has lost it after this time."""
+"""A browser renews the lease every 5 s; without renewal it ends after this time."""
 
 
 @dataclass(frozen=True, slots=True)
 class RequestContext:
-    """Where a request comes from: the lease's token that it carries, who sent it and from where, whether a page of ours
-    did, and the hosts that the administrator says simulate vehicles."""
+    """Origin of a request: the lease token that it carries, its caller, whether Gainline's own page sent it, and the
+    hosts that the administrator has listed as simulating vehicles."""
 
     token: str | None = None
     caller: Caller = COMMAND_LINE
@@ -37,21 +37,21 @@ class RequestContext:
 
 
 LOCAL_CLI: Final = RequestContext()
-"""Somebody at this computer's command line, who is in control of nothing."""
+"""A user of this computer's command line, who is in control of no vehicle."""
 
 
 def control_of(row: VehicleRow) -> Control | None:
-    """Who is in control now; None when nobody is."""
+    """The operator now in control; None when there is none."""
     if row.operator is None or row.operator_until is None or row.operator_until <= utc_now():
         return None
     return Control(operator=row.operator, until=row.operator_until)
 
 
 def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, context: RequestContext) -> Lease:
-    """A new lease, or the same one renewed by its token; with `take_over` also somebody else's, which an act records.
+    """Grant a new lease, or renew it by its token; with `take_over` also one of another operator, which an act records.
 
-    Raises ConflictError naming who is in control, or saying that the token's lease is no longer there; NotAllowedError
-    for who may not command the vehicle.
+    Raises ConflictError that names the operator in control or says that the token's lease has ended; NotAllowedError
+    when the client may not command the vehicle.
     """
     row = repository.get_one(session, vehicle_id)
     require_may_command(row, context)
@@ -71,7 +71,8 @@ def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, context
 
 
 def give_up_control(session: Session, vehicle_id: int, token: str | None) -> None:
-    """Harmless when nobody is in control. Raises ConflictError when somebody else is."""
+    """Give up control; does nothing when there is no lease. Raises ConflictError when another operator is in
+    control."""
     row = repository.get_one(session, vehicle_id)
     if (held := control_of(row)) is None:
         return
@@ -83,12 +84,13 @@ def give_up_control(session: Session, vehicle_id: int, token: str | None) -> Non
 
 
 def holds(row: VehicleRow, token: str) -> bool:
-    """Whether the token is that of the vehicle's last lease, which may be over: nobody else has taken it since."""
+    """Whether the token is that of the vehicle's last lease, which may have ended without another one following."""
     return row.operator_token_hash is not None and hmac.compare_digest(row.operator_token_hash, _digest(token))
 
 
 def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) -> str:
-    """The operator who asks, empty when nobody is in control. Raises ConflictError when somebody else is."""
+    """Return the operator of the request, empty if there is no lease. Raises ConflictError if another operator is in
+    control."""
     if (held := control_of(row)) is None:
         return ""
     if context.token is None or not holds(row, context.token):
@@ -100,8 +102,8 @@ def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) ->
 
 
 def require_control(row: VehicleRow, context: RequestContext) -> str:
-    """The operator in control, who asks from a page of ours in an unlocked browser on this computer: the only one who
-    may have a real vehicle take off. Raises NotAllowedError or ConflictError otherwise."""
+    """Return the operator in control, who must send the request from Gainline's own page in an unlocked browser on this
+    computer; a real vehicle takes off on no other request. Raises NotAllowedError or ConflictError otherwise."""
     require(Permission.TAKE_OFF, context.caller, row.name)
     if not context.from_our_page:
         raise NotAllowedError(
@@ -115,13 +117,15 @@ def require_control(row: VehicleRow, context: RequestContext) -> str:
 
 
 def require_may_command(row: VehicleRow, context: RequestContext) -> None:
-    """Raises NotAllowedError for who may not command a vehicle that has a link; simulations without one are for all."""
+    """Raise NotAllowedError when the client may not command a vehicle with a link; simulations without one are open to
+    all."""
     if row.registered:
         require(Permission.REAL if row.is_real else Permission.LINK, context.caller, row.name)
 
 
 def require_may(act: Permission, row: VehicleRow, context: RequestContext) -> None:
-    """Raises NotAllowedError for who may not do this with a real vehicle that has a link; any other is for all."""
+    """Raise NotAllowedError when the client lacks the permission for a real vehicle with a link; others are open to
+    all."""
     if row.registered and row.is_real:
         require(act, context.caller, row.name)
 
@@ -129,7 +133,7 @@ def require_may(act: Permission, row: VehicleRow, context: RequestContext) -> No
 def record_act(
     session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: str, asked: dict[str, float] | None = None
 ) -> VehicleActRow:
-    """Something that was decided, and took no vehicle to answer it."""
+    """Record an act that is complete at once because it needs no answer from the vehicle."""
     now = utc_now()
     act = VehicleActRow(
         vehicle_id=row.id,
@@ -149,7 +153,8 @@ def record_act(
 def _granted(session: Session, row: VehicleRow, operator: str, token: str) -> Lease:
     until = utc_now() + LEASE
     if row.operator == operator and row.operator_token_hash == _digest(token) and control_of(row) is not None:
-        # Renewed every few seconds: said to nobody, for whoever shows it asks again when it would be over.
+        # Renewed every few seconds, so no event is published: a client that shows the lease loads it again when it
+        # would end.
         session.execute(update(VehicleRow).where(VehicleRow.id == row.id).values(operator_until=until))
     else:
         row.operator, row.operator_token_hash, row.operator_until = operator, _digest(token), until

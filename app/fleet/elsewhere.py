@@ -1,4 +1,4 @@
-"""Vehicles that stand for others: campaigns came from elsewhere with them, and they never fly from here."""
+"""Placeholders for vehicles of other installations, for imported campaigns; they never fly from here."""
 
 from collections.abc import Mapping
 from itertools import count
@@ -20,10 +20,9 @@ _NAME: Final = "origin_name"
 def get_or_create_imported_vehicle(
     session: Session, *, name: str, kind: str, is_real: bool, safe_gains: Mapping[str, float]
 ) -> VehicleRow:
-    """The one that stands for a vehicle of that name and kind, made when it is wanted first.
+    """Return the placeholder for a vehicle of that name and kind; create it if there is none.
 
-    It is of the kind whose flights are made elsewhere, so that nothing can be flown on it; it has no ledger, because it
-    was given nothing from here.
+    Its kind is `import`, so that it cannot be flown, and it has no ledger, because no gains were sent to it from here.
     """
     origin: dict[str, OptionValue] = {_KIND: kind, _NAME: name}
     for number in count(1):
@@ -37,7 +36,7 @@ def get_or_create_imported_vehicle(
 
 
 def origin_of(row: VehicleRow) -> tuple[str, str] | None:
-    """Kind and name of the vehicle that this one stands for; None for one of our own."""
+    """Kind and name of the vehicle that a placeholder stands for; None for a vehicle of this installation."""
     if row.registered or _KIND not in row.options:
         return None
     return str(row.options[_KIND]), str(row.options[_NAME])

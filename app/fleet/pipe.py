@@ -1,4 +1,4 @@
-"""The end of the pipe that a vehicle's process has to the worker."""
+"""The vehicle process's end of the pipe to the worker."""
 
 import select
 from collections import deque
@@ -9,22 +9,23 @@ from app.fleet.session import FromVehicleProcess, ToVehicleProcess, VehicleComma
 
 
 class PipeClosedError(Exception):
-    """The pipe is broken: nobody keeps the books any more."""
+    """The pipe is broken: the worker has closed it or died."""
 
 
 class WorkerPipe:
-    """The process's end of the pipe. Once it is broken, `hear` says so; `show` and `say` are for nobody then."""
+    """The process's end of the pipe. Once it is broken, `receive` raises; `send` and `send_if_ready` drop the
+    message."""
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
         self._received: deque[ToVehicleProcess] = deque()
 
     def receive(self) -> ToVehicleProcess | None:
-        """The next message; None when there is none. Raises PipeClosedError."""
+        """Return the next message; None when there is none. Raises PipeClosedError."""
         return self._received.popleft() if self._received else self._read()
 
     def receive_command(self) -> VehicleCommand | None:
-        """The next order, past what waits before it; None when there is none, also of a broken pipe."""
+        """Return the next command ahead of other messages; None when there is none, or the pipe is broken."""
         with suppress(PipeClosedError):
             while (message := self._read()) is not None:
                 self._received.append(message)
@@ -40,7 +41,8 @@ class WorkerPipe:
             raise PipeClosedError from error
 
     def is_open(self) -> bool:
-        """To be asked while nothing is to be heard. Raises PipeClosedError rather than say no."""
+        """Return True while the pipe is open; discards a waiting message. Raises PipeClosedError instead of returning
+        False."""
         self.receive()
         return True
 
@@ -49,7 +51,7 @@ class WorkerPipe:
             self._pipe.send(message)
 
     def send_if_ready(self, message: FromVehicleProcess) -> None:
-        """Say it if it can be said at once."""
+        """Send the message unless that would block."""
         with suppress(OSError, ValueError):
             if select.select([], [self._pipe], [], 0.0)[1]:
                 self._pipe.send(message)

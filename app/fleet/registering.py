@@ -1,4 +1,4 @@
-"""Registering vehicles one by one, and editing what they are registered with."""
+"""Registration of vehicles, and changes of their settings."""
 
 from collections.abc import Mapping
 
@@ -23,10 +23,10 @@ from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 
 def register_vehicle(session: Session, new: NewVehicle, context: RequestContext) -> Vehicle:
-    """A vehicle of its own, not connected yet.
+    """Register a vehicle; it is not connected yet.
 
-    Raises InputError naming what cannot be used, ConflictError when the name is taken, UnconfirmedError when nobody has
-    looked at a real vehicle's safe gains, NotAllowedError for who may not command it.
+    Raises InputError that names what cannot be used, ConflictError when the name is taken, UnconfirmedError when no
+    person has confirmed a real vehicle's safe gains, NotAllowedError when the client may not command it.
     """
     kind = get_kind(new.kind, field="kind")
     if not is_registered_one_by_one(kind):
@@ -61,8 +61,12 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
 
 
 def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: RequestContext) -> Vehicle:
-    """Raises ConflictError when somebody else was faster or is in control, or the vehicle is not at rest; InputError
-    naming what cannot be used, NotAllowedError for who may not command the vehicle."""
+    """Change a registered vehicle.
+
+    Raises ConflictError when another client changed it first, another operator is in control, or the vehicle's state
+    does not allow it; InputError that names what cannot be used; NotAllowedError when the client may not command the
+    vehicle.
+    """
     row = repository.get_one(session, vehicle_id)
     check_version(edit.version, row.version, row.name, _differences(row, edit))
     _require_own(row)
@@ -88,7 +92,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
 def promote_gains(
     session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, context: RequestContext
 ) -> None:
-    """Flown gains become the safe ones. Raises ConflictError as `edit_vehicle` does."""
+    """Make flown gains the safe gains. Raises ConflictError as `edit_vehicle` does."""
     check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
     _require_own(row)
     require_may_command(row, context)
@@ -126,7 +130,7 @@ def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: Req
             hint="Register the other one as a vehicle of its own.",
             problems=(Problem("options", "would make another vehicle of it"),),
         )
-    _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has others
+    _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
     row.options, row.identity, row.checks, row.checked_at = options, None, None, None
 
 
@@ -147,7 +151,7 @@ def _set_safe_gains(
 
 
 def _space(kind: VehicleKind, options: Mapping[str, OptionValue], gains: Mapping[str, object] | None) -> PolicySpace:
-    """Of the experiments that such a vehicle flies, the gains of the one that these belong to, or of its usual one."""
+    """Gain space of the vehicle's experiment that has these gains, or of its first experiment."""
     spaces = [get_experiment(name).space for name in kind.experiments_with(options)]
     return next((space for space in spaces if set(space.names) == set(gains or ())), spaces[0])
 

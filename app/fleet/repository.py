@@ -15,11 +15,11 @@ from app.trials.states import ACTIVE_STATES
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 Line = tuple[str, int]
-"""A line of the ledger: its purpose, and the id of its flight or act."""
+"""A line of the ledger: its purpose and the id of its flight or act."""
 
 
 def get_one(session: Session, vehicle_id: int) -> VehicleRow:
-    """Raises NotFoundError."""
+    """The vehicle with that id. Raises NotFoundError."""
     if (row := one_or_none(session, vehicle_id)) is None:
         raise NotFoundError("vehicle", vehicle_id)
     return row
@@ -30,25 +30,25 @@ def one_or_none(session: Session, vehicle_id: int) -> VehicleRow | None:
 
 
 def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
-    """The one that campaigns share; those that stand for a vehicle elsewhere say where it comes from."""
+    """The vehicle that campaigns share; placeholders for vehicles elsewhere are told apart by their options."""
     rows = session.scalars(select(VehicleRow).where(VehicleRow.kind == kind, VehicleRow.registered.is_(False)))
     return next((row for row in rows if not row.options), None)
 
 
 def of_name_or_none(session: Session, name: str) -> VehicleRow | None:
-    """Whatever the case of its letters."""
+    """The vehicle of that name, ignoring case."""
     return session.scalar(select(VehicleRow).where(func.lower(VehicleRow.name) == name.lower()).limit(1))
 
 
 def page(session: Session, *, after_id: int, limit: int) -> tuple[Sequence[VehicleRow], int]:
-    """The vehicles after that id, one more than `limit`, and the number of all."""
+    """The next `limit` + 1 vehicles after that id, and the total count."""
     total = session.scalar(select(func.count(VehicleRow.id))) or 0
     wanted = select(VehicleRow).where(VehicleRow.id > after_id).order_by(VehicleRow.id).limit(limit + 1)
     return session.scalars(wanted).all(), total
 
 
 def registered_in(session: Session, *states: VehicleState) -> Sequence[VehicleRow]:
-    """The registered vehicles in those states."""
+    """Registered vehicles in those states."""
     wanted = select(VehicleRow).where(VehicleRow.registered.is_(True), VehicleRow.state.in_(states))
     return session.scalars(wanted.order_by(VehicleRow.id)).all()
 
@@ -60,7 +60,7 @@ def flight_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
 
 
 def get_act(session: Session, act_id: int) -> VehicleActRow:
-    """Raises NotFoundError."""
+    """The act with that id. Raises NotFoundError."""
     if (row := session.get(VehicleActRow, act_id)) is None:
         raise NotFoundError("act", act_id)
     return row
@@ -76,7 +76,7 @@ def acts_under_way(session: Session) -> Sequence[VehicleActRow]:
 
 
 def first_requested_act(session: Session) -> VehicleActRow | None:
-    """The one that has waited longest."""
+    """The oldest requested act."""
     wanted = select(VehicleActRow).where(VehicleActRow.state == ActState.REQUESTED)
     return session.scalar(wanted.order_by(VehicleActRow.id).limit(1))
 
@@ -84,7 +84,7 @@ def first_requested_act(session: Session) -> VehicleActRow | None:
 def acts(
     session: Session, vehicle_id: int, *, before_id: int | None, limit: int
 ) -> tuple[Sequence[VehicleActRow], int]:
-    """The newest acts before that id, one more than `limit`, and the number of all."""
+    """The newest `limit` + 1 acts before that id, and the total count."""
     wanted = select(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id)
     total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
     if before_id is not None:
@@ -95,9 +95,9 @@ def acts(
 def ledger(
     session: Session, vehicle_id: int, *, before: Position | None, limit: int
 ) -> tuple[list[tuple[Line, Position]], int]:
-    """The newest lines before that position, one more than `limit`, each with its own; and the number of all.
+    """The newest `limit` + 1 lines before that position, each with its own position; and the total count.
 
-    A flight is a line from the moment it was asked for, and another one once the safe gains are restored after it.
+    A flight is a line from its request on, and another one once the safe gains are restored after it.
     """
     flight = FlightRow.vehicle_id == vehicle_id
     lines = union_all(
@@ -132,7 +132,7 @@ def acts_by_id(session: Session, ids: Sequence[int]) -> dict[int, VehicleActRow]
 
 
 def flights_of(session: Session, vehicle_id: int) -> Sequence[FlightRow]:
-    """Those that left the ground or may have, the oldest first."""
+    """Flights that a worker claimed and that are finished, oldest first."""
     wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.finished_at.is_not(None))
     return session.scalars(wanted.where(FlightRow.claimed_at.is_not(None)).order_by(FlightRow.id)).all()
 

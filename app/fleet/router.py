@@ -68,7 +68,7 @@ def edit_vehicle(session: Writer, asking: RequestContextDep, vehicle_id: Id, bod
 
 @router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)
 def connect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
-    """Open the link, and keep it open; the vehicle's safe gains are written and read back, unless it is armed."""
+    """Open the link and keep it open; the vehicle's safe gains are written and read back, unless it is armed."""
     return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.CONNECT, asking))
 
 
@@ -80,7 +80,7 @@ def disconnect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_i
 
 @router.post("/{vehicle_id}/check", status_code=status.HTTP_202_ACCEPTED)
 def check_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
-    """Look at everything that has to be so before a flight."""
+    """Run the preflight check."""
     return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.CHECK, asking))
 
 
@@ -98,19 +98,19 @@ def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: 
 
 @router.get("/{vehicle_id}/acts")
 def list_acts(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[VehicleAct]:
-    """What the vehicle was asked beside its flights, the newest first."""
+    """Acts of the vehicle, newest first: requests beside its flights."""
     return views.acts_view(session, vehicle_id, limit=limit, cursor=cursor)
 
 
 @router.get("/{vehicle_id}/ledger")
 def list_given_gains(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[GivenGains]:
-    """Every gain set that the vehicle was given, the newest first: in flights, restored after them, and beside them."""
+    """Every gain set that the vehicle was given, newest first: in flights, restored after them, and by acts."""
     return views.ledger_view(session, vehicle_id, limit=limit, cursor=cursor)
 
 
 @router.post("/{vehicle_id}/land", status_code=status.HTTP_202_ACCEPTED)
 async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = None) -> OrderAnswer:
-    """Have the vehicle land now, whatever it does. Goes straight to the worker and waits for no storage."""
+    """Land the vehicle now, whatever it is doing. Goes straight to the worker without waiting for storage."""
     return await _order(live, vehicle_id, "land", body, "The vehicle is told to land until it agrees.")
 
 
@@ -118,8 +118,8 @@ async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = N
 async def stop_motors(
     live: Live, database: CurrentDatabase, asking: RequestContextDep, vehicle_id: Id, body: VehicleOrder | None = None
 ) -> OrderAnswer:
-    """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage,
-    unless whoever asks may not command real vehicles: then the database says whether it is one."""
+    """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
+    Only for a client that may not command real vehicles is the database read first, to see whether this is one."""
     if not is_allowed(access.Permission.STOP, asking.caller):
         await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The vehicle is told to stop its motors.")
@@ -142,18 +142,19 @@ async def _order(
 
 @router.post("/{vehicle_id}/release")
 def release_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id, body: Release) -> Vehicle:
-    """Take a vehicle out of quarantine, on the word of a person who has looked at it. One with a link is released once
-    it is seen to be disarmed and to hold its safe gains; the act says what came of that."""
+    """Release a vehicle from quarantine, on the statement of a person who has looked at it. A vehicle with a link is
+    released once the worker has verified that it is disarmed and holds its safe gains; the act reports the outcome."""
     return act(Vehicle, lambda session: acts.release_vehicle(session, vehicle_id, body.statement, asking))
 
 
 @router.put("/{vehicle_id}/control")
 def take_control(session: Writer, asking: RequestContextDep, vehicle_id: Id, body: LeaseRequest) -> Lease:
-    """Take control for 15 s, or renew it with one's token; a take-over from somebody else is recorded as an act."""
+    """Take control for 15 s, or renew the lease with its token; taking over from another operator is recorded as an
+    act."""
     return control.take_control(session, vehicle_id, body, asking)
 
 
 @router.delete("/{vehicle_id}/control", status_code=status.HTTP_204_NO_CONTENT)
 def give_up_control(session: Writer, asking: RequestContextDep, vehicle_id: Id) -> None:
-    """Hand over: nobody is in control afterwards."""
+    """Give up control: no operator is in control afterwards."""
     control.give_up_control(session, vehicle_id, asking.token)

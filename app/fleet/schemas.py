@@ -1,4 +1,4 @@
-"""What a vehicle looks like from outside."""
+"""API schemas of vehicles."""
 
 from datetime import datetime
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ Battery = Annotated[str, Field(max_length=60), Shown]
 
 
 class VehicleChoice(Request):
-    """Which vehicle flies: a simulation by its kind with its settings, where one left out has its default, or a
+    """The vehicle of a campaign: a simulation by its kind with its settings, where an omitted one has its default, or a
     registered vehicle by its id, which has settings of its own."""
 
     kind: Annotated[str, Field(max_length=40, examples=["jsbsim"])]
@@ -22,7 +22,7 @@ class VehicleChoice(Request):
 
 
 class CampaignVehicle(BaseModel):
-    """A campaign's vehicle with its settings: the campaign's own, or those it is registered with."""
+    """A campaign's vehicle with its settings: the campaign's own, or those that it is registered with."""
 
     id: int
     kind: str
@@ -37,8 +37,8 @@ class CampaignVehicle(BaseModel):
 
 
 class NewVehicle(Request):
-    """A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real one a person
-    has looked at them (`safe_gains_confirmed`), and says so in `statement`."""
+    """A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real vehicle a
+    person has to confirm them (`safe_gains_confirmed`) and say so in `statement`."""
 
     name: Name
     kind: Annotated[str, Field(max_length=40, examples=["mavlink"])]
@@ -49,8 +49,9 @@ class NewVehicle(Request):
 
 
 class VehicleEdit(Request):
-    """Changes of a registered vehicle; what is left out stays. Options change only while it is disconnected, and let
-    the next connection pin the identity anew; safe gains need a statement by whom and why."""
+    """Changes of a registered vehicle; omitted fields stay as they are. Options can change only while it is
+    disconnected, and the next connection then pins the identity anew; safe gains need a statement of who decided and
+    why."""
 
     version: Version
     name: Name | None = None
@@ -61,7 +62,7 @@ class VehicleEdit(Request):
 
 
 class Identity(BaseModel):
-    """Who answers at the other end of the link; pinned at the first connection that leaves nothing to decide."""
+    """Identity that the vehicle reports over its link; pinned at the first connection without a concern."""
 
     system_id: int
     autopilot: str
@@ -81,14 +82,15 @@ class VehicleCheck(BaseModel):
 
 
 class Control(BaseModel):
-    """Who is in control. Renewals are not announced: load it again after `until` to see whether it is over."""
+    """The operator in control. Renewals are not published as events: load it again after `until` to see whether it has
+    ended."""
 
     operator: str
     until: datetime
 
 
 class Lease(BaseModel):
-    """Control of a vehicle until then. The token goes into the header X-Gainline-Control of what needs it."""
+    """Control of a vehicle until then. Requests that need it send the token in the header X-Gainline-Control."""
 
     operator: str
     token: str
@@ -96,7 +98,7 @@ class Lease(BaseModel):
 
 
 class LeaseRequest(Request):
-    """Take control, renew it with the token of the lease that one has, or take over from somebody else."""
+    """Take control, renew it with the token of your lease, or take over from another operator."""
 
     operator: Annotated[Name, Field(max_length=80)]
     take_over: bool = False
@@ -104,8 +106,8 @@ class LeaseRequest(Request):
 
 
 class Vehicle(BaseModel):
-    """Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it said it has,
-    at `held_at`. A simulation that is shared by campaigns is not `registered`, and keeps no link."""
+    """Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it reported at
+    `held_at`. A simulation that is shared by campaigns is not `registered` and has no link."""
 
     id: int
     version: int
@@ -131,8 +133,8 @@ class Vehicle(BaseModel):
 
 
 class VehicleAct(BaseModel):
-    """What a vehicle was asked beside its flights, by whom and why, and what came of it. `result` of a check holds its
-    items, of `parameters` every parameter of the vehicle."""
+    """A request to a vehicle beside its flights: by whom and why, and its outcome. `result` holds the items of a check,
+    or all parameters of the vehicle for `parameters`."""
 
     id: int
     vehicle_id: int
@@ -152,7 +154,7 @@ Purpose = Literal["flight", "restore after flight", "connect", "restore", "relea
 
 
 class GivenGains(BaseModel):
-    """One line of a vehicle's ledger: the gains it was asked to take, for what, and those it said it had."""
+    """One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back."""
 
     purpose: Purpose
     flight_id: int | None
@@ -166,7 +168,7 @@ class GivenGains(BaseModel):
 
 
 class Release(Request):
-    """Who has looked at the vehicle, and found what."""
+    """Statement of who has looked at the vehicle and what they found."""
 
     statement: Reason
 
@@ -178,8 +180,8 @@ class VehicleOrder(Request):
 
 
 class OrderAnswer(BaseModel):
-    """`accepted` once the process that has the vehicle's link has passed the order on; what comes of it is seen in the
-    vehicle's status. When it is false, `sentence` says why, and the order is not carried out later."""
+    """`accepted` is true once the process that has the vehicle's link has forwarded the command; the effect is seen in
+    the vehicle's status. When it is false, `sentence` says why, and the command is not carried out later."""
 
     accepted: bool
     sentence: str

@@ -1,7 +1,7 @@
-"""The process of a session: it has one vehicle, listens to it, and does what the worker says.
+"""Process of a vehicle connection: holds one vehicle's link and carries out the worker's requests.
 
-It looks into the pipe every few milliseconds, whatever it does with a vehicle that might move. What it shows of the
-vehicle is dropped when the worker does not read: nothing that flies waits for anybody.
+It polls the pipe every few milliseconds in every operation during which the vehicle might move. Status and telemetry
+are dropped when the worker does not read them, so that a flight never waits for the worker.
 """
 
 import datetime as dt
@@ -51,17 +51,18 @@ from app.vehicles.open import get_kind, restore_safe_gains
 POLL_INTERVAL_S: Final = 0.005
 STATUS_INTERVAL_S: Final = 0.2
 LOST_AFTER_S: Final = 3.0
-"""Without a heartbeat for so long, a vehicle is shown as gone."""
+"""A vehicle without a heartbeat for this long is shown as gone."""
 LOCK_TIMEOUT_S: Final = 120.0
-"""How long a session waits for the one of a worker that was killed: it may be landing, or waiting for a lost link."""
+"""How long the process waits for that of a killed worker, which may be landing or waiting for a lost link."""
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
-"""How long after its worker's end a process repeats an order: shorter than the next one's session waits."""
+"""How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
+lock."""
 RECONNECT_INTERVAL_S: Final = 2.0
 _EXPIRED: Final = "It reached the vehicle's process too late and was not passed on; whoever asked was told so."
 
 
 def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
-    """The process, from connecting until the worker closes the pipe or dies, or the link fails."""
+    """Main function of the process, from connecting until the worker closes the pipe or dies, or the link fails."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     line = WorkerPipe(pipe)
@@ -76,7 +77,7 @@ def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
         pass
     except GainlineError as error:
         line.send(failure_from(error))
-    except Exception as error:  # noqa: BLE001 - the edge of the process; the worker's log says it
+    except Exception as error:  # noqa: BLE001 - outermost frame of the process; the worker's log has the error
         line.send(internal_error(error))
     finally:
         pipe.close()
@@ -84,10 +85,10 @@ def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
 
 
 class VehicleProcess:
-    """One vehicle under control."""
+    """One connected vehicle, and the requests that it carries out."""
 
     def __init__(self, line: WorkerPipe, call: ConnectionRequest) -> None:
-        """Raises VehicleError when the vehicle does not answer."""
+        """Connect to the vehicle. Raises VehicleError when it does not answer."""
         self._line, self._call = line, call
         self._speed = float(call.options.get("clock_speed", 1.0))
         self._identity = call.identity
@@ -102,8 +103,10 @@ class VehicleProcess:
         line.send(ConnectionOpened(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
 
     def run(self) -> None:
-        """Do what is asked, one thing after the other. Raises PipeClosedError at the end, VehicleError when the link
-        fails."""
+        """Carry out requests one after another.
+
+        Raises PipeClosedError when the worker closes the pipe or dies, VehicleError when the link fails.
+        """
         try:
             while True:
                 self._carry_out(self._next())
@@ -118,7 +121,7 @@ class VehicleProcess:
             case VehicleRequest():
                 self._line.send(self._act(asked))
             case _:
-                pass  # of a flight that is over
+                pass  # belongs to a flight that is over
 
     def _finish_order(self) -> None:
         """Nobody listens any more: a vehicle that was told to land, or to stop its motors, is told so while it has not
@@ -157,19 +160,19 @@ class VehicleProcess:
         return vehicle
 
     def _pin(self, vehicle: ConnectedVehicle) -> None:
-        """As the worker does it: who answers is known from the first moment without a concern."""
+        """Pin the identity like the worker does: at the first connection without a concern."""
         if not vehicle.concern:
             self._identity = vehicle.identity
 
     def _next(self) -> ToVehicleProcess:
-        """The worker's next message that is no order, listening to the vehicle meanwhile."""
+        """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
         while (message := self._poll_commands()) is None:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
             self._publish_status()
         return message
 
     def _poll_commands(self) -> ToVehicleProcess | None:
-        """Pass an order on at once; any other message is returned."""
+        """Forward a command at once; return any other message."""
         message = self._line.receive()
         if not isinstance(message, VehicleCommand):
             return message
@@ -177,7 +180,10 @@ class VehicleProcess:
         return None
 
     def _while_waiting(self) -> None:
-        """In whatever takes time on the ground: an order goes out at once, and ends that."""
+        """Callback of slow operations on the ground: forwards a command at once, which interrupts the operation.
+
+        Raises InterruptedByOrderError for a forwarded command, VehicleError when the take-off is late.
+        """
         if not self._is_open:
             return
         self._publish_status()
@@ -192,7 +198,7 @@ class VehicleProcess:
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """By the first order that comes."""
+        """Context that the first command interrupts."""
         self._may_interrupt = True
         try:
             yield
@@ -200,11 +206,11 @@ class VehicleProcess:
             self._end_interruptions()
 
     def _end_interruptions(self) -> None:
-        """What follows goes to its end: the flight, which hears orders itself, or giving the safe gains back."""
+        """Make what follows uninterruptible: the flight, which polls commands itself, or restoring the safe gains."""
         self._may_interrupt, self._take_off_by_s = False, None
 
     def _forward_command(self, ordered: VehicleCommand) -> bool:
-        """Whether it went out."""
+        """Forward a command to the vehicle and report it to the worker. Returns whether it was sent."""
         problem = _EXPIRED if _has_expired(ordered) else ""
         if not problem:
             try:
@@ -240,7 +246,7 @@ class VehicleProcess:
 
     def _act(self, asked: VehicleRequest) -> VehicleResponse:
         try:
-            if self._vehicle.condition().armed:  # whatever takes time would keep Land waiting
+            if self._vehicle.condition().armed:  # a slow operation would delay Land
                 raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
             self._require_vehicle(asked.safe_gains)
             with self._interruptible():
@@ -272,7 +278,7 @@ class VehicleProcess:
         )
 
     def _require_vehicle(self, safe_gains: Mapping[str, float]) -> None:
-        """A vehicle whose safe gains a person has changed is connected anew, which writes them once it is pinned."""
+        """Reconnect if a person has changed the safe gains, which writes them once the vehicle is pinned."""
         if dict(self._vehicle.safe_gains) != dict(safe_gains):
             self._vehicle.close()
             self._vehicle = self._connect(safe_gains)
@@ -294,7 +300,7 @@ class VehicleProcess:
             self._line.send(failure_from(error))
         except PipeClosedError:
             raise
-        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial gets a truthful end
+        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
             self._line.send(internal_error(error))
         finally:
             self._trial_id = None
@@ -313,14 +319,14 @@ class VehicleProcess:
             return self._vehicle.stage(gains)
 
     def _await_takeoff_clearance(self) -> TakeOffCommand | None:
-        """Wait for the worker's word, attending the vehicle. Raises PipeClosedError."""
+        """Wait for the worker's decision, attending to the vehicle. Raises PipeClosedError."""
         while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
             self._note(answer)
         return answer if isinstance(answer, TakeOffCommand) else None
 
     def _require_in_time(self) -> None:
-        """Until it arms: every wait on the ground moves the deadline on, which only a process that stands still misses.
-        Raises VehicleError then."""
+        """Check the take-off deadline until the vehicle arms. Every wait on the ground extends it, so that only a
+        process that was suspended misses it. Raises VehicleError then."""
         by_s, now_s = self._take_off_by_s, time.monotonic()
         if by_s is None:
             return
@@ -354,7 +360,7 @@ class VehicleProcess:
         (self._line.send if isinstance(message, FlightPhase) else self._line.send_if_ready)(message)
 
     def _should_stop(self) -> StopRequest | None:
-        """Asked every few milliseconds in the air."""
+        """Stop callback, called every few milliseconds in the air."""
         self._publish_status()
         try:
             while not self._is_worker_gone and (message := self._line.receive()) is not None:
@@ -365,7 +371,7 @@ class VehicleProcess:
         return self._stop
 
     def _note(self, message: ToVehicleProcess) -> None:
-        """What ends the flight: the first reason counts, but motors off counts more."""
+        """Note a reason to end the flight: the first one counts, but motors off overrides it."""
         match message:
             case CancelFlight(trial_id, reason) if trial_id == self._trial_id:
                 self._stop = self._stop or StopRequest(reason)

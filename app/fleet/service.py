@@ -1,6 +1,6 @@
-"""Vehicles as campaigns and flights know them: who they are, and what state they are in.
+"""Vehicles as campaigns and flights use them: which vehicle, and its state.
 
-Registering is in `registering`, what a vehicle is asked beside its flights in `acts`, who is in control in `control`.
+Registration is in `registering`, requests beside flights in `acts`, operators' leases in `control`.
 """
 
 from collections.abc import Mapping
@@ -44,10 +44,10 @@ __all__ = [
 
 
 def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Gains) -> VehicleRow:
-    """The registered vehicle that is chosen by its id, or the shared one of a kind, made when it is the first time that
-    anybody wants it. `default_gains` are the experiment's.
+    """The registered vehicle with the chosen id, or the shared one of a kind, created at its first use.
 
-    Raises InputError when there is none, or when it tunes other gains than the experiment.
+    `default_gains` are the experiment's. Raises InputError when there is no such vehicle, or when its gains are not
+    those of the experiment.
     """
     if choice.id is not None:
         return _registered(session, choice, choice.id, default_gains)
@@ -84,8 +84,11 @@ def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, defaul
 
 
 def simulation_for(session: Session, experiment: str, gains: Gains) -> VehicleChoice | None:
-    """What flies an experiment without anything real: a simulation that is shared by campaigns, the most detailed one
-    first, else a registered vehicle that is simulated and has the same `gains`, one that is connected before others."""
+    """Simulation that can fly an experiment.
+
+    A simulation shared by campaigns, in the order of VEHICLE_KINDS (the most detailed first); else a registered vehicle
+    that is simulated and has the same `gains`, a connected one first. None when there is none.
+    """
     for kind in VEHICLE_KINDS.values():
         if kind.can_fly and not kind.is_real and experiment in kind.experiments:
             return VehicleChoice(kind=kind.name)
@@ -107,8 +110,7 @@ def _no_choice(field: str, reason: str) -> InputError:
 
 
 def require_ready(session: Session, row: VehicleRow, action: str) -> None:
-    """Raises ConflictError when the vehicle cannot be asked to `fly` or to `stage`, BusyError when it is asked
-    something else."""
+    """Raise ConflictError when the vehicle's state does not allow `fly` or `stage`, BusyError while it is busy."""
     if not can_fly(row):
         raise ConflictError(
             f"{row.name} cannot be flown from here.",
@@ -125,7 +127,7 @@ def require_ready(session: Session, row: VehicleRow, action: str) -> None:
 
 
 def require_idle(session: Session, row: VehicleRow) -> None:
-    """Raises BusyError while the vehicle has a flight, or is asked something else: nothing queues."""
+    """Raise BusyError while the vehicle has a flight or an act under way, because requests do not queue."""
     if (flight := repository.flight_under_way(session, row.id)) is not None:
         raise BusyError(
             f"{row.name} has a flight already: trial {flight.trial.number} of campaign {flight.campaign_id}.",
@@ -136,12 +138,12 @@ def require_idle(session: Session, row: VehicleRow) -> None:
 
 
 def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:
-    """Raises ConflictError when the states' table does not lead there."""
+    """Change a vehicle's state. Raises ConflictError when the transition is not in the table."""
     row.state = check_transition(TRANSITIONS, row.state, to, row.name)
 
 
 def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:
-    """After a flight, however it ended: ready again, or quarantined when there is a concern."""
+    """Set the state after a flight, however it ended: ready, or quarantined when there is a concern."""
     if concern:
         row.concern = concern
     target = VehicleState.QUARANTINED if concern else VehicleState.READY
@@ -150,17 +152,17 @@ def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:
 
 
 def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
-    """The vehicle has said which gains it holds."""
+    """Record the gains that the vehicle reported."""
     row.held, row.held_at = dict(held), utc_now()
 
 
 def is_classed_automatically(row: VehicleRow) -> bool:
-    """Whether a complete flight counts without a person's word: simulated ones do, and records sent in from outside."""
+    """Whether a complete flight counts without a review: simulated flights do, and imported records."""
     return not row.is_real or not can_fly(row)
 
 
 def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[Vehicle]:
-    """In the order in which they were registered or first wanted."""
+    """Page of vehicles in the order in which they were registered or first used."""
     after = 0 if cursor is None else decode_cursor("id", cursor, float)[1]
     rows, total = repository.page(session, after_id=after, limit=limit)
     following = encode_cursor("id", (0, rows[limit - 1].id)) if len(rows) > limit else None
@@ -168,12 +170,12 @@ def list_vehicles(session: Session, *, limit: int, cursor: str | None) -> Page[V
 
 
 def get_vehicle(session: Session, vehicle_id: int) -> Vehicle:
-    """Raises NotFoundError."""
+    """The vehicle with that id. Raises NotFoundError."""
     return vehicle_view(repository.get_one(session, vehicle_id))
 
 
 class BatteryReading(TypedDict):
-    """A flight's battery: its number in the vehicle's ledger, the label, and the voltages, V."""
+    """A flight's battery: the flight's number among the vehicle's, the label, and the voltages, V."""
 
     flight: int
     battery: str
@@ -182,7 +184,7 @@ class BatteryReading(TypedDict):
 
 
 def battery_flights(session: Session, vehicle_id: int) -> list[BatteryReading]:
-    """What was read of the battery before and after each flight, the oldest first."""
+    """Battery readings before and after each flight, oldest first."""
     return [
         BatteryReading(flight=place, battery=row.battery, before_v=row.battery_v_before, after_v=row.battery_v_after)
         for place, row in enumerate(repository.flights_of(session, vehicle_id), start=1)
@@ -190,5 +192,5 @@ def battery_flights(session: Session, vehicle_id: int) -> list[BatteryReading]:
 
 
 def safe_gains_changes(session: Session, vehicle_id: int) -> list[datetime]:
-    """When the safe gains were set, the oldest first."""
+    """Times at which the safe gains were set, oldest first."""
     return [row.requested_at for row in repository.safe_gains_acts(session, vehicle_id)]

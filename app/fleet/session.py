@@ -1,8 +1,9 @@
-"""A connected vehicle's session: a process of its own that keeps the link open between flights.
+"""Connection to a vehicle: a process of its own that keeps the link open between flights.
 
 This is the worker's side; the process itself is in `seat`. It never touches the database. When the worker dies, the
-pipe between them breaks: a flight is then aborted, the vehicle lands and is left with its safe gains, one that was told
-to land outside of a flight is told so until it has, and the process ends; the next worker's session waits until then.
+pipe between them breaks. A flight is then aborted: the vehicle lands and is left with its safe gains. A land or motors
+off command outside a flight is repeated until the vehicle obeys, for at most 60 s. Then the process ends; the next
+worker's connection waits for that.
 """
 
 import datetime as dt
@@ -45,23 +46,26 @@ _ENDED: Final = (
     "remote control now."
 )
 SILENT_AFTER_S: Final = 2.0
-"""A process that has its vehicle says something five times a second."""
+"""A process with an open link sends a status five times a second."""
 NOT_ANSWERING: Final = (
     "The process that has its link does not answer: orders do not reach the vehicle. If it flies, use its own remote "
     "control now."
 )
 MAX_UNANSWERED_ORDERS: Final = 50
-"""Far fewer than fit into the pipe of a process that reads nothing: whoever gives orders must not wait for it."""
+"""Far fewer than fill the pipe of a process that does not read, so that sending a command never blocks."""
 SHUTDOWN_TIMEOUT_S: Final = 5.0
 TAKE_OFF_TIMEOUT_S: Final = 2.0
-"""Nothing takes off later after its operator's word than that operator expects it."""
+"""A take-off later than this after the operator's request would surprise the operator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionRequest:
-    """Whom a session is for. `lock` is held as long as it has the vehicle; `identity` is the pinned one, None before
-    the first time; `trial_parameters` is the folder of what a trial changes beside the gains. `patient`: look for a
-    vehicle that does not answer until it does."""
+    """What the process needs to connect to a vehicle.
+
+    `lock` is held as long as the process has the vehicle. `identity` is the pinned one, None before the first
+    connection. `trial_parameters` is the folder for parameters that a trial changes besides the gains. `keep_retrying`:
+    retry until the vehicle answers.
+    """
 
     vehicle_id: int
     name: str
@@ -77,7 +81,7 @@ class ConnectionRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionOpened:
-    """Said by the process once the link is open; `concern` is why the vehicle may only be observed."""
+    """From the process: the link is open; `concern` is why the vehicle may only be observed."""
 
     identity: Identity
     concern: str
@@ -86,7 +90,7 @@ class ConnectionOpened:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleRequest:
-    """Said to the process: carry this act out, for a vehicle with these safe gains."""
+    """To the process: carry out this act, for a vehicle with these safe gains."""
 
     kind: ActKind
     safe_gains: Mapping[str, float]
@@ -94,7 +98,7 @@ class VehicleRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleResponse:
-    """Said by the process: what came of an act; `problem` when it failed. `held` are the gains as last read back."""
+    """From the process: outcome of an act; `problem` when it failed. `held` are the gains as last read back."""
 
     problem: str = ""
     concern: str = ""
@@ -106,8 +110,10 @@ class VehicleResponse:
 
 @dataclass(frozen=True, slots=True)
 class VehicleCommand:
-    """Said to the process at any moment: land, or motors off; not to be carried out after `by_s` of this computer's
-    monotonic clock. `number` comes back in the answer."""
+    """To the process, at any moment: land, or motors off.
+
+    Not to be carried out after `by_s` of this computer's monotonic clock, s. The answer carries the same `number`.
+    """
 
     number: int
     order: VehicleCommandKind
@@ -117,7 +123,7 @@ class VehicleCommand:
 
 @dataclass(frozen=True, slots=True)
 class CommandForwarded:
-    """Said by the process: an order was passed on to the vehicle; `problem` when it could not be."""
+    """From the process: a command was forwarded to the vehicle; `problem` when it could not be."""
 
     number: int
     order: VehicleCommandKind
@@ -133,9 +139,9 @@ MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 class VehicleConnection:
     """The worker's handle of such a process: a FlightBackend for flights, and a link to the vehicle in between.
 
-    `hear` is told, on a thread of the session's own, how the vehicle is and what became of orders; of a process that
-    stands still, every two seconds that it does not answer. One conversation at
-    a time: a flight or an act; orders may come at any moment, from any thread.
+    `hear` is called on a thread of the connection with the vehicle's status and the outcome of commands; while the
+    process does not answer, every two seconds with a status that says so. One flight or act at a time; commands may be
+    sent at any moment, from any thread.
     """
 
     def __init__(
@@ -152,11 +158,11 @@ class VehicleConnection:
         theirs.close()
         self._numbers = itertools.count(1)
         self._orders: dict[int, Future[str]] = {}
-        """Those that the process has not answered, by their numbers."""
+        """Commands that the process has not answered, by their numbers."""
         self._ended = threading.Event()
         self._open = False
         self.trial_id: int | None = None
-        """Of the flight under way."""
+        """Trial of the running flight."""
         threading.Thread(target=self._listen, name=f"session {call.name}", daemon=True).start()
 
     @property
@@ -168,8 +174,11 @@ class VehicleConnection:
         return self._process.pid
 
     def wait_until_open(self) -> ConnectionOpened:
-        """Wait until the link is open. Raises VehicleError when it cannot be, SafeGainsError when the vehicle's gains
-        are in doubt; the process has ended then."""
+        """Wait until the link is open.
+
+        Raises VehicleError when it cannot be opened, SafeGainsError when the vehicle's gains are in doubt; the process
+        has then ended.
+        """
         match self._next():
             case ConnectionOpened() as said:
                 self._open = True
@@ -180,14 +189,14 @@ class VehicleConnection:
                 raise AssertionError(f"A session began with {other!r}.")
 
     def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> VehicleResponse:
-        """Have an act carried out and wait for what came of it. Raises VehicleError when the process dies."""
+        """Carry out an act and wait for its outcome. Raises VehicleError when the process dies."""
         self._post(VehicleRequest(kind=kind, safe_gains=dict(safe_gains)))
         said = self._next()
         assert isinstance(said, VehicleResponse), said
         return said
 
     def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        """As `FlightBackend.fly` says."""
+        """See `FlightBackend.fly`."""
         self.trial_id = orders.trial_id
         try:
             self._post(orders)
@@ -209,7 +218,7 @@ class VehicleConnection:
         self._post(CancelFlight(trial_id, reason))
 
     def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
-        """What will say why the order did not go out to the vehicle, or nothing once it has."""
+        """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was."""
         told: Future[str] = Future()
         if len(self._orders) >= MAX_UNANSWERED_ORDERS:
             told.set_result(NOT_ANSWERING)
@@ -228,15 +237,15 @@ class VehicleConnection:
     def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
         with suppress(OSError), socket.socket(fileno=os.dup(self._pipe.fileno())) as end:
-            end.shutdown(socket.SHUT_RDWR)  # unlike closing the pipe, it wakes who listens to it
+            end.shutdown(socket.SHUT_RDWR)  # unlike closing the pipe, this wakes the listening thread
 
     def close(self) -> None:
-        """Hang up and see the process end, unless it takes long."""
+        """Request the close and wait for the process to end, for at most SHUTDOWN_TIMEOUT_S."""
         self.request_close()
         self._process.join(SHUTDOWN_TIMEOUT_S)
 
     def _next(self) -> FromVehicleProcess:
-        """What the process says next, apart from what is heard at once. Raises VehicleError when it is dead."""
+        """Return the process's next flight or act message. Raises VehicleError when the process is dead."""
         if (said := self._said.get()) is None:
             self._said.put(None)
             raise process_died_error(self._process.exitcode)
@@ -273,7 +282,7 @@ class VehicleConnection:
     def _post(self, message: ToVehicleProcess) -> bool:
         try:
             self._send(message)
-        except OSError:  # it is dead, which whoever listens to it learns
+        except OSError:  # the process is dead: the listening thread reports it
             return False
         return True
 

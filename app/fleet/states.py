@@ -1,4 +1,4 @@
-"""The states of a vehicle, and of what it is asked beside its flights."""
+"""States of a vehicle, and of its acts: requests beside its flights."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -6,14 +6,14 @@ from typing import Final
 
 
 class VehicleState(StrEnum):
-    """What may be asked of a vehicle.
+    """States of a vehicle.
 
-        disconnected ←→ ready ←→ staged ──→ flying ──→ ready
-              ↑           ↑         └──────────┴──→ quarantined
-              └───────────┴── released by a person ──────┘
+            disconnected ←→ ready ←→ staged ──→ flying ──→ ready
+                  ↑           ↑         └──────────┴──→ quarantined
+                  └───────────┴── released by a person ──────┘
 
-    Quarantined: something could not be verified, for instance that the safe gains are back. It flies nothing until a
-    person has looked at it and releases it.
+    Quarantined: something could not be verified, for instance that the safe gains are restored. The vehicle is grounded
+    until a person has looked at it and releases it.
     """
 
     DISCONNECTED = "disconnected"
@@ -47,12 +47,12 @@ ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "motors off": _MAYBE_UP,
     "release": frozenset({VehicleState.QUARANTINED}),
 }
-"""What a person may do with a vehicle, and in which states. Only registered vehicles that the program keeps a link to
-take anything beside `fly` and `release`. One that is not connected is disconnected where it is looked for."""
+"""Actions that a person may take on a vehicle, and in which states. A vehicle that is not registered takes only `fly`
+and `release`. To disconnect a vehicle that is not connected is to stop looking for it."""
 
 
 class ActKind(StrEnum):
-    """What a registered vehicle was asked, or what was decided about it, beside its flights."""
+    """Kinds of acts: requests to a registered vehicle and decisions about it, beside its flights."""
 
     CONNECT = "connect"
     DISCONNECT = "disconnect"
@@ -67,13 +67,15 @@ class ActKind(StrEnum):
 
 
 GIVES_GAINS: Final = frozenset({ActKind.CONNECT, ActKind.RESTORE, ActKind.RELEASE})
-"""Acts that write the safe gains to the vehicle, and so stand in its ledger. A first connection only compares: it
-stands there where the vehicle was found with them."""
+"""Acts that write the safe gains to the vehicle and so belong in its ledger. A first connection only compares the
+gains; it is in the ledger if the vehicle was found with its safe gains."""
 
 
 class ActState(StrEnum):
-    """requested ──→ running ──→ done | failed
-    └──→ failed
+    """States of an act.
+
+    requested ──→ running ──→ done | failed
+        └──→ failed
     """
 
     REQUESTED = "requested"

@@ -1,8 +1,6 @@
-"""Sessions of connected vehicles: what people ask of these beside flights is carried out here, and links that are
-wanted are kept open.
+"""Connections to vehicles: carries out acts, and keeps the wanted links open.
 
-Landing and motors off go from the socket's thread straight into a session's pipe; what became of them is written down
-afterwards.
+Land and motors off go from the socket's thread straight into a connection's pipe; their outcome is recorded afterwards.
 """
 
 import datetime as dt
@@ -44,12 +42,12 @@ _log = structlog.get_logger(__name__)
 
 @dataclass(slots=True)
 class VehicleSlot:
-    """A vehicle's place: the session that has it. `busy` is held while one is opened or closed."""
+    """Connection of one vehicle. `busy` is held while a connection is opened or closed."""
 
     busy: threading.Lock = field(default_factory=threading.Lock)
     session: VehicleConnection | None = None
     reconnecting: VehicleConnection | None = None
-    """One that waits for a vehicle that does not answer."""
+    """A connection that is waiting for its vehicle to answer."""
     concern: str = ""
 
     @property
@@ -58,9 +56,11 @@ class VehicleSlot:
 
 
 class VehicleConnectionManager:
-    """Claims acts and carries them out, and has the sessions. `closing` ends the waiting for a database that takes
-    nothing. `order` and `session` may be called from any thread. Without `real`, no real vehicle is connected again by
-    itself: others reach the server."""
+    """Claims and carries out acts, and owns the connections.
+
+    `closing` ends the retries while the database accepts no writes. `order` and `session` may be called from any
+    thread. Without `links`, no vehicle is reconnected automatically.
+    """
 
     def __init__(
         self,
@@ -88,7 +88,10 @@ class VehicleConnectionManager:
         self._record_executor = ThreadPoolExecutor(1, thread_name_prefix="books")
 
     def recover(self) -> None:
-        """After a start, and after the flights' own recovery: nobody has a link to any vehicle. Raises StorageError."""
+        """Reset the vehicles' states at a worker's start, when no link is open; call it after the recovery of flights.
+
+        Raises StorageError.
+        """
         with self._database.write() as transaction:
             acts.withdraw_acts(transaction)
             acts.forget_connections(transaction)
@@ -96,7 +99,7 @@ class VehicleConnectionManager:
                 acts.request_reconnections(transaction)
 
     def close(self) -> None:
-        """When nothing is carried out any more: every vehicle is let go, with its safe gains."""
+        """Close all connections once nothing is being carried out; every vehicle is left with its safe gains."""
         slots = tuple(self._slots.values())
         for session in [each for slot in slots for each in (slot.session, slot.reconnecting) if each is not None]:
             session.request_close()
@@ -108,8 +111,10 @@ class VehicleConnectionManager:
     # ---- from any thread
 
     def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
-        """What will say why the order did not go out to the vehicle, or nothing once it has. A flight that waits for
-        its take-off stands down by it too."""
+        """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was.
+
+        A flight that waits for its take-off stands down as well.
+        """
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:
             return _refused(NO_LINK)
@@ -119,7 +124,7 @@ class VehicleConnectionManager:
         return told
 
     def session(self, vehicle_id: int) -> VehicleConnection:
-        """For a flight. Raises VehicleError when there is no link."""
+        """The vehicle's connection, for a flight. Raises VehicleError when there is none."""
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:
             raise _no_link_error()
@@ -128,16 +133,16 @@ class VehicleConnectionManager:
     # ---- acts
 
     def claim(self) -> ActTask | None:
-        """The act that has waited longest, now this worker's; None when none waits. Raises StorageError."""
+        """Claim the oldest requested act for this worker; None when there is none. Raises StorageError."""
         with self._database.write() as transaction:
             return acts.claim_act(transaction, self._worker)
 
     def carry_out(self, task: ActTask) -> None:
-        """The whole act, to its stored outcome. Raises nothing."""
+        """Carry out an act and store its outcome. Raises nothing."""
         with structlog.contextvars.bound_contextvars(vehicle_id=task.vehicle.vehicle_id, act_id=task.act_id):
             try:
                 {ActKind.CONNECT: self._connect, ActKind.DISCONNECT: self._disconnect}.get(task.kind, self._ask)(task)
-            except Exception as error:  # noqa: BLE001 - the edge of the thread; the vehicle must not stay busy for ever
+            except Exception as error:  # noqa: BLE001 - outermost frame; the vehicle must not stay busy for ever
                 _log.exception("act failed by a mistake of the program")
                 self._fail(task, f"The program made a mistake ({type(error).__name__}); see the worker's log.")
 
@@ -162,7 +167,7 @@ class VehicleConnectionManager:
         self._store_with_retry(partial(_disconnected, task=task))
 
     def _close(self, vehicle_id: int, *, only: VehicleConnection | None = None) -> None:
-        """The vehicle's session, whichever it is or `only` that one."""
+        """Close the vehicle's connection; with `only`, close it only if it is that one."""
         slot = self._slot(vehicle_id)
         self._acquire_slot(slot)
         try:
@@ -176,7 +181,7 @@ class VehicleConnectionManager:
         self._publish_state(vehicle_id, "gone")
 
     def _acquire_slot(self, slot: VehicleSlot) -> None:
-        """The slot for an act: a session that seeks its vehicle, be it one that is only about to, gives way."""
+        """Acquire the slot for an act; closes a connection attempt that is holding it."""
         while not slot.busy.acquire(timeout=self._clock.wall_s(YIELD_POLL_S)):
             if (seeking := slot.reconnecting) is not None:
                 seeking.request_close()
@@ -202,8 +207,10 @@ class VehicleConnectionManager:
     # ---- links
 
     def maintain(self) -> None:
-        """To be called every second or so: sessions that ended by themselves are taken out of the books, and vehicles
-        that are wanted connected are looked for. Raises StorageError."""
+        """Release ended connections, and reconnect vehicles that are wanted connected. Call it about every second.
+
+        Raises StorageError.
+        """
         for vehicle_id, slot in tuple(self._slots.items()):
             if (session := slot.session) is not None and not session.alive:
                 self._release_ended(vehicle_id, slot, session)
@@ -220,9 +227,9 @@ class VehicleConnectionManager:
             with self._database.write() as transaction:
                 acts.record_disconnected(transaction, vehicle_id)
         except ConflictError:
-            return  # its flight is still in the books; later
+            return  # the database still has its flight: try again later
         _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
-        if slot.session is gone:  # and not one that was opened meanwhile
+        if slot.session is gone:  # not one that was opened meanwhile
             slot.session = None
         self._publish_state(vehicle_id, "gone")
 
@@ -235,7 +242,8 @@ class VehicleConnectionManager:
             self._reconnect_executor.submit(self._reconnect, slot, vehicle)
 
     def _reconnect(self, slot: VehicleSlot, vehicle: LinkedVehicle) -> None:
-        """With `busy` held. Raises nothing that matters: who is wanted is looked for again."""
+        """Connect a wanted vehicle, with `busy` held. Errors are logged only, because the next attempt follows
+        anyway."""
         try:
             said = self._open_connection(slot, vehicle, patient=True)
             found = slot.session
@@ -253,7 +261,7 @@ class VehicleConnectionManager:
             self._close(vehicle.vehicle_id, only=found)
 
     def _open_connection(self, slot: VehicleSlot, vehicle: LinkedVehicle, *, patient: bool = False) -> ConnectionOpened:
-        """With `busy` held. Raises VehicleError when there is no link in the end."""
+        """Open a connection, with `busy` held. Raises VehicleError when no link is established."""
         vehicle_id = vehicle.vehicle_id
         if slot.session is not None:
             slot.session.close()
@@ -290,10 +298,10 @@ class VehicleConnectionManager:
     def _slot(self, vehicle_id: int) -> VehicleSlot:
         return self._slots.setdefault(vehicle_id, VehicleSlot())
 
-    # ---- what sessions say by themselves
+    # ---- unsolicited messages of connections
 
     def _on_message(self, slot: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
-        """On the session's own thread."""
+        """Handle a message, on the connection's own thread."""
         match news:
             case VehicleStatus(concern=concern):
                 self._publish(news)
@@ -308,15 +316,16 @@ class VehicleConnectionManager:
         now = dt.datetime.now(dt.UTC).isoformat()
         self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=now, step=""))
 
-    # ---- books
+    # ---- database
 
     def _record_in_background(self, work: Callable[[Transaction], None]) -> None:
-        """Afterwards, in its turn: whoever says it waits for nothing."""
+        """Record in the background, in order, so that the caller does not wait for the database."""
         with suppress(RuntimeError):  # the worker has ended
             self._record_executor.submit(self._store_with_retry, work)
 
     def _store_with_retry(self, work: Callable[[Transaction], T]) -> T | None:
-        """What `work` gives, tried until the database takes it; None when it does not fit, or the worker closes."""
+        """Result of `work`, retried until the database accepts it; None if the database refuses it or the worker
+        closes."""
         while True:
             try:
                 with self._database.write() as transaction:

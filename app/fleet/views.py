@@ -1,4 +1,4 @@
-"""How vehicles, their acts and their ledger look from outside."""
+"""API views of vehicles, their acts and their ledger."""
 
 from typing import Final
 
@@ -71,7 +71,7 @@ def act_view(row: VehicleActRow) -> VehicleAct:
 
 
 def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
-    """The newest first. Raises NotFoundError."""
+    """Page of acts, newest first. Raises NotFoundError."""
     repository.get_one(session, vehicle_id)
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.acts(session, vehicle_id, before_id=before, limit=limit)
@@ -80,7 +80,7 @@ def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | No
 
 
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:
-    """Every gain set that the vehicle was given, the newest first. Raises NotFoundError."""
+    """Page of the gain sets that the vehicle was given, newest first. Raises NotFoundError."""
     vehicle = repository.get_one(session, vehicle_id)
     before = None if cursor is None else decode_cursor(_NEWEST_FIRST, cursor, str)
     found, total = repository.ledger(session, vehicle_id, before=before, limit=limit)
