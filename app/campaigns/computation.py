@@ -1,4 +1,4 @@
-"""What a proposal is computed from, and how: pure, without the database, for processes that only compute."""
+"""Computation of a proposal: pure and without the database, for compute processes."""
 
 from dataclasses import dataclass
 
@@ -17,9 +17,11 @@ from app.core.strategies.base import Proposal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignHistory:
-    """All that a proposal is computed from. `digest` changes as soon as any of it does. `donor` is the flight that a
-    warm start comes from; the definition holds the checksum of its record. `battery_v` is the voltage, V, at which the
-    last flight ended, one that does not count included."""
+    """All that a proposal is computed from. `digest` changes as soon as any of it does.
+
+    `donor` is the flight that a warm start begins from; the definition holds the checksum of its record. `battery_v` is
+    the battery voltage, V, at the end of the last flight, including one that does not count.
+    """
 
     campaign_id: int
     definition: Definition
@@ -31,8 +33,8 @@ class CampaignHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProposalComputation:
-    """A proposal with the gate's word on it, over the `spread` of what is known of the vehicle, the stop rule's, and
-    what is recommended."""
+    """A proposal with its gate result, the parameter distribution `spread` it was checked over, the stop rule's
+    verdict, and the recommended next action."""
 
     history_digest: str
     proposal: Proposal
@@ -44,7 +46,10 @@ class ProposalComputation:
 
 
 def compute(past: CampaignHistory) -> ProposalComputation:
-    """Pure: the same history gives the same answer. Takes up to a second; call it outside of any transaction."""
+    """Compute the next proposal. Deterministic: the same history gives the same result.
+
+    Takes up to a second; call it outside of any transaction.
+    """
     definition, flights = past.definition, past.flights
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, flights, past.donor)
@@ -71,7 +76,7 @@ def compute(past: CampaignHistory) -> ProposalComputation:
 
 
 def warm_up() -> None:
-    """Load and compile what a proposal needs, so that the first one is as quick as the others."""
+    """Import and compile what a proposal needs, so that the first one is as fast as the others."""
     definition, experiment = Definition(), Takeoff()
     default = experiment.space.default
     flown = experiment.simulate(default, experiment.nominal_model)

@@ -1,4 +1,4 @@
-"""A campaign's definition on its way from a request to the core, into its row, and back."""
+"""Conversion of a campaign's definition: from a request to the core, into its row, and back."""
 
 import hashlib
 import json
@@ -22,25 +22,29 @@ _ADAPTER: Final = TypeAdapter(Definition)
 
 
 def core_definition(asked: DefinitionIn) -> Definition:
-    """The same definition as the core has it, unchecked."""
+    """Convert a request's definition to the core's, unchecked."""
     return _ADAPTER.validate_python(asked.model_dump())
 
 
 def definition_of(row: CampaignRow) -> Definition:
-    """The definition of a stored campaign, with its vehicle's safe gains (once it has flown, those at its first flight)
-    where they are not the experiment's own."""
+    """The definition of a stored campaign, with safe gains if they are not the experiment's defaults.
+
+    The safe gains are the vehicle's, or those at the campaign's first flight once it has flown.
+    """
     space = get_experiment(row.experiment).space
     own = dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains)
     default = space.mapping(space.default)
-    are_others = own.keys() != default.keys()  # a vehicle that is flown elsewhere stands for several
+    are_others = own.keys() != default.keys()  # a placeholder of a vehicle elsewhere may serve several experiments
     safe_gains = None if are_others or own == default else own
     return replace(_ADAPTER.validate_python(row.definition), safe_gains=safe_gains)
 
 
 def frozen_digest(row: CampaignRow) -> str:
-    """SHA-256 over all that is frozen at the first flight: the definition, the vehicle (a registered one by its id, a
-    shared one with all its settings), and its safe gains. Proposals carry the narrower digest of the definition,
-    because they depend on nothing else."""
+    """SHA-256 over all that is frozen at the first flight.
+
+    That is the definition, the vehicle (a registered one by its id, a shared one by all its settings), and its safe
+    gains. Proposals carry the digest of the definition alone, because they depend on nothing else.
+    """
     frozen = {
         "definition": definition_of(row).digest(),
         "vehicle": row.vehicle.kind,
@@ -52,13 +56,16 @@ def frozen_digest(row: CampaignRow) -> str:
 
 
 def stored(definition: Definition) -> JsonObject:
-    """For the row; safe gains are the vehicle's."""
+    """The definition as stored in the row, without the safe gains, which are the vehicle's."""
     return {name: value for name, value in asdict(definition).items() if name != "safe_gains"}
 
 
 def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definition, dict[str, OptionValue]]:
-    """Definition and complete vehicle options: none for a registered vehicle, which has its own, and whose gains the
-    fleet compares with the experiment's. Raises InputError naming everything that cannot be used in either."""
+    """Check a campaign; return its definition and the complete vehicle options.
+
+    A registered vehicle has options of its own, so none are returned; its gains are compared with the experiment's in
+    `fleet`. Raises InputError that names everything invalid in either.
+    """
     _require_whole(asked)
     definition = core_definition(asked)
     options: dict[str, OptionValue] = {}
@@ -92,7 +99,8 @@ def _require_whole(asked: DefinitionIn) -> None:
 
 
 def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionValue]) -> Iterator[Problem]:
-    """`options` are empty where they could not be used, and for a registered vehicle."""
+    """Problems with the combination of experiment and vehicle. `options` is empty if invalid, and for a registered
+    vehicle."""
     if kind not in VEHICLE_KINDS:
         return
     described = VEHICLE_KINDS[kind]

@@ -1,4 +1,4 @@
-"""The flight of another campaign that a warm start comes from, looked up when the campaign is defined."""
+"""Donor of a warm start: a flight of another campaign, looked up when the campaign is defined."""
 
 from sqlalchemy.orm import Session
 
@@ -12,11 +12,11 @@ from app.trials.states import TrialState
 
 
 def fill_in_donor(session: Session, asked: Definition) -> Definition:
-    """The same definition with the donor's trial number, checksum and gains filled in; without a donor as it is.
+    """Return the definition with the donor's trial number, checksum and gains filled in; unchanged without a donor.
 
-    The donor is the best valid flight of its campaign unless a trial is named. Its record and its gains are kept from
-    then on, whatever the trial is classed as later. Raises InputError when there is no such flight, it belongs to
-    another experiment, or its record is not the one that the definition names.
+    The donor is the best valid flight of its campaign unless a trial is named. Its record and gains are fixed from then
+    on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs to another
+    experiment, or its record does not match the checksum in the definition.
     """
     named = asked.start.donor
     if named is None or asked.start.kind != "campaign":

@@ -1,4 +1,4 @@
-"""What the figures need, gathered from storage as plain data."""
+"""Input data of the figures, loaded from the database as plain data."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -37,14 +37,16 @@ _INPUTS: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
         {"pitch_rad": "Pitch", "pitch_reference_rad": "Pitch reference", "elevator_rad": "Elevator"},
     ),
 }
-"""What is drawn below the scored output, by experiment: the axis, and the channels with their titles."""
+"""Channels below the scored output in a flight's figure, by experiment: the axis title, and the channels with their
+titles."""
 _CONFIDENCE: Final = 0.9
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
 
 @dataclass(frozen=True, slots=True)
 class FigureView:
-    """What somebody looks at: seconds of the curves, None for all; and a flight that is to have one, by its number."""
+    """View of a figure: the time range of the curves, s, None for all; and the number of a flight to be drawn
+    individually."""
 
     window: Range | None = None
     chosen: int | None = None
@@ -75,8 +77,11 @@ def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
 
 
 def history_of(session: Session, campaign_id: int, *, curves: bool, view: FigureView = WHOLE_FLIGHT) -> History:
-    """The campaign as its figures see it; without `curves` no record is read, and with them only of those flights that
-    have a curve of their own: of many flights the rest come as their coarse copies."""
+    """Input data of the campaign's figures.
+
+    Without `curves` no record is read. With them, full records are read only for the flights that are drawn
+    individually; the others have their coarse curves.
+    """
     campaign = repository.get_one(session, campaign_id)
     definition = definition_of(campaign)
     experiment = experiment_of(definition)
@@ -119,8 +124,8 @@ def _flight(row: TrialRow) -> FlightData:
 
 
 def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
-    """The scatter of repeated flights, with what the experiment knew of it before; None without a valid flight, and
-    while it is not known."""
+    """Scatter of repeated flights, including the experiment's prior; None without a valid flight, and while it is not
+    known."""
     groups = groups_of(history.flown_gains(rows))
     scatter = pool_scatter(groups, prior)
     if not groups or not scatter.known:
@@ -145,8 +150,10 @@ def _glitches(row: TrialRow) -> tuple[Range, ...]:
 
 
 def _curves(session: Session, flown: Sequence[TrialRow], whole: Collection[int], output: str) -> dict[int, Curve]:
-    """The scored output of each flight that left a record, by its number: of those in `whole` as it was recorded,
-    unless the record is damaged."""
+    """Scored output of each flight that has a record, by its number.
+
+    At full rate for those in `whole` whose record is not damaged, else coarse.
+    """
     recorded = [row for row in flown if row.trajectory_id is not None]
     records = history.readable_of(
         session, [row.trajectory_id for row in recorded if row.trajectory_id is not None and row.number in whole]
@@ -169,7 +176,7 @@ def _coarse(curves: Mapping[int, list[list[float]]], row: TrialRow) -> Curve:
 
 @lru_cache
 def _goal(experiment_name: str) -> tuple[Curve, Curve | None]:
-    """Set point of an experiment, and its reference, if its model has one: the same whatever the gains."""
+    """Set point of an experiment, and its reference if its model has one; neither depends on the gains."""
     experiment = get_experiment(experiment_name)
     grid = experiment.grid_s
     set_point = Curve(grid, experiment.set_point(grid))
@@ -181,7 +188,8 @@ def _goal(experiment_name: str) -> tuple[Curve, Curve | None]:
 
 
 def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow], output: str) -> NextFlight | None:
-    """The trial that is planned or in the air, else the proposal for the one after the last."""
+    """The trial that is planned or flying, else the fresh proposal for the trial after the last one; None if there is
+    none."""
     planned = next((row for row in rows if row.state in _UNFLOWN), None)
     if planned is not None:
         return NextFlight(
@@ -213,7 +221,7 @@ def _proposal_of(session: Session, row: TrialRow) -> ProposalRow | None:
 
 
 def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _Predicted:
-    """The predicted curve with its band, as far as there are any."""
+    """Predicted curve of a proposal and its band, where there are any."""
     if proposal is None or proposal.predicted_id is None:
         return {"curve": None, "band": None}
     predicted = history.readable_of(session, [proposal.predicted_id]).get(proposal.predicted_id)

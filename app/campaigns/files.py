@@ -1,4 +1,4 @@
-"""Campaign files: a campaign as YAML, the fields of `POST /api/campaigns` and a description. Errors name the line."""
+"""Campaign files: the fields of `POST /api/campaigns` and a description, as YAML. Errors name the line."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,27 +24,29 @@ MAX_FILE_BYTES: Final = 2**20
 
 
 class CampaignFile(NewCampaign):
-    """What a campaign file holds; what is left out has the same working default as over REST. `gains` are the sets that
-    `gainline run` flies one after the other under the strategy `manual`."""
+    """Content of a campaign file; omitted fields have the same defaults as in the API.
+
+    `gains` are the sets that `gainline run` flies one after another under the strategy `manual`.
+    """
 
     description: Text = ""
     gains: Annotated[list[dict[str, Number]], Field(max_length=MAX_FLIGHTS)] = Field(default_factory=list)
 
 
 def preset_names() -> tuple[str, ...]:
-    """The campaigns that come with the program, the paper's own first."""
+    """Names of the campaigns that come with the program, the paper's own first."""
     return tuple(sorted((path.stem for path in PRESETS_DIR.glob("*.yaml")), key=lambda name: (len(name), name)))
 
 
 def read_preset(name: str) -> CampaignFile:
-    """Raises NotFoundError naming the presets that there are."""
+    """Read a preset. Raises NotFoundError that names the available presets."""
     if name not in preset_names():
         raise NotFoundError("preset", name, hint=f"Choose one of {', '.join(preset_names())}, or give a YAML file.")
     return read_campaign_file(PRESETS_DIR / f"{name}.yaml")
 
 
 def read_campaign_file(path: Path) -> CampaignFile:
-    """Read and check a campaign file. Raises InputError with the line of everything that is wrong."""
+    """Read and check a campaign file. Raises InputError with the line of each problem."""
     document = _load(path)
     try:
         file = CampaignFile.model_validate(document)
@@ -66,8 +68,10 @@ def read_campaign_file(path: Path) -> CampaignFile:
 def gains_by_hand(
     file: CampaignFile, definition: Definition, *, within_bounds: bool = False
 ) -> tuple[dict[str, float], ...]:
-    """The sets to be flown, each complete and in the experiment's order. Raises InputError naming what is wrong in
-    which (`gains.0.kp`), and for sets that the strategy would not look at."""
+    """The gain sets to be flown, each complete and in the experiment's order.
+
+    Raises InputError that names each invalid gain (`gains.0.kp`), and when the strategy does not use given gains.
+    """
     if file.gains and definition.strategy != MANUAL.name:
         raise InputError(
             "These gains would not be flown.",
@@ -120,7 +124,7 @@ def _load(path: Path) -> "CommentedMap":
 
 
 def _steps(field: str) -> list[str | int]:
-    """The way to a field, as in `gains.0.kp`."""
+    """Path to a field, from text such as `gains.0.kp`."""
     return [int(part) if part.isdecimal() else part for part in field.split(".")]
 
 
@@ -129,7 +133,7 @@ def _located(document: "CommentedMap", where: Sequence[str | int], reason: str) 
 
 
 def _line(document: "CommentedMap", where: Sequence[str | int]) -> int:
-    """The line of the deepest part of `where` that the file holds, counted from 1."""
+    """Line of the deepest part of `where` that the file holds, counted from 1."""
     from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
     node: object = document
@@ -146,7 +150,8 @@ def _line(document: "CommentedMap", where: Sequence[str | int]) -> int:
 
 
 def with_settings(file: CampaignFile, settings: Mapping[tuple[str, ...], object]) -> CampaignFile:
-    """The file with some fields replaced, each named by its path. Raises InputError when the result is no campaign."""
+    """The file with some fields replaced, each given by its path. Raises InputError when the result is not a valid
+    campaign."""
     document = file.model_dump()
     for path, value in settings.items():
         node = document

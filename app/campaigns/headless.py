@@ -1,4 +1,4 @@
-"""A whole campaign without a database, by the same functions that the dashboard's jobs and flights use."""
+"""Runs a whole campaign without a database, by the same functions as the dashboard's jobs and flights."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,8 +27,10 @@ Outcome = Literal["valid", "aborted", "invalid"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadlessTrial:
-    """One flown trial; `error` is None unless the flight was complete and could be scored. `overrule_reason` says why
-    it flew although the gate refused its gains."""
+    """One flown trial. `error` is None unless the flight was complete and could be scored.
+
+    `overrule_reason` is why the trial was flown although the gate refused its gains.
+    """
 
     number: int
     kind: Kind
@@ -43,7 +45,7 @@ class HeadlessTrial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadlessCampaign:
-    """All trials of a campaign, in their order, and why it ended."""
+    """All trials of a campaign in their order, and why it ended."""
 
     trials: Sequence[HeadlessTrial]
     stopped_because: str
@@ -56,8 +58,11 @@ class HeadlessCampaign:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignListener:
-    """What the caller wants to hear: a proposal before its flight, samples during it, the trial after it; and which
-    gains the vehicle holds as soon as these are others, None while nobody knows."""
+    """Callbacks of a campaign.
+
+    `proposed` before a flight, `sampled` during it, `landed` after it; `holding` whenever the gains on the vehicle
+    change, with None while they are unknown.
+    """
 
     proposed: Callable[[int, Proposal], None] = field(default=lambda _number, _proposal: None)
     sampled: Callable[[Sample], None] = field(default=lambda _sample: None)
@@ -75,14 +80,14 @@ def fly_campaign(
     overrule: str = "",
     trial_parameters: Path | None = None,
 ) -> HeadlessCampaign:
-    """Fly proposals as fast as possible until the campaign's own rule ends it; in their place `gains`, complete sets of
-    one's own, until all are flown.
+    """Fly proposals as fast as possible until the campaign's stop rule ends it; or fly `gains`, complete sets, until
+    all are flown.
 
-    `overrule` is the reason why gains that the gate refuses shall fly all the same, on a simulated vehicle. There is
-    nobody here to look at glitches: a flight with any does not count. `trial_parameters` is as in `open_vehicle`.
+    `overrule` is the reason why gains that the gate refuses are flown all the same, on a simulated vehicle. A flight
+    with glitches does not count, because no person reviews it. `trial_parameters` is as in `open_vehicle`.
 
-    The definition must have been checked. Raises InputError for a warm start, whose donor only a database has,
-    GainsError when the strategy proposes what the gate refuses, and VehicleError when the vehicle cannot fly.
+    The definition must have been checked. Raises InputError for a warm start, whose donor is in a database, GainsError
+    when the gate refuses the strategy's proposal, and VehicleError when the vehicle cannot fly.
     """
     _require_no_donor(definition)
     experiment = experiment_of(definition)
@@ -114,7 +119,7 @@ def fly_campaign(
 
 
 def _manual_proposal(gains: Gains, history: Sequence[Flight]) -> Proposal:
-    """What a person or a script has chosen promises nothing."""
+    """Proposal for gains that a person or a script has chosen, without a prediction."""
     return Proposal(
         kind="repeat" if was_flown(gains, history) else "manual",
         gains=dict(gains),
@@ -131,7 +136,7 @@ def _stop_reason(
     proposal: Proposal,
     battery_v: float | None,
 ) -> str:
-    """Why nothing more is flown; empty while there is more. `battery_v`: where the last trial ended."""
+    """Why the campaign ends; empty while it continues. `battery_v`: voltage at the end of the last trial."""
     judged = evaluate_stop_rule(definition, history, proposal, battery_v=battery_v)
     if judged.stop:
         return judged.why
@@ -141,7 +146,7 @@ def _stop_reason(
 
 
 def _flight_of(trial: HeadlessTrial, proposal: Proposal, record: FlightRecord) -> tuple[Flight, ...]:
-    """The trial as the next proposals see it; nothing where it does not count."""
+    """The trial as a flight of the history; empty if it does not count."""
     if trial.outcome == "invalid":
         return ()
     return (

@@ -1,7 +1,7 @@
-"""The model's error around a campaign's gains: computed as a job for one proposal, kept as that job's result.
+"""The model's error around a campaign's gains, computed as a job for one proposal and stored as that job's result.
 
-For a worker: `read_plan`, then `app.core.landscape` (pure, in any process), then the result `as_json`. Only the newest
-landscape of a campaign is kept.
+For a worker: `read_plan`, then `app.core.landscape` (pure, in any process), then store the result of `as_json`. Only
+the newest landscape of a campaign is kept.
 """
 
 from dataclasses import asdict, dataclass
@@ -35,7 +35,7 @@ _EVERY: Final = tuple(JobState)
 
 @dataclass(frozen=True, slots=True)
 class LandscapeAnswer:
-    """The card, and whether a job has yet to be asked for what it is to show."""
+    """The card, and whether a job still has to be requested for its content."""
 
     card: Card
     wanted: bool = False
@@ -57,17 +57,19 @@ def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stac
 
 
 def request_landscape(session: Session, campaign_id: int) -> None:
-    """A job computes the landscape of the latest proposal, unless one does or did already, or a person cancelled it."""
+    """Request a job that computes the landscape of the latest proposal, unless there is one or a person cancelled
+    it."""
     proposal = repository.latest_proposal(session, campaign_id)
     if proposal is None or not _is_wanted(_job(session, campaign_id, proposal.id)):
         return
     order: JsonObject = {"name": _name(campaign_id), "proposal_id": proposal.id}
     job = jobs.enqueue_job(session, LANDSCAPE_JOB, campaign_id=campaign_id, order=order)
-    job.order = order  # one that still waits was meant for a proposal that is overtaken
+    job.order = order  # a job that still waits may be for an outdated proposal
 
 
 def read_plan(session: Session, campaign_id: int, order: JsonObject) -> LandscapePlan:
-    """What the job's proposal was computed from. Raises SupersededError once the campaign's flights are others."""
+    """Read what the job's proposal was computed from. Raises SupersededError when the campaign's flights have changed
+    since."""
     past = read_history(session, campaign_id)
     named = order.get("proposal_id")
     proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None
@@ -88,7 +90,7 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
 
 
 def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
-    """The job's result."""
+    """The job's result as JSON."""
     return {"proposal_id": order["proposal_id"], "landscape": asdict(landscape)}
 
 
@@ -130,13 +132,13 @@ def _name(campaign_id: int) -> str:
 
 
 def _job(session: Session, campaign_id: int, proposal_id: int) -> JobRow | None:
-    """The newest job for that proposal."""
+    """The newest landscape job, if it is for that proposal."""
     job = jobs.latest_ordered(session, LANDSCAPE_JOB, _name(campaign_id), _EVERY)
     return job if job is not None and (job.order or {}).get("proposal_id") == proposal_id else None
 
 
 def _is_wanted(job: JobRow | None) -> bool:
-    """Whether a job is to be asked for where that is the newest one."""
+    """Whether a job has to be requested, given the newest one."""
     return job is None or jobs.is_withdrawn(job)
 
 
@@ -148,14 +150,14 @@ def _result(session: Session, campaign_id: int, proposal_id: int) -> Landscape |
 
 
 def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, float]:
-    """The gains of the flight that the proposal starts from, else its own."""
+    """Gains of the flight that the proposal starts from, else the proposal's own."""
     number = proposal.explanation.get("base_flight")
     base = next((flight for flight in past.flights if flight.number == number), None)
     return dict(proposal.gains if base is None else base.gains)
 
 
 def _search(proposal: ProposalRow) -> Search:
-    """How the strategy looked for the next gains, as its explanation has it."""
+    """The strategy's search for the next gains, from the proposal's explanation."""
     said = proposal.explanation
     return Search(
         gradient=dict(said.get("gradient", {})),

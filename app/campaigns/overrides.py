@@ -22,11 +22,11 @@ def override(
     gains: Sequence[str] = (),
     settings: Sequence[str] = (),
 ) -> CampaignFile:
-    """The file with what was given on the command line in place of its own.
+    """The file with the values given on the command line in place of its own.
 
-    Another vehicle or strategy starts from its default options; `vehicle` may name an address too, as in
-    mavlink:udp:127.0.0.1:4245. Each of `gains` is a set to be flown by hand. Raises InputError naming what cannot be
-    used.
+    Another vehicle or strategy starts from its default options; `vehicle` may include an address, as in
+    mavlink:udp:127.0.0.1:4245. Each of `gains` is a set to be flown by hand. Raises InputError that names what cannot
+    be used.
     """
     chosen: dict[Path, object] = {}
     if vehicle is not None:
@@ -55,7 +55,7 @@ def _start(text: str, experiment: str) -> Mapping[str, object]:
 
 
 def _gains(text: str, experiment: str, option: str, others: str = "") -> dict[str, float]:
-    """A set as NAME=NUMBER,… in any order, or as numbers in the experiment's own."""
+    """Parse a gain set: NAME=NUMBER,… in any order, or numbers in the experiment's order."""
     space = get_experiment(experiment).space
     parts = text.split(",")
     pairs = [part.partition("=") for part in parts]
@@ -97,7 +97,7 @@ def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[Path, obje
 
 
 def _known(file: CampaignFile) -> dict[str, Path]:
-    """Where each setting's value goes, by the name used on the command line."""
+    """Path of each setting, by its name on the command line."""
     strategy = STRATEGIES.get(file.definition.strategy)
     return {
         "first_step_fraction": ("definition", "first_step_fraction"),
@@ -110,7 +110,7 @@ def _known(file: CampaignFile) -> dict[str, Path]:
 
 
 def _value(text: str) -> object:
-    """A YAML scalar: number, true/false, or text."""
+    """Parse a YAML scalar: number, true/false, or text."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 

@@ -1,4 +1,4 @@
-"""Making a campaign's best gains the safe ones of its vehicle, where its flights have shown that they are better."""
+"""Promotion of a campaign's best gains to its vehicle's safe gains, once flights have shown that they are better."""
 
 from sqlalchemy.orm import Session
 
@@ -19,10 +19,10 @@ from app.trials import history
 
 
 def promote_best(session: Session, campaign_id: int, asked: Promotion, context: RequestContext) -> Vehicle:
-    """The vehicle with its new safe gains; the act that records it names the flights.
+    """Make the best gains the vehicle's safe gains; the act that records this names the flights.
 
     Raises ConflictError while the best gains are not shown to be better than the first ones, and when the vehicle is
-    shared, not at rest, in somebody else's control, or was changed meanwhile.
+    shared, not at rest, under another operator's control, or was changed meanwhile.
     """
     row = repository.get_one(session, campaign_id)
     now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))

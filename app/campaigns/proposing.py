@@ -1,4 +1,4 @@
-"""The next gain set: computed as a job from the stored history, stored with that history's digest, judged.
+"""Proposals: computed as a job from the stored history, and stored with that history's digest and the gate's result.
 
 For a worker: `read_history`, then `computation.compute` (pure, in any process), then `store_proposal`.
 """
@@ -44,7 +44,7 @@ _UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no 
 
 
 def read_history(session: Session, campaign_id: int) -> CampaignHistory:
-    """The campaign's definition and its flights with their trajectories as stored. Raises NotFoundError."""
+    """The campaign's definition and its flights, with trajectories as stored. Raises NotFoundError."""
     row = repository.get_one(session, campaign_id)
     definition, trials = definition_of(row), history.trials_of(session, campaign_id)
     return CampaignHistory(
@@ -72,9 +72,10 @@ def _donor(session: Session, definition: Definition) -> Flight | None:
 
 
 def store_proposal(session: Session, campaign_id: int, computed: ProposalComputation) -> ProposalRow:
-    """Store a proposal, and let it count: a draft becomes ready, a campaign whose rule says so is finished.
+    """Store a proposal and update the campaign: a draft becomes ready; a campaign is finished when its stop rule says
+    so.
 
-    One from an outdated history is stored too, stale from the start, and counts for nothing. Raises NotFoundError when
+    A proposal from an outdated history is stored as stale and does not update the campaign. Raises NotFoundError when
     the campaign has been deleted.
     """
     campaign = repository.get_one(session, campaign_id)
@@ -108,19 +109,19 @@ def _apply_to_campaign(session: Session, campaign: CampaignRow, said: StopVerdic
     elif campaign.state == CampaignState.DECIDING and said.reason is not None:
         end_campaign(session, campaign, _OUTCOMES[said.reason], said.why)
     elif campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
-        # A flight was classed anew: the end is judged again, and told as it now is.
+        # A flight was reclassified: the reason for the end is updated.
         campaign.outcome = None if said.reason is None else _OUTCOMES[said.reason]
         campaign.stop_reason = said.why if said.reason is not None else f"{_UNSUPPORTED} {said.why}"
 
 
 def request_proposal(session: Session, campaign: CampaignRow) -> None:
-    """The history has changed, or somebody wants the proposal anew: a job computes it."""
+    """Request a job that computes the proposal, after a change of the history or on request."""
     if campaign.state in _COMPUTED_IN:
         jobs.enqueue_job(session, PROPOSAL_JOB, campaign_id=campaign.id)
 
 
 def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) -> ProposalRow:
-    """A proposal of this campaign that still holds. Raises NotFoundError, or ConflictError when it is stale."""
+    """A proposal of this campaign that is not stale. Raises NotFoundError, or ConflictError when it is stale."""
     row = repository.get_proposal_or_none(session, proposal_id)
     if row is None or row.campaign_id != campaign.id:
         raise NotFoundError("proposal", proposal_id, hint="Ask for the campaign's proposal and use its id.")
@@ -133,7 +134,7 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
 
 
 def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalRow:
-    """The present proposal. Raises ConflictError while there is none for the present flights."""
+    """The latest proposal. Raises ConflictError when there is none for the present flights."""
     row = repository.latest_proposal(session, campaign.id)
     if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
@@ -144,12 +145,12 @@ def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalR
 
 
 def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
-    """Whether the campaign's history is no longer the one that the proposal was computed from."""
+    """Whether the campaign's history has changed since the proposal was computed."""
     return row.history_digest != history.history_digest(session, campaign.id, definition_of(campaign), trials)
 
 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
-    """Give up the unflown trials of proposals that the campaign's history has overtaken."""
+    """Cancel the unflown trials of stale proposals."""
     trials = history.trials_of(session, campaign.id)
     waiting = [row for row in trials if row.state in UNFLOWN and row.proposal_id is not None]
     proposals = repository.proposals_by_id(session, {row.proposal_id for row in waiting if row.proposal_id})
@@ -161,7 +162,7 @@ def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
 
 
 def stored_start(session: Session, campaign: CampaignRow) -> Gains:
-    """The start gains, from the first proposal; searching them takes too long for a transaction.
+    """The start gains, from the first proposal; their search takes too long for a transaction.
 
     Raises ConflictError while they are not known.
     """
@@ -179,11 +180,11 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
 
 
 def stored_distribution(session: Session, campaign: CampaignRow, experiment: Experiment) -> ParameterDistribution:
-    """What was known of the vehicle when the latest proposal was computed: a fit takes too long for a transaction.
+    """What was known of the vehicle when the latest proposal was computed; a fit takes too long for a transaction.
 
-    One that further flights have overtaken still serves, it only knows less; one from a flight that no longer counts
-    does not, and before any there is the data sheet. Early databases do not say which flights they are: then it is
-    computed anew, and until that is done the data sheet serves too.
+    A distribution from before the latest flights is still used: it only knows less. The data sheet (the prior) is used
+    before the first one, and when it was fitted to a flight that no longer counts. Early databases do not store the
+    flights of a distribution: then the proposal is computed again, and the data sheet is used until it is there.
     """
     latest = repository.latest_proposal(session, campaign.id)
     if latest is None or latest.spread is None:
@@ -202,7 +203,7 @@ def stored_distribution(session: Session, campaign: CampaignRow, experiment: Exp
 
 
 def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reason: str) -> None:
-    """Finish a campaign; what has not flown is cancelled."""
+    """Finish a campaign, and cancel its unflown trials."""
     set_campaign_state(campaign, CampaignState.FINISHED)
     campaign.outcome, campaign.stop_reason = outcome, reason
     notify_rehearsed_campaign(session, campaign)
@@ -211,23 +212,23 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
 
 
 def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:
-    """Raises ConflictError when the states' table does not lead there."""
+    """Change a campaign's state. Raises ConflictError when the transition is not in the table."""
     row.state = check_transition(TRANSITIONS, row.state, to, f"Campaign {row.id}")
 
 
 def space_of(definition: Definition) -> PolicySpace:
-    """The gains that a campaign may choose from."""
+    """Gain space of a campaign, within its bounds."""
     return experiment_of(definition).space.narrowed(definition.bounds)
 
 
 def gate_json(gate: GateResult) -> JsonObject:
-    """The gate's answer as it is stored; a number that is none is null there."""
+    """The gate's result as stored; infinite and undefined numbers become null."""
     checks = [asdict(check) | {"worst": check.worst if math.isfinite(check.worst) else None} for check in gate.checks]
     return {"passed": gate.passed, "checks": checks}
 
 
 def gate_of(stored: JsonObject) -> GateResult:
-    """The gate's answer again."""
+    """The gate's result from its stored form."""
     return GateResult(
         tuple(
             Check(**check | {"worst": math.inf if check["worst"] is None else check["worst"]})

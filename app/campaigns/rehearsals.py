@@ -1,4 +1,4 @@
-"""Whether a campaign on a real vehicle was rehearsed: flown on a simulation first, with the same definition."""
+"""Rehearsals: whether a campaign on a real vehicle was first flown on a simulation with the same definition."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from app.trials import history
 from app.trials.states import TrialState
 
 FLIGHTS: Final = 3
-"""Valid flights that are enough, where the campaign's own rule has not ended it before."""
+"""Number of valid flights that passes a rehearsal, unless the campaign's own rule ends it earlier."""
 _FAILED_STATES: Final = frozenset({TrialState.ABORTED, TrialState.INVALID, TrialState.LOST})
 _NOT_NEEDED: Final = Rehearsal(state="not needed", campaign_id=None, reason="")
 
 
 @dataclass(frozen=True, slots=True)
 class RehearsalTrial:
-    """One trial of a rehearsal: `gate_passed` is false where the gate's refusal was overruled."""
+    """One trial of a rehearsal; `gate_passed` is false where the gate's refusal was overruled."""
 
     number: int
     state: TrialState
@@ -33,9 +33,9 @@ class RehearsalTrial:
 
 
 def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) -> tuple[RehearsalState, str]:
-    """What a rehearsal's flights say, and why. `outcome` is None until its campaign is over.
+    """State of a rehearsal by its flights, and the reason. `outcome` is None until its campaign is finished.
 
-    Passed: at least three valid flights, or as many as the campaign's own rule took to end it; none of them aborted,
+    Passed: at least FLIGHTS valid flights, or as many as the campaign's own rule took to end it; none of them aborted,
     invalid or lost, and none with gains that the gate refused.
     """
     flown = [trial for trial in trials if trial.state in history.FLOWN]
@@ -53,7 +53,7 @@ def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) 
 
 
 def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
-    """Where a campaign's rehearsal stands: its latest one with the very same definition, safe gains included."""
+    """State of a campaign's latest rehearsal with exactly the same definition, safe gains included."""
     if not fleet.needs_staging(campaign.vehicle):
         return _NOT_NEEDED
     held = repository.rehearsals(session, campaign.id)
@@ -76,7 +76,7 @@ def is_rehearsal_satisfied(said: Rehearsal) -> bool:
 
 
 def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
-    """Raises ConflictError while a campaign on a real vehicle has no rehearsal that passed."""
+    """Raise ConflictError while a campaign on a real vehicle has no rehearsal that passed."""
     said = rehearsal_of(session, campaign)
     if not is_rehearsal_satisfied(said):
         where = "on its simulation" if said.campaign_id is None else f"in campaign {said.campaign_id}"
@@ -89,11 +89,11 @@ def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
 
 
 def rehearsed_by(session: Session, rehearsal: CampaignRow) -> int | None:
-    """The campaign that this one rehearses; None where it is no rehearsal."""
+    """The campaign that this one rehearses; None if it is not a rehearsal."""
     return repository.rehearsed_id(session, rehearsal.id)
 
 
 def notify_rehearsed_campaign(session: Session, rehearsal: CampaignRow) -> None:
-    """What changes in a rehearsal changes the campaign that it is for, and who looks at that one hears of it."""
+    """Mark the campaign that this one rehearses as updated, so that its clients load it again."""
     if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
         repository.get_one(session, campaign_id).updated_at = utc_now()

@@ -1,4 +1,4 @@
-"""Rehearsing a campaign on a real vehicle: the same campaign on a simulation."""
+"""Creation of rehearsals: the same campaign on a simulation, for a campaign on a real vehicle."""
 
 from typing import Final
 
@@ -18,10 +18,10 @@ _NAME_ROOM: Final = 100
 
 
 def rehearse(session: Session, campaign_id: int) -> Campaign:
-    """The campaign that rehearses this one: the one that is under way or passed, else a new draft on a simulation with
-    the same definition and the same safe gains.
+    """Return the rehearsal of this campaign: the one that is under way or passed, else a new draft on a simulation with
+    the same definition and safe gains.
 
-    Raises ConflictError where none is needed, and where no simulation flies this experiment.
+    Raises ConflictError where no rehearsal is needed, and where no simulation can fly the experiment.
     """
     row = repository.get_one(session, campaign_id)
     said = rehearsal_of(session, row)

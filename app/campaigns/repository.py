@@ -17,12 +17,12 @@ from app.errors import NotFoundError
 from app.trials import history
 
 _NO_ERROR: Final = 1e300
-"""Where campaigns without an error stand among the errors: last."""
+"""Sort key of campaigns without an error: they come last."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    """What a list is sorted by; `kind` is the type of the value in a cursor."""
+    """Sort order of a list; `kind` is the type of the value in a cursor."""
 
     value: ColumnElement[datetime] | ColumnElement[str] | ColumnElement[float] | ColumnElement[int]
     descending: bool
@@ -44,14 +44,14 @@ def cursor_kind(sort: Sort) -> type[str] | type[float]:
 
 
 def get_one(session: Session, campaign_id: int) -> CampaignRow:
-    """Raises NotFoundError."""
+    """The campaign with that id. Raises NotFoundError."""
     if (row := session.get(CampaignRow, campaign_id)) is None:
         raise NotFoundError("campaign", campaign_id)
     return row
 
 
 def ids_of_name(session: Session, name: str) -> list[int]:
-    """The ids of all campaigns of that name, whatever its case, the oldest first."""
+    """Ids of all campaigns of that name, ignoring case, oldest first."""
     same = or_(CampaignRow.name == name, func.lower(CampaignRow.name) == name.lower())
     return list(session.scalars(select(CampaignRow.id).where(same).order_by(CampaignRow.id).limit(20)))
 
@@ -66,7 +66,7 @@ def page(
     after: Position | None,
     limit: int,
 ) -> tuple[list[tuple[CampaignRow, Position]], int]:
-    """The campaigns after that position, one more than `limit`, each with its own; and the number of all."""
+    """The next `limit` + 1 campaigns after that position, each with its own position; and the total count."""
     wanted = _filters(search, states, vehicles)
     total = session.scalar(select(func.count(CampaignRow.id)).join(CampaignRow.vehicle).where(*wanted)) or 0
     order = _ORDERS[sort]
@@ -103,7 +103,7 @@ def unflown_on(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
 
 
 def rehearsals(session: Session, campaign_id: int) -> Sequence[CampaignRow]:
-    """The campaigns that rehearse this one, the newest first."""
+    """The campaigns that rehearse this one, newest first."""
     joined = select(CampaignRow).join(RehearsalRow, RehearsalRow.rehearsal_id == CampaignRow.id)
     return session.scalars(joined.where(RehearsalRow.campaign_id == campaign_id).order_by(CampaignRow.id.desc())).all()
 
@@ -132,7 +132,7 @@ def latest_proposal(session: Session, campaign_id: int) -> ProposalRow | None:
 
 
 def of_vehicle(session: Session, vehicle_id: int) -> Sequence[CampaignRow]:
-    """The vehicle's campaigns, the oldest first."""
+    """The vehicle's campaigns, oldest first."""
     return session.scalars(
         select(CampaignRow).where(CampaignRow.vehicle_id == vehicle_id).order_by(CampaignRow.id)
     ).all()

@@ -36,7 +36,7 @@ def list_campaigns(
     limit: Limit = 50,
     cursor: CursorText = None,
 ) -> Page[CampaignSummary]:
-    """Campaigns with what a card shows of them."""
+    """Campaigns as summaries for the list."""
     return service.list_campaigns(
         session, search=search, states=state or [], vehicles=vehicle or [], sort=sort, limit=limit, cursor=cursor
     )
@@ -69,50 +69,50 @@ def delete_campaign(
 
 @router.post("/{campaign_id}/finish")
 def finish_campaign(act: IdempotentPost, campaign_id: Id, body: Finish | None = None) -> Campaign:
-    """End a campaign between flights, on the operator's word."""
+    """Finish a campaign between flights, on the operator's decision."""
     reason = (body or Finish()).reason
     return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason))
 
 
 @router.post("/{campaign_id}/archive")
 def archive_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
-    """Put a finished campaign away."""
+    """Archive a finished campaign."""
     return act(Campaign, lambda session: service.archive_campaign(session, campaign_id))
 
 
 @router.post("/{campaign_id}/clone", status_code=status.HTTP_201_CREATED)
 def clone_campaign(act: IdempotentPost, campaign_id: Id, body: Clone | None = None) -> Campaign:
-    """A new campaign with the same definition, linked to this one."""
+    """Create a campaign with the same definition, linked to this one."""
     return act(Campaign, lambda session: service.clone_campaign(session, campaign_id, body or Clone()))
 
 
 @router.post("/{campaign_id}/rehearsal", status_code=status.HTTP_201_CREATED)
 def rehearse_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
-    """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation, made unless there is one that
-    is under way or passed."""
+    """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation. Created unless there is one
+    that is under way or passed."""
     return act(Campaign, lambda session: rehearsing.rehearse(session, campaign_id))
 
 
 @router.post("/{campaign_id}/promote")
 def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Promotion) -> Vehicle:
-    """Make the best gains the safe ones of the campaign's registered vehicle, once its flights have shown that they are
-    better than the first ones."""
+    """Make the best gains the safe gains of the campaign's registered vehicle, once its flights have shown that they
+    are better than the first ones."""
     return act(Vehicle, lambda session: promoting.promote_best(session, campaign_id, body, asking))
 
 
 @router.get("/{campaign_id}/statistics")
 def get_statistics(session: Reader, campaign_id: Id) -> CampaignStatistics:
-    """What the flights say about the gains: repeats, scatter, better or worse, drift, and how well predictions held."""
+    """Statistics of the flights: repeats, scatter, better or worse, drift, and how well predictions held."""
     return campaign_statistics(session, campaign_id)
 
 
 @router.get("/{campaign_id}/proposal")
 def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
-    """Where the next gain set stands, and the gain set once it is there."""
+    """State of the next proposal, and the proposal once it is there."""
     return service.next_flight(session, campaign_id)
 
 
 @router.post("/{campaign_id}/proposal", status_code=status.HTTP_202_ACCEPTED)
 def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
-    """Compute the next gain set anew."""
+    """Compute the proposal again."""
     return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))

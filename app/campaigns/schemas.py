@@ -1,4 +1,4 @@
-"""What campaigns and proposals look like from outside."""
+"""API schemas of campaigns and proposals."""
 
 from datetime import datetime
 from enum import StrEnum
@@ -29,7 +29,7 @@ class Sort(StrEnum):
 
 
 class Donor(Request):
-    """The flight of another campaign that a warm start comes from, with the checksum of its record. Without a trial
+    """The flight of another campaign that a warm start begins from, with the checksum of its record. Without a trial
     number it is the best valid one; the checksum is filled in."""
 
     campaign_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)]
@@ -38,8 +38,8 @@ class Donor(Request):
 
 
 class Start(Request):
-    """Where the first flight's gains come from; `gains` with kind `given`, `donor` with `campaign`, whose gains are
-    filled in."""
+    """Where the first flight's gains come from. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
+    gains are filled in."""
 
     kind: Literal["default", "simplex", "given", "campaign"] = "default"
     gains: dict[str, Number] | None = None
@@ -47,10 +47,10 @@ class Start(Request):
 
 
 class StopRule(Request):
-    """`paper`: two flights in a row without `improvement` (a share of the best) on the best so far, or the budget;
-    `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
-    the baseline; `budget`: only the number of flights ends the campaign. With every kind a flight that ends below
-    `min_battery_v` ends it."""
+    """`paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
+    the budget. `noise`: ends when no remaining difference can be told from noise with `confidence`, after the winner
+    was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
+    kind a flight that ends below `min_battery_v` ends it."""
 
     kind: Literal["paper", "noise", "budget"] = "paper"
     max_flights: Annotated[int, Field(strict=True, ge=1, le=200)] = 7
@@ -60,7 +60,7 @@ class StopRule(Request):
 
 
 class Definition(Request):
-    """Everything that a proposal depends on, beside the flights. Frozen at the first flight.
+    """Everything besides the flights that a proposal depends on. Frozen at the first flight.
 
     `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change as shares of
     its range, before and after the first valid flight; `ceiling_m` is the highest altitude that the gate lets a model
@@ -81,7 +81,7 @@ class Definition(Request):
 
 
 class NewCampaign(Request):
-    """A campaign to be created; what is left out has a working default."""
+    """A campaign to be created; omitted fields have working defaults."""
 
     name: Name
     vehicle: VehicleChoice = Field(default_factory=lambda: VehicleChoice(kind="jsbsim"))
@@ -89,7 +89,8 @@ class NewCampaign(Request):
 
 
 class CampaignEdit(Request):
-    """Changes of a campaign; what is left out stays. Definition and vehicle change only before the first flight."""
+    """Changes of a campaign; omitted fields stay as they are. Definition and vehicle can change only before the first
+    flight."""
 
     version: Version
     name: Name | None = None
@@ -98,7 +99,7 @@ class CampaignEdit(Request):
 
 
 class Clone(Request):
-    """A new campaign with the same definition, perhaps on another vehicle, linked to this one. With `warm_start` it
+    """A new campaign with the same definition, optionally on another vehicle, linked to this one. With `warm_start` it
     starts from this one's best flight."""
 
     name: Name | None = None
@@ -107,21 +108,21 @@ class Clone(Request):
 
 
 class Finish(Request):
-    """Why the operator ends the campaign."""
+    """Why the operator finishes the campaign."""
 
     reason: Text = "stopped by the operator"
 
 
 class Promotion(Request):
-    """Who makes the best gains the vehicle's safe ones, and why; `version` is the vehicle's."""
+    """Who makes the best gains the vehicle's safe gains, and why; `version` is the vehicle's."""
 
     version: Version
     statement: Reason
 
 
 class BestTrial(BaseModel):
-    """The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
-    from the scatter pooled over the campaign, null while that is not known."""
+    """The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
+    while the scatter is not known."""
 
     trial_id: int
     trial_number: int
@@ -133,14 +134,14 @@ class BestTrial(BaseModel):
 
 
 class FlyingTrial(BaseModel):
-    """The trial whose flight is asked for or under way."""
+    """The trial whose flight is requested or under way."""
 
     trial_id: int
     trial_number: int
 
 
 class TrialCounts(BaseModel):
-    """Trials by what became of them; `flown` are those with a record or a known end."""
+    """Number of trials by their state; `flown` are those that left the ground."""
 
     total: int
     flown: int
@@ -154,8 +155,8 @@ RehearsalState = Literal["not needed", "missing", "under way", "passed", "failed
 
 
 class Rehearsal(BaseModel):
-    """Whether a campaign on a real vehicle was flown on a simulation first, which has to be `passed` before anything is
-    staged. `campaign_id` is the rehearsal's own campaign; `reason` says why it stands so."""
+    """Whether a campaign on a real vehicle was first flown on a simulation, which has to be `passed` before a trial can
+    be staged. `campaign_id` is the rehearsal's own campaign; `reason` explains the state."""
 
     state: RehearsalState
     campaign_id: int | None
@@ -163,7 +164,7 @@ class Rehearsal(BaseModel):
 
 
 class Campaign(BaseModel):
-    """One vehicle, one experiment, one strategy, and what came of it."""
+    """One vehicle, one experiment, one strategy, and the results."""
 
     id: int
     version: int
@@ -227,7 +228,7 @@ class GainChange(BaseModel):
 
 
 class StopVerdict(BaseModel):
-    """Whether the campaign's own rule says that it is over, and why."""
+    """Whether the campaign's stop rule ends it, and why."""
 
     stop: bool
     reason: str
@@ -237,7 +238,7 @@ class StopVerdict(BaseModel):
 
 class Advice(BaseModel):
     """The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
-    first flight, or its gains once more."""
+    first flight, or its gains again."""
 
     kind: AdviceKind
     gains: Gains
@@ -245,8 +246,8 @@ class Advice(BaseModel):
 
 
 class Proposal(BaseModel):
-    """The next gain set, from one history. Stale as soon as that history has changed. `recommended` is the advice's
-    kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so."""
+    """The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
+    advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so."""
 
     id: int
     campaign_id: int
@@ -266,7 +267,7 @@ class Proposal(BaseModel):
 
 
 class NextFlight(BaseModel):
-    """Where the next proposal stands. While a new one is computed, `proposal` may be the stale one before it."""
+    """State of the next proposal. While a new one is computed, `proposal` may be the stale one before it."""
 
     state: Literal["computing", "ready", "failed", "none"]
     proposal: Proposal | None
@@ -286,16 +287,16 @@ class RepeatGroup(BaseModel):
 
 
 class FlightsToDecide(BaseModel):
-    """Further flights after which a difference that stays as it is would be decided."""
+    """Further flights of each gain set after which an unchanged difference would be decided."""
 
     best: int
     baseline: int
 
 
 class Comparison(BaseModel):
-    """The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
-    direction, with the allowance for having chosen the best among several. The verdict is `not known yet`, without
-    confidence and standard error, while nobody knows how much flights scatter."""
+    """The best gains compared with the first flight's. `difference` is best − baseline; `confidence` that of the
+    likelier direction, with the allowance for having chosen the best among several. While the scatter of flights is
+    unknown, the verdict is `not known yet`, without confidence and standard error."""
 
     verdict: Verdict
     confidence: float | None
@@ -306,7 +307,7 @@ class Comparison(BaseModel):
 
 
 class Drift(BaseModel):
-    """The first gains' last flight against their first: `confidence` that anything has changed."""
+    """The first gains' last flight compared with their first: `confidence` that anything has changed."""
 
     first_trial: int
     last_trial: int
@@ -317,7 +318,7 @@ class Drift(BaseModel):
 
 
 class Trend(BaseModel):
-    """Slope of the error of the gains flown most, with its interval, 90 %."""
+    """Slope of the error of the gains flown most often, with its 90 % interval."""
 
     against: Literal["flight number", "battery voltage"]
     unit: str
@@ -340,10 +341,10 @@ class TrackRecord(BaseModel):
 
 
 class CampaignStatistics(BaseModel):
-    """What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
-    repeats and the experiment's prior, null while nobody knows it: before the first repeat under an autopilot whose
-    scatter was never measured; `optimism` by how much the best is expected to look better than it is, for
-    having been chosen, and `shrunk_error` its error without that."""
+    """What the flights say about the gains, with confidence. `sigma` is the flight-to-flight scatter, pooled over all
+    repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
+    scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
+    chosen, and `shrunk_error` its error corrected for that."""
 
     error_unit: str
     confidence: float

@@ -1,4 +1,4 @@
-"""What people and scripts do with campaigns. Proposals are in `proposing`, how things look from outside in `views`."""
+"""Operations on campaigns for clients: people and scripts. Proposals are in `proposing`, API views in `views`."""
 
 from collections.abc import Collection
 from typing import Final
@@ -50,7 +50,7 @@ def list_campaigns(
     limit: int,
     cursor: str | None,
 ) -> Page[CampaignSummary]:
-    """One page of cards. Raises InputError for a cursor that is none of this list's."""
+    """One page of summaries. Raises InputError for a cursor of another list."""
     after = None if cursor is None else decode_cursor(sort, cursor, repository.cursor_kind(sort))
     found, total = repository.page(
         session, search=search, states=states, vehicles=vehicles, sort=sort, after=after, limit=limit
@@ -60,13 +60,15 @@ def list_campaigns(
 
 
 def get_row(session: Session, campaign_id: int) -> CampaignRow:
-    """For the other slices. Raises NotFoundError."""
+    """The campaign's row, for other slices. Raises NotFoundError."""
     return repository.get_one(session, campaign_id)
 
 
 def find_by_id_or_name(session: Session, wanted: str) -> int:
-    """The campaign with that id or, whatever its case, that name. Raises NotFoundError, and InputError when several
-    have it."""
+    """Id of the campaign with that id or, ignoring case, that name.
+
+    Raises NotFoundError, and InputError when several have the name.
+    """
     if wanted.isdecimal() and len(wanted) < _DIGITS_OF_AN_ID:
         return get_row(session, int(wanted)).id
     found = repository.ids_of_name(session, wanted)
@@ -82,12 +84,12 @@ def find_by_id_or_name(session: Session, wanted: str) -> int:
 
 
 def get_campaign(session: Session, campaign_id: int) -> Campaign:
-    """Raises NotFoundError."""
+    """The campaign with that id. Raises NotFoundError."""
     return campaign_view(session, repository.get_one(session, campaign_id))
 
 
 def create_campaign(session: Session, new: NewCampaign) -> Campaign:
-    """A draft whose first gains are being computed. Raises InputError naming every field that cannot be used."""
+    """Create a draft and request its first proposal. Raises InputError that names every invalid field."""
     row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
     return campaign_view(session, row)
 
@@ -101,8 +103,11 @@ def add_campaign(
     parent_id: int | None,
     safe_gains: dict[str, float] | None = None,
 ) -> CampaignRow:
-    """A draft whose first gains are being computed. A rehearsal has the `safe_gains` of the vehicle that it is for;
-    every other campaign gets those of its own at its first flight. Raises InputError naming what cannot be used."""
+    """Add a draft and request its first proposal.
+
+    `safe_gains` are given for a rehearsal: those of the vehicle that it is for. Every other campaign gets its own
+    vehicle's at its first flight. Raises InputError that names what cannot be used.
+    """
     definition, options, vehicle = _checked(session, asked, choice)
     row = CampaignRow(
         name=name,
@@ -122,7 +127,8 @@ def add_campaign(
 
 
 def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
-    """A new draft with the same definition, linked to its origin, with a warm start from the origin's best flight."""
+    """Create a draft with the same definition, linked to its origin; with `warm_start` it starts from the origin's best
+    flight."""
     origin = repository.get_one(session, campaign_id)
     vehicle = clone.vehicle or _choice_of(origin)
     name = clone.name or f"{origin.name[:110]} (again)"
@@ -134,7 +140,8 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
 
 
 def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Campaign:
-    """Raises ConflictError when somebody else was faster, or when the definition is frozen."""
+    """Change a campaign. Raises ConflictError when another client changed it first, or when its definition is
+    frozen."""
     row = repository.get_one(session, campaign_id)
     definition = None if edit.definition is None else edit.definition.model_dump(mode="json")
     check_version(
@@ -162,7 +169,10 @@ def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Cam
 
 
 def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
-    """Raises ConflictError when a vehicle was given gains in it, or somebody has changed it meanwhile."""
+    """Delete a campaign.
+
+    Raises ConflictError when a flight was begun in it, or another client has changed it meanwhile.
+    """
     row = repository.get_one(session, campaign_id)
     check_version(version, row.version, f"Campaign {row.id}", {})
     check_action(ACTIONS, "delete", row.state, f"Campaign {row.id}")
@@ -181,7 +191,7 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
 
 
 def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign:
-    """End it on the operator's word. Raises ConflictError unless it is between flights."""
+    """Finish a campaign on the operator's decision. Raises ConflictError unless it is between flights."""
     row = repository.get_one(session, campaign_id)
     check_action(ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
@@ -190,7 +200,7 @@ def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign
 
 
 def archive_campaign(session: Session, campaign_id: int) -> Campaign:
-    """Raises ConflictError unless it is finished."""
+    """Archive a campaign. Raises ConflictError unless it is finished."""
     row = repository.get_one(session, campaign_id)
     check_action(ACTIONS, "archive", row.state, f"Campaign {row.id}")
     set_campaign_state(row, CampaignState.ARCHIVED)
@@ -198,12 +208,12 @@ def archive_campaign(session: Session, campaign_id: int) -> Campaign:
 
 
 def next_flight(session: Session, campaign_id: int) -> NextFlight:
-    """Where the next proposal stands. Raises NotFoundError."""
+    """State of the next proposal. Raises NotFoundError."""
     return next_flight_view(session, repository.get_one(session, campaign_id))
 
 
 def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
-    """Have the proposal computed anew. Raises ConflictError in states in which none is made."""
+    """Request the proposal again. Raises ConflictError in states without proposals."""
     row = repository.get_one(session, campaign_id)
     check_action(ACTIONS, "propose", row.state, f"Campaign {row.id}")
     request_proposal(session, row)
@@ -211,7 +221,7 @@ def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
 
 
 def start_flying(row: CampaignRow) -> None:
-    """A trial lifts off, or a record of one arrives: from the first one on the definition is frozen."""
+    """Enter state flying, at a lift-off or an imported record; at the first one the definition is frozen."""
     if row.definition_digest is None:
         row.safe_gains = row.safe_gains or dict(row.vehicle.safe_gains)
         row.definition_digest = frozen_digest(row)
@@ -219,14 +229,14 @@ def start_flying(row: CampaignRow) -> None:
 
 
 def finish_flying(session: Session, row: CampaignRow) -> None:
-    """The trial is down, however it ended; the next gains are computed from what is known now."""
+    """Leave state flying once the trial has ended, however it ended, and request the next proposal."""
     if row.state == CampaignState.FLYING:
         set_campaign_state(row, CampaignState.DECIDING)
     history_changed(session, row)
 
 
 def history_changed(session: Session, row: CampaignRow) -> None:
-    """A flight counts now that did not, or the other way round: everything computed from the flights is outdated."""
+    """Update everything computed from the flights, after a change of which flights count."""
     row.updated_at = utc_now()
     notify_rehearsed_campaign(session, row)
     cancel_outdated(session, row)
@@ -234,7 +244,7 @@ def history_changed(session: Session, row: CampaignRow) -> None:
 
 
 def safe_gains_changed(session: Session, vehicle_id: int) -> None:
-    """What has not flown yet begins from the vehicle's safe gains: the gains proposed for it are outdated."""
+    """Request new proposals for the vehicle's unflown campaigns, which start from its safe gains."""
     for row in repository.unflown_on(session, vehicle_id):
         cancel_outdated(session, row)
         request_proposal(session, row)
@@ -250,7 +260,7 @@ def _choice_of(row: CampaignRow) -> VehicleChoice:
 def _checked(
     session: Session, asked: Definition, choice: VehicleChoice
 ) -> tuple[CoreDefinition, dict[str, OptionValue], VehicleRow]:
-    """The definition, the campaign's own settings of its vehicle, none for a registered one, and the vehicle."""
+    """The checked definition, the campaign's own vehicle options (none for a registered vehicle), and the vehicle."""
     definition, options = check_campaign(fill_in_donor(session, asked), choice)
     space = get_experiment(definition.experiment).space
     vehicle = fleet.chosen_vehicle(session, choice, default_gains=space.mapping(space.default))
@@ -264,7 +274,7 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     definition, options, row.vehicle = _checked(session, asked, edit.vehicle or _choice_of(row))
     row.experiment, row.strategy = definition.experiment, definition.strategy
     row.definition, row.vehicle_options = stored(definition), options
-    if row.vehicle.is_real:  # it ends with safe gains of its own, whatever a rehearsal had those of
+    if row.vehicle.is_real:  # it gets the safe gains of its own vehicle; a rehearsal had those of another
         row.safe_gains = None
     cancel_unflown(history.trials_of(session, row.id), None, "the campaign's definition was changed")
     request_proposal(session, row)

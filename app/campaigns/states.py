@@ -1,4 +1,4 @@
-"""The life of a campaign."""
+"""States of a campaign."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -6,13 +6,13 @@ from typing import Final
 
 
 class CampaignState(StrEnum):
-    """From the first idea to the archive.
+    """States of a campaign.
 
-        draft ──→ ready ──→ flying ←──→ deciding ──→ finished ──→ archived
+            draft ──→ ready ──→ flying ←──→ deciding ──→ finished ──→ archived
 
-    draft: its first gains are not known yet. ready: they are, and nothing has flown; the definition may still change.
-    flying: a trial is in the air. deciding: the next gains are being found, or a person has to say something.
-    finished: converged, out of flights, or stopped by the operator; see `Outcome`.
+    draft: its first gains are not computed yet. ready: they are, and nothing has flown; the definition may still
+    change. flying: a trial is in the air. deciding: the next gains are being computed, or a review is due. finished:
+    converged, out of flights, or stopped by the operator; see `Outcome`.
     """
 
     DRAFT = "draft"
@@ -54,5 +54,5 @@ ACTIONS: Final[Mapping[str, frozenset[CampaignState]]] = {
     "clone": _ALL,
     "judge": _ALL - {CampaignState.ARCHIVED},
 }
-"""What a person may do with a campaign, and in which states. `define` changes definition or vehicle, `plan` adds a
-trial, `judge` says what a flight is worth or hands in the record of a lost one."""
+"""Actions that a person may take on a campaign, and in which states. `define` changes definition or vehicle, `plan`
+adds a trial, `judge` classifies a flight or imports the record of a lost one."""

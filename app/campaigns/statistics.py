@@ -1,4 +1,4 @@
-"""What a campaign's flights say about its gains, as it looks from outside."""
+"""API view of a campaign's statistics."""
 
 from collections.abc import Sequence
 from typing import Final, Literal
@@ -30,11 +30,11 @@ from app.trials import history
 
 _SURE: Final = 0.9
 _NO_OPTIMISM: Final = 0.05
-"""Shares of a standard error below this are not worth a sentence."""
+"""Smaller optimism, as a share of a standard error, is not mentioned."""
 
 
 def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistics:
-    """Raises NotFoundError."""
+    """Statistics of a campaign. Raises NotFoundError."""
     row = repository.get_one(session, campaign_id)
     trials = history.trials_of(session, campaign_id)
     definition, experiment = definition_of(row), get_experiment(row.experiment)
@@ -66,7 +66,7 @@ def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState
 
 
 def standing_within_bounds_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
-    """The standing among the gains that may be flown again; None before the first valid flight of any."""
+    """Groups, scatter and winner among the gains that may be flown again; None before the first valid flight."""
     return standing_within_bounds(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
 
 
@@ -137,7 +137,8 @@ def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
 
 
 def _trends(experiment: Experiment, group: Group, trials: Sequence[TrialRow]) -> list[Trend]:
-    """Of the gains flown most: their errors against the flights' numbers, and against the battery where it was told."""
+    """Trends of the gains flown most often: their errors by flight number, and by battery voltage where it was
+    measured."""
     voltages = {row.number: row.landing_battery_v for row in trials}
     told = [
         (volts, error)

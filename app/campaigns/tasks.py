@@ -1,4 +1,4 @@
-"""Carrying out a campaign's jobs: stored flights in, a stored proposal or landscape out, computed by the pool."""
+"""Execution of a campaign's jobs: read flights, compute in the pool, store a proposal or a landscape."""
 
 from time import monotonic
 from typing import Final
@@ -15,13 +15,13 @@ from app.jobs.tasks import ClaimedJob
 from app.pool import ComputePool
 
 POINTS_PER_BATCH: Final = 48
-"""So many gain sets of a landscape are asked of the pool together: a proposal waits for no more."""
+"""Number of gain sets of a landscape per request to the pool, which limits how long a proposal has to wait."""
 
 _log = structlog.get_logger(__name__)
 
 
 class ProposalJob:
-    """What the runner of proposal jobs carries out."""
+    """Carries out proposal jobs for a job runner."""
 
     def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
         self._database = database
@@ -29,8 +29,10 @@ class ProposalJob:
         self._worker = worker
 
     def __call__(self, job: ClaimedJob) -> None:
-        """From the stored flights to the stored proposal. Raises GainlineError, and CancelledError when the pool is
-        closed meanwhile."""
+        """Compute a proposal from the stored flights and store it.
+
+        Raises GainlineError, and CancelledError when the pool is closed meanwhile.
+        """
         if job.campaign_id is None:
             raise GainlineError("It names no campaign.", hint="")
         started_s = monotonic()
@@ -44,7 +46,7 @@ class ProposalJob:
 
 
 class LandscapeJob:
-    """What the runner of landscape jobs carries out."""
+    """Carries out landscape jobs for a job runner."""
 
     def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
         self._database = database
@@ -52,8 +54,10 @@ class LandscapeJob:
         self._worker = worker
 
     def __call__(self, job: ClaimedJob) -> None:
-        """From the stored proposal to the stored landscape, a few points at a time. Raises GainlineError, and
-        CancelledError when the pool is closed meanwhile."""
+        """Compute the landscape of the stored proposal in batches and store it.
+
+        Raises GainlineError, and CancelledError when the pool is closed meanwhile.
+        """
         if job.campaign_id is None:
             raise GainlineError("It names no campaign.", hint="")
         started_s = monotonic()

@@ -1,4 +1,4 @@
-"""How campaigns and proposals look from outside."""
+"""API views of campaigns and proposals."""
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
@@ -80,7 +80,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
 
 
 def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSummary]:
-    """The cards of several campaigns, from one query for all their trials."""
+    """Summaries of several campaigns, with one query for all their trials."""
     by_campaign: Mapping[int, list[TrialRow]] = defaultdict(list)
     for trial in history.trials_of(session, *(row.id for row in rows)):
         by_campaign[trial.campaign_id].append(trial)
@@ -113,7 +113,7 @@ def _summary(
 
 
 def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
-    """Where the next proposal stands; computed in the background, it may be fresh, stale, on its way, or impossible."""
+    """State of the next proposal, which is computed in the background: fresh, stale, being computed, or impossible."""
     session.flush()
     trials = history.trials_of(session, row.id)
     latest = repository.latest_proposal(session, row.id)
@@ -179,7 +179,7 @@ def _explanation(row: ProposalRow) -> Explanation:
 
 
 def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
-    """As stored; rows of releases without advice have the stop rule's word and the proposal."""
+    """The advice as stored; for rows of releases without advice, the stop rule's verdict and the proposal."""
     if row.advice is not None:
         return Advice.model_validate(row.advice)
     return Advice(kind="stop" if verdict.stop else "step", gains=row.gains, why=verdict.sentence)
@@ -228,7 +228,8 @@ def _next_action(row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehear
 
 
 def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> list[str]:
-    """The states' table, without what a flight under way forbids, and a begun one for ever."""
+    """Allowed actions: those of the state table, less what an active flight rules out, and deletion once a flight was
+    begun."""
     impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
     if history.has_begun_flight(session, row.id):
         impossible.add("delete")
@@ -236,7 +237,8 @@ def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> li
 
 
 def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> Mapping[int, list[SparkCurve]]:
-    """Of each campaign the first flight, the best, and the latest, in their order; none of one without any."""
+    """Curves of the first flight, the best and the latest of each campaign, in their order; none for a campaign without
+    any."""
     chosen = {campaign: _sparking(trials) for campaign, trials in by_campaign.items()}
     curves = history.curves_of(session, [trial for trials in chosen.values() for trial in trials])
     found: Mapping[int, list[SparkCurve]] = defaultdict(list)

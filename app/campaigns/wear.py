@@ -1,4 +1,4 @@
-"""What a vehicle's campaigns tell of the vehicle itself: its calibrations over its flights, and its batteries."""
+"""Condition of a vehicle over all its campaigns: its calibrations over its flights, and its batteries."""
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -21,7 +21,7 @@ _STRATEGY: Final = "calibrated"
 
 
 class FittedNumber(BaseModel):
-    """A parameter of the model with its standard error."""
+    """A fitted parameter of the model with its standard error."""
 
     name: str
     title: str
@@ -31,7 +31,7 @@ class FittedNumber(BaseModel):
 
 
 class Estimate(BaseModel):
-    """One calibration: after which of the vehicle's flights, counted over all its campaigns."""
+    """One calibration. `flight` counts the vehicle's flights over all its campaigns."""
 
     flight: int
     campaign_id: int
@@ -42,7 +42,7 @@ class Estimate(BaseModel):
 
 
 class Retune(BaseModel):
-    """Whether the vehicle is to be tuned again: `since` is the flight after which it was tuned last."""
+    """Whether the vehicle should be tuned again; `since` is the flight after which it was last tuned."""
 
     due: bool
     since: int | None
@@ -51,21 +51,23 @@ class Retune(BaseModel):
 
 
 class VehicleCalibration(BaseModel):
-    """What the flights say about the vehicle, the oldest calibration first, and whether it still is as it was tuned."""
+    """The vehicle's calibrations, oldest first, and whether the vehicle has changed since it was tuned."""
 
     estimates: list[Estimate]
     retune: Retune
 
 
 def calibration_of(session: Session, vehicle_id: int) -> VehicleCalibration:
-    """Raises NotFoundError. Of a shared simulation only the campaigns count that flew with its latest settings: with
-    others it is another vehicle."""
+    """Calibrations of a vehicle. Raises NotFoundError.
+
+    For a shared simulation only campaigns with its latest settings count, because other settings make another vehicle.
+    """
     estimates, ends = _estimates(session, vehicle_id)
     return VehicleCalibration(estimates=estimates, retune=_retune(estimates, ends))
 
 
 def vehicle_figure(session: Session, vehicle_id: int, name: str, theme: ThemeName) -> Card:
-    """`calibration` or `batteries`. Raises NotFoundError."""
+    """Figure of a vehicle: `calibration` or `batteries`. Raises NotFoundError."""
     if name == "batteries":
         fleet.get_vehicle(session, vehicle_id)
         flights = [BatteryFlight(**each) for each in fleet.battery_flights(session, vehicle_id)]
