@@ -1,9 +1,9 @@
-"""Who sends a request: read from the connection, its headers, and the key that it shows.
+"""Origin and permissions of a request, from its connection, its headers, and the key that it presents.
 
-A page from elsewhere can make a browser send an act to a server on loopback; a foreign name can be pointed at this
-machine so that its pages count as ours; and a proxy or a tunnel on this machine connects from loopback for strangers.
-What is checked here stands in the way of each. Headers alone prove nothing: what commands a real vehicle shows a key
-(`app.keyring`) besides.
+These checks address three attacks: a page of another site makes a browser send a change to a server on loopback; a
+foreign host name is pointed at this machine, so that its pages count as ours; a proxy or tunnel on this machine
+connects from loopback on behalf of remote clients. Headers alone prove nothing, so a request that commands a real
+vehicle must also present a key (`app.keyring`).
 """
 
 import ipaddress
@@ -23,23 +23,23 @@ from app.settings import is_loopback
 
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _COSTLY: Final = ("/api/system/backup", "/report.pdf", "/bundle")
-"""How the paths end whose reading computes for long or fills a disk, while something may fly: read by who may change
-things."""
+"""Suffixes of paths whose reading computes for long or fills a disk, possibly during a flight; these need the
+permission to change."""
 _FORWARDED: Final = frozenset({"forwarded", "via", "x-real-ip", "x-client-ip", "true-client-ip", "cdn-loop"})
 _FORWARDED_BEGINS: Final = (
     *("x-forwarded", "x-original-", "x-proxy", "x-remote-", "x-cluster-", "x-tunnel", "proxy-client-"),
     *("x-amzn-", "x-appengine-", "x-arr-", "x-azure-", "x-envoy-", "x-vercel-"),
     *("cf-", "do-connecting-", "fastly-", "fly-", "ngrok-", "tailscale-"),
 )
-"""Headers that proxies and tunnels add; no browser does."""
+"""Headers that proxies and tunnels add, and browsers do not."""
 
 
 class AccessMiddleware:
-    """Refuses requests under a foreign name, those that another site's page asks of the API, and changes by who has no
-    key for them.
+    """Refuses requests under a foreign host name, API requests from another site's pages, and changes without a key for
+    them.
 
-    `host` is the name that the dashboard was told to listen on; `refuse_foreign` makes the answer from a sentence and a
-    hint, `refuse` from one of our errors.
+    `host` is the name that the server listens on; `refuse_foreign` builds the response from a sentence and a hint,
+    `refuse` from one of the application's errors.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class AccessMiddleware:
         headers = Headers(scope=scope)
         address = headers.get("host", "")
         name = _name_of(address)
-        if name not in {"localhost", self._host} and not _is_ip_address(name):  # an address cannot be pointed elsewhere
+        if name not in {"localhost", self._host} and not _is_ip_address(name):  # DNS rebinding needs a name
             return self._refuse_foreign(
                 f"This server does not answer to the name “{address}”.",
                 "Use localhost or the machine's address, or start it with that name as --host (GAINLINE_HOST).",
@@ -86,12 +86,12 @@ class AccessMiddleware:
 
 
 def caller_of(request: Request) -> Caller:
-    """Who sent the request."""
+    """The caller of a request."""
     return read_caller(request.scope, host=request.app.state.settings.host)
 
 
 def read_caller(scope: Scope, *, host: str) -> Caller:
-    """Who sent what is in the scope, to a server that listens on this host."""
+    """The caller of the request in `scope`, to a server that listens on this host."""
     headers = Headers(scope=scope)
     because = _describe_origin(scope.get("client"), headers)
     keyring: Keyring = scope["app"].state.keyring
@@ -116,8 +116,10 @@ def _describe_origin(client: tuple[str, int] | None, headers: Headers) -> str:
 
 
 def _shown(headers: Headers, cookie: str) -> Iterator[str]:
-    """Every value that may show a key. A page at another port of this computer can put a second cookie of the name
-    beside ours, which must not hide it."""
+    """Every value in the request that may be a key.
+
+    A page at another port of this computer can set a second cookie of the same name, which must not hide ours.
+    """
     for each in headers.get("cookie", "").split(";"):
         name, _, value = each.strip().partition("=")
         if name == cookie:

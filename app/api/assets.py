@@ -1,7 +1,7 @@
-"""The dashboard's scripts and styles: compressed once, then sent from memory.
+"""The dashboard's scripts and styles, compressed once and then sent from memory.
 
-Compressed and read in pieces for every request, the chart library alone kept the server busy for a tenth of a second,
-just when a page asks for its figures.
+When they were read and compressed for every request, the chart library alone kept the server busy for 0.1 s, just when
+a page requests its figures.
 """
 
 import gzip
@@ -16,14 +16,14 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 _FILES: Final = 64
-"""More than a build has."""
+"""More files than a build has."""
 
 
 class Assets(StaticFiles):
-    """Files whose names carry a hash of their content, so that what was compressed stays true."""
+    """Static files whose names contain a hash of their content, so that the cached compressed data stays valid."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """The file, compressed for a client that takes it so; raises HTTPException 404 where there is none."""
+        """The file, compressed if the client accepts gzip; raises HTTPException 404 when there is none."""
         answer = await super().get_response(path, scope)
         asked = Headers(scope=scope)
         whole = scope["method"] == "GET" and "range" not in asked

@@ -1,4 +1,4 @@
-"""What this installation offers: experiments, strategies, vehicles, presets; and whether it is well."""
+"""What this installation offers (experiments, strategies, vehicles, presets), and its health."""
 
 from typing import Literal
 
@@ -27,7 +27,8 @@ class VehicleTrouble(BaseModel):
 
 
 class Health(BaseModel):
-    """`vehicles_not_answering`: those that no order reaches, because the process that has their link stands still."""
+    """Health of the server. `vehicles_not_answering`: vehicles that commands do not reach, because the process that has
+    their link does not answer."""
 
     status: Literal["ok"]
     version: str
@@ -60,7 +61,8 @@ class OptionInfo(BaseModel):
 
 
 class ExperimentInfo(BaseModel):
-    """`output` is the channel that is scored. Without a model nothing is foretold, and gains are chosen by hand."""
+    """An experiment. `output` is the channel that is scored. Without a model there are no predictions, and gains are
+    chosen by hand."""
 
     name: str
     title: str
@@ -73,7 +75,7 @@ class ExperimentInfo(BaseModel):
 
 
 class StrategyInfo(BaseModel):
-    """`experiments` names those that it works with."""
+    """A strategy. `experiments` names those that it works with."""
 
     name: str
     title: str
@@ -83,8 +85,8 @@ class StrategyInfo(BaseModel):
 
 
 class VehicleKindInfo(BaseModel):
-    """`can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly.
-    Vehicles of a kind that is `registered` are made one by one, and chosen by their id."""
+    """A kind of vehicle. `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those
+    that it can fly. Vehicles of a kind that is `registered` are registered one by one and chosen by their id."""
 
     name: str
     title: str
@@ -114,7 +116,7 @@ class Catalogue(BaseModel):
 
 @router.get("/health")
 async def get_health(live: Live) -> Health:
-    """Whether the program answers, whether a worker is there to fly and compute, and whether orders reach every
+    """Whether the server answers, whether a worker is there to fly and compute, and whether commands reach every
     connected vehicle."""
     silent = live.hub.vehicles("not answering")
     return Health(
@@ -178,7 +180,7 @@ def _strategy(strategy: Strategy) -> StrategyInfo:
 
 
 def _is_ready(preset: PresetInfo) -> bool:
-    """Whether its vehicle is there for everybody, rather than one that somebody has to register first."""
+    """Whether its vehicle is available without being registered first."""
     return not is_registered_one_by_one(get_kind(preset.campaign.vehicle.kind))
 
 

@@ -1,4 +1,4 @@
-"""What routes ask for: a reader's session, a writer's session, at most one carrying-out per idempotency key."""
+"""Dependencies of routes: a session to read, a session to write, and idempotent POST requests."""
 
 import hashlib
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ ControlToken = Annotated[
 ]
 
 
-# These are coroutines so that they need no thread: with every thread waiting for the database, an abort still passes.
+# These are coroutines and so need no thread: an abort gets through while every thread waits for the database.
 
 
 async def _database(request: Request) -> Database:
@@ -67,7 +67,7 @@ CurrentSettings = Annotated[Settings, Depends(_settings)]
 
 
 async def _request_context(request: Request, settings: CurrentSettings, token: ControlToken = None) -> RequestContext:
-    """No script in a page can set Sec-Fetch-Site: browsers do."""
+    """Build the request context. Scripts in a page cannot set Sec-Fetch-Site; only the browser does."""
     return RequestContext(
         token=token,
         caller=caller_of(request),
@@ -89,13 +89,13 @@ def _writer(database: CurrentDatabase) -> Iterator[Session]:
         yield session
 
 
-# Scope "function": the transaction is over, for better or worse, before the answer is sent.
+# Scope "function": the transaction has ended before the response is sent.
 Reader = Annotated[Session, Depends(_reader, scope="function")]
 Writer = Annotated[Session, Depends(_writer, scope="function")]
 
 
 class IdempotentRequest:
-    """Carries out a POST in one transaction, and not again when it comes again with the same idempotency key."""
+    """Carries out a POST in one transaction, and only once for requests with the same idempotency key."""
 
     def __init__(self, database: Database, key: str | None, fingerprint: str) -> None:
         self._database = database
@@ -105,9 +105,10 @@ class IdempotentRequest:
     def __call__(
         self, answer: type[M], work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None
     ) -> M:
-        """What `work` answers, or what it answered the first time. Raises KeyReusedError for another request.
+        """Return the result of `work`, or its stored result of the first time. Raises KeyReusedError for another
+        request.
 
-        `ahead` reads and computes before the transaction, so that nobody waits for the lock meanwhile.
+        `ahead` reads and computes before the transaction, so that the write lock is held for a short time only.
         """
         if ahead is not None:
             with self._database.read() as session:
@@ -119,7 +120,7 @@ class IdempotentRequest:
 
 
 def fingerprint(request: Request, body_digest: str) -> str:
-    """What makes two requests the same one: method, path and body."""
+    """Fingerprint of a request; two requests are the same if method, path and body are."""
     return hashlib.sha256(f"{request.method} {request.url.path} {body_digest}".encode()).hexdigest()
 
 

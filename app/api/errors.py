@@ -1,4 +1,4 @@
-"""Errors over HTTP: problem details (RFC 9457) with a hint. The only place that knows what error has which status."""
+"""Errors over HTTP: problem details (RFC 9457) with a hint. The only module that maps errors to status codes."""
 
 import errno
 import json
@@ -50,7 +50,7 @@ _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
     LinkDownError: (HTTPStatus.SERVICE_UNAVAILABLE, "Worker out of reach"),
     GainlineError: (HTTPStatus.INTERNAL_SERVER_ERROR, "Error"),
 }
-"""Status and title; a class without its own has those of the nearest above it."""
+"""Status and title; a class that is not listed has those of its nearest listed base class."""
 
 _HTTP: Final[Mapping[int, tuple[str, str]]] = {
     400: (
@@ -60,7 +60,7 @@ _HTTP: Final[Mapping[int, tuple[str, str]]] = {
     404: ("There is nothing at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
     405: ("{path} does not know the method {method}.", "The methods of each path are listed in /api/openapi.json."),
 }
-"""What the framework refuses by itself."""
+"""Errors raised by the framework itself."""
 
 RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
     "default": {
@@ -83,7 +83,7 @@ def install(app: FastAPI) -> None:
 
 
 def kind_of(error: GainlineError) -> tuple[HTTPStatus, str]:
-    """Status and title of the nearest class that has them."""
+    """Status and title of the nearest listed class."""
     return next(_KINDS[kind] for kind in type(error).__mro__ if kind in _KINDS)
 
 
@@ -105,7 +105,7 @@ def _problem(
         hint=hint,
         problems=list(problems),
     )
-    # What is quoted from a request may hold half a character, which has no UTF-8.
+    # A quoted part of the request may hold a lone surrogate, which UTF-8 cannot encode.
     content = json.dumps(body.model_dump(), ensure_ascii=False).encode("utf-8", "replace")
     return Response(content, status, headers, media_type=MEDIA_TYPE)
 
@@ -116,7 +116,7 @@ async def _own_error(_request: Request, error: Exception) -> Response:
 
 
 def problem_response(error: GainlineError) -> Response:
-    """The answer that one of our errors makes, also before the application has seen the request."""
+    """Response for one of the application's errors; also used before the request reaches the application."""
     status, title = kind_of(error)
     return _problem(
         status,
@@ -143,7 +143,8 @@ async def _invalid_request(_request: Request, error: Exception) -> Response:
 
 
 def _refused(found: Mapping[str, Any]) -> ProblemField:
-    """The field dotted as the caller wrote it: without the part of the request, unless there is nothing else."""
+    """The refused field, dotted as the caller wrote it: without the part of the request, unless there is nothing
+    else."""
     part, *inner = found["loc"]
     if found["type"] == "json_invalid":
         return ProblemField(field="body", reason=f"is not JSON: {found['ctx']['error']}, at character {inner[0]}")
@@ -161,12 +162,12 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def foreign_request_response(detail: str, hint: str) -> Response:
-    """A request that is not from us or not for us."""
+    """Response to a request of another site or under a foreign host name."""
     return _problem(HTTPStatus.FORBIDDEN, detail, hint, title="Foreign request")
 
 
 async def _system_error(request: Request, error: Exception) -> Response:
-    """A full disk may also show outside of the database, for instance while an upload is set aside."""
+    """Answer an OSError; a full disk may also appear outside the database, for instance while an upload is spooled."""
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
         return await _own_error(
             request,

@@ -1,4 +1,4 @@
-"""One stream of server-sent events a browser tab: what changed, and telemetry while something flies."""
+"""Server-sent events, one stream per browser tab: what changed, and telemetry during flights."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -33,14 +33,15 @@ async def events(
         float, Query(ge=0.0, le=MAX_SINCE_S, description="seconds before now whose changes come first")
     ] = 0.0,
 ) -> AsyncIterator[ServerSentEvent]:
-    """Follow everything that happens.
+    """Stream all events.
 
     `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
-    entity_id, campaign_id), those of the last `since_s` seconds first, for whoever read something just before; its id
-    lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the server included. `reset`: that id
-    is unknown here, load everything anew. `telemetry` and `phase` come from a running flight, `vehicle` five times a
-    second from a connected vehicle, and `worker` tells whether the worker is there: when it comes or goes, and every
-    three seconds, so that silence means a dead line. These carry no id and may be dropped for a slow client.
+    entity_id, campaign_id); those of the last `since_s` seconds come first, for a client that has just read something.
+    Its id lets a client that reconnects with `Last-Event-ID` miss nothing, even after a restart of the server. `reset`:
+    that id is unknown here, load everything again. `telemetry` and `phase` come from a running flight, `vehicle` five
+    times a second from a connected vehicle. `worker` tells whether the worker is there: when that changes, and every
+    three seconds, so that a client detects a dead connection by silence. These carry no id and may be dropped for a
+    slow client.
     """
     with live.hub.subscribe() as stream:
         sent, known = await asyncio.to_thread(_start, database, last_event_id, since_s)
@@ -64,7 +65,8 @@ async def events(
 
 
 def _start(database: Database, last_event_id: str | None, since_s: float) -> tuple[int, bool]:
-    """The event after which the stream begins, and whether the client's own history is known up to there."""
+    """The event id after which the stream begins, and whether all events since the client's last one are still
+    stored."""
     with database.read() as session:
         latest = latest_event_id(session)
         if not last_event_id:

@@ -1,4 +1,4 @@
-"""Figures over HTTP: Plotly JSON that a browser draws, with the same data as a table."""
+"""Figures over HTTP: Plotly JSON for the browser, with the same data as a table."""
 
 from typing import Annotated, Literal
 
@@ -19,7 +19,7 @@ Theme = Annotated[ThemeName, Query(description="colours for a light or a dark pa
 
 
 class FigureColumn(BaseModel):
-    """One column of a figure's table; `digits` after the point, null for text."""
+    """One column of a figure's table; `digits` after the decimal point, null for text."""
 
     name: str
     title: str
@@ -28,7 +28,7 @@ class FigureColumn(BaseModel):
 
 
 class FigureTable(BaseModel):
-    """The figure's data in numbers."""
+    """The figure's data as a table."""
 
     columns: list[FigureColumn]
     rows: list[list[str | int | float | None]]
@@ -60,15 +60,15 @@ def get_campaign_figure(
 ) -> FigureCard:
     """All takeoffs over the set point, the error of each flight, or the gains of each flight.
 
-    Of more than 30 flights the takeoffs are drawn as an envelope, with the first, the best, the latest and that
-    `flight` by themselves. Between `from_s` and `to_s` curves have as many points again.
+    With more than 30 flights the takeoffs are drawn as an envelope; the first, the best, the latest and that `flight`
+    are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
     """
     view = drawing.FigureView(window=_window(from_s, to_s), chosen=flight)
     return figure_card(drawing.campaign_figure(session, campaign_id, name, theme, view))
 
 
 def _window(from_s: float | None, to_s: float | None) -> Range | None:
-    """Raises InputError when it ends before it begins, or has one end only."""
+    """Time range of the curves. Raises InputError when it ends before it begins, or has one end only."""
     if from_s is None and to_s is None:
         return None
     if from_s is None or to_s is None or not from_s < to_s:
@@ -82,10 +82,10 @@ def _window(from_s: float | None, to_s: float | None) -> Range | None:
 
 @router.get("/trials/{trial_id}/figure")
 def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> FigureCard:
-    """One flight by itself, with its prediction and its commands."""
+    """One flight, with its prediction and its commands."""
     return figure_card(drawing.flight_figure(session, trial_id, theme))
 
 
 def figure_card(card: Card) -> FigureCard:
-    """The card as it is answered."""
+    """Convert a card to its API schema."""
     return FigureCard.model_validate(card, from_attributes=True)

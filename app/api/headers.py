@@ -1,4 +1,4 @@
-"""Headers of every answer: what a page may load, and what may be kept by the browser."""
+"""Headers of every response: what a page may load, and what the browser may cache."""
 
 from typing import Final
 
@@ -16,16 +16,18 @@ _SECURITY: Final = {
 
 
 def _caching(path: str, status: int) -> str:
-    """Built assets carry their content's hash in their names and never change; everything else is asked for anew."""
+    """Cache-Control of a response: built assets have a content hash in their names and never change; the rest is
+    revalidated."""
     if path.startswith("/assets/") and status in {200, 206, 304}:
         return "public, max-age=31536000, immutable"
     return "no-store" if path.startswith("/api/") else "no-cache"
 
 
 class HeadersMiddleware:
-    """Adds the headers as an answer starts; streams pass through untouched.
+    """Adds the headers as a response starts; the body passes unchanged.
 
-    Under /api the wish for a page is not heard, so that an unknown path there gives a problem and not the dashboard.
+    Removes the Accept header of requests under /api, so that an unknown path there gives a problem and not the
+    dashboard.
     """
 
     def __init__(self, app: ASGIApp) -> None:

@@ -1,4 +1,4 @@
-"""The landscape of a campaign over HTTP: a figure that is computed when it is first asked for."""
+"""The error landscape of a campaign over HTTP: a figure that is computed when it is first requested."""
 
 from typing import Annotated
 
@@ -22,7 +22,7 @@ def get_landscape(
 ) -> FigureCard:
     """The gains as a path over the error that the strategy's model predicts, two gains at a time.
 
-    A job computes it for each proposal, started when somebody who may change things first asks for it; until that is
+    A job computes it for each proposal, started at the first request by a client that may make changes; until it is
     done the card is `waiting`.
     """
     with database.read() as session:

@@ -1,4 +1,5 @@
-"""How much may be sent at once: refused by the stated length where there is one, else as soon as it is passed."""
+"""Size limits of request bodies: enforced by the stated length if there is one, else as soon as the limit is
+exceeded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,14 +14,14 @@ from app.errors import GainlineError, Problem, TooLargeError
 JSON_BYTES: Final = 2**20
 """Largest JSON body."""
 PHOTO_BYTES: Final = 10 * 2**20 + 2**12
-"""Largest photo, with the form that it comes in."""
+"""Largest photo, including the form around it."""
 BUNDLE_BYTES: Final = 2**30
 """Largest campaign in one file; `gainline unbundle` has no such limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Limit:
-    """Of the request's `field`; `otherwise` is what to do with more."""
+    """Size limit of a request's `field`; `otherwise` is the advice for larger ones."""
 
     field: str
     size_bytes: int
@@ -31,7 +32,7 @@ _JSON: Final = _Limit("body", JSON_BYTES, "no act of the API needs more")
 
 
 class BodyLimitMiddleware:
-    """Bounds every request's body: flight records to `upload_bytes`, photos to 10 MiB, bundles to 1 GiB, everything
+    """Limits every request's body: flight records to `upload_bytes`, photos to 10 MiB, bundles to 1 GiB, everything
     else to 1 MiB."""
 
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:

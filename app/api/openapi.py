@@ -1,4 +1,4 @@
-"""The OpenAPI document: FastAPI's own, and the problem details that every operation may answer with."""
+"""The OpenAPI document: FastAPI's own, plus the problem details that every operation may answer with."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from app.schemas import Problem
 
 
 def describe(app: FastAPI) -> None:
-    """Complete the application's OpenAPI document."""
+    """Add the problem schema to the application's OpenAPI document."""
     plain = app.openapi
 
     def complete() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""This server itself: where other devices reach it, what it holds, and a copy of all of it to keep elsewhere."""
+"""This server: the addresses where other devices reach it, its data, and a backup."""
 
 import shutil
 from collections.abc import Iterator
@@ -26,15 +26,16 @@ _CHUNK_BYTES: Final = 2**20
 
 
 class AddressInfo(BaseModel):
-    """`interface` is empty where the server was told to listen on a name or on one address."""
+    """An address of this server. `interface` is empty where the server listens on a name or on one address."""
 
     url: str
     interface: str
 
 
 class System(BaseModel):
-    """`addresses` are those under which other devices reach this server, the likeliest first: none on loopback, and
-    `in_container` its own, which need not be the host's. `exposes` ends the sentence "It listens on …, so"."""
+    """This server. `addresses` are those under which other devices reach it, the likeliest first: none on loopback, and
+    with `in_container` the container's own, which need not be the host's. `exposes` ends the sentence "It listens on …,
+    so"."""
 
     version: str
     worker: Literal["running", "not answering", "absent"]
@@ -52,7 +53,7 @@ class System(BaseModel):
 
 @router.get("")
 def get_system(request: Request, settings: CurrentSettings, database: CurrentDatabase, live: Live) -> System:
-    """Version, address, room on the disk: what one is asked for when something is wrong."""
+    """Version, addresses, disk space: the facts to report with a problem."""
     return System(
         version=__version__,
         worker=live.worker,
@@ -95,10 +96,10 @@ def get_address_code(
     responses={200: {"content": {_SQLITE: {"schema": {"type": "string", "format": "binary"}}}}},
 )
 def get_backup(database: CurrentDatabase) -> StreamingResponse:
-    """The whole database as it is at this moment, as one SQLite file; flights and computations go on meanwhile.
+    """The whole database at this moment, as one SQLite file; flights and computations continue meanwhile.
 
-    It is verified first; 503 names the trials whose record is damaged.
-    Only for programs and the dashboard itself: a page of another site cannot ask for it.
+    It is verified first; 503 names the trials whose record is damaged. Only for programs and the dashboard itself: a
+    page of another site cannot request it.
     """
     copy = take_backup(database.file, require_intact)
     size = copy.seek(0, 2)
@@ -107,7 +108,7 @@ def get_backup(database: CurrentDatabase) -> StreamingResponse:
     headers = {
         "Content-Disposition": f'attachment; filename="{name}"',
         "Content-Length": str(size),
-        # Not packed on the way: its records are packed already, and a browser shows how much is still to come.
+        # Not compressed: its records are compressed already, and with a length the browser shows the progress.
         "Content-Encoding": "identity",
         "Cross-Origin-Resource-Policy": "same-origin",
     }

@@ -1,4 +1,4 @@
-"""How a person unlocks a browser: a link that works once, and a cookie in its place."""
+"""Unlocking of a browser: a link that works once and sets a cookie."""
 
 from typing import Annotated, Final
 
@@ -14,7 +14,7 @@ router = APIRouter(tags=["system"])
 
 KEPT_S: Final = 90 * 24 * 3600
 _HEADERS: Final = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
-"""The token stands in the address: neither a cache nor the next page learns of it."""
+"""The token is in the address: these headers keep it out of caches and from the next page."""
 
 _SPENT: Final = f"""<!doctype html>
 <html lang="en">
@@ -36,9 +36,9 @@ that Gainline runs on, and open the link that it prints.</p>
 
 
 class Access(BaseModel):
-    """What whoever asks may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
-    link, `may_command` real ones. `elsewhere`: they are not on this computer. `hint` says how a browser is unlocked;
-    empty where no link would change anything."""
+    """What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
+    link, `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` says how to unlock a browser;
+    empty where a link would change nothing."""
 
     elsewhere: bool
     may_change: bool
@@ -49,7 +49,7 @@ class Access(BaseModel):
 
 @router.get("/api/access")
 def get_access(request: Request) -> Access:
-    """What whoever asks may do here."""
+    """What this client may do."""
     caller = caller_of(request)
     may_change, may_command = is_allowed(Permission.CHANGE, caller), is_allowed(Permission.TAKE_OFF, caller)
     return Access(
@@ -69,12 +69,12 @@ def _would_help(caller: Caller) -> bool:
 
 @router.get("/unlock", include_in_schema=False)
 def unlock(request: Request, token: Annotated[str, Query(max_length=200)] = "") -> Response:
-    """Take a link's token for a cookie, once. What the cookie is worth depends on where the browser is."""
+    """Exchange a link's token for a cookie, once. What the cookie permits depends on where the browser is."""
     keyring: Keyring = request.app.state.keyring
     caller = caller_of(request)
     given = keyring.given_to(caller.place)
     if not keyring.open_link(token):
-        if caller.key >= given:  # opened twice in the same browser
+        if caller.key >= given:  # the link was opened twice in the same browser
             return RedirectResponse("/", 303, headers=_HEADERS)
         return HTMLResponse(_SPENT, 403, headers=_HEADERS)
     answer = RedirectResponse("/", 303, headers=_HEADERS)

@@ -1,4 +1,4 @@
-"""Flight records sent to us: set aside while they arrive, bounded by the application's limit on a body."""
+"""Uploaded flight records: spooled while they arrive, limited by the application's limit on bodies."""
 
 import hashlib
 import tempfile
@@ -43,7 +43,7 @@ REQUEST_BODY: Final = {
         },
     }
 }
-"""For OpenAPI."""
+"""Request body of a flight record, for OpenAPI."""
 
 FILE_BODY: Final = {
     "requestBody": {
@@ -56,12 +56,13 @@ FILE_BODY: Final = {
         },
     }
 }
-"""The same for one file of any kind."""
+"""Request body of one file of any kind, for OpenAPI."""
 
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """A record that has arrived completely, and the transaction that may store it; `name` is its file's, if told."""
+    """A completely received record, and the transaction that may store it; `name` is its file name, empty if not
+    given."""
 
     file: BinaryIO
     name: str
@@ -69,12 +70,12 @@ class Upload:
     once: IdempotentRequest
 
     def content(self) -> bytes:
-        """All of the file, which the limit on bodies has bounded."""
+        """The whole file; its size is bounded by the limit on bodies."""
         self.file.seek(0)
         return self.file.read()
 
     def read_companion(self) -> bytes | None:
-        """All of the companion, if there is one."""
+        """The whole companion file, if there is one."""
         if self.companion is None:
             return None
         self.companion.seek(0)

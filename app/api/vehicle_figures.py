@@ -1,4 +1,4 @@
-"""What a vehicle's flights tell of it over HTTP: calibration and batteries."""
+"""Condition of a vehicle over HTTP, from its flights: calibration and batteries."""
 
 from typing import Literal
 
@@ -14,7 +14,8 @@ router = APIRouter(prefix="/api/vehicles", tags=["vehicles"])
 
 @router.get("/{vehicle_id}/calibration")
 def get_calibration(session: Reader, vehicle_id: Id) -> VehicleCalibration:
-    """The model as it was fitted after each flight, over all campaigns of the vehicle, and whether a re-tune is due."""
+    """The model as fitted after each flight, over all campaigns of the vehicle, and whether it should be tuned
+    again."""
     return wear.calibration_of(session, vehicle_id)
 
 
@@ -22,5 +23,5 @@ def get_calibration(session: Reader, vehicle_id: Id) -> VehicleCalibration:
 def get_vehicle_figure(
     session: Reader, vehicle_id: Id, name: Literal["calibration", "batteries"], theme: Theme = "light"
 ) -> FigureCard:
-    """The fitted parameters over the vehicle's flights, or the voltages before and after each flight."""
+    """The fitted parameters over the vehicle's flights, or the battery voltages before and after each flight."""
     return figure_card(wear.vehicle_figure(session, vehicle_id, name, theme))
