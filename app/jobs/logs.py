@@ -1,4 +1,4 @@
-"""What the worker wrote down about one job, found in its log files."""
+"""Log lines of one job, from the worker's log files."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -15,7 +15,7 @@ _LARGEST_LINE: Final = 200_000
 
 @dataclass(frozen=True, slots=True)
 class LogLine:
-    """One line: `details` are its further fields in words, `exception` a traceback, empty without one."""
+    """One log line: `details` are its further fields as text, `exception` is a traceback, empty without one."""
 
     at: datetime
     level: str
@@ -25,9 +25,10 @@ class LogLine:
 
 
 def lines_of_job(data_dir: Path, job_id: int, *, since: datetime, limit: int) -> tuple[list[LogLine], int]:
-    """The last `limit` lines about a job that was asked for at `since`, the oldest first, and the number of all.
+    """The last `limit` lines about a job created at `since`, oldest first, and the total count.
 
-    Ids of jobs begin anew with a new database, and the log files stay: older lines are somebody else's.
+    Older lines are ignored: job ids start again with a new database while the log files stay, so they belong to another
+    job.
     """
     found: list[LogLine] = []
     for file in reversed([data_dir / "log" / f"worker.log{suffix}" for suffix in _suffixes()]):
@@ -36,13 +37,14 @@ def lines_of_job(data_dir: Path, job_id: int, *, since: datetime, limit: int) ->
 
 
 def _suffixes() -> Iterator[str]:
-    """Of the newest file first."""
+    """Suffixes of the log files, newest file first."""
     yield ""
     yield from (f".{number}" for number in range(1, KEPT_LOGS + 1))
 
 
 def _of_file(file: Path, job_id: int, since: datetime) -> Iterator[LogLine]:
-    """Most lines are somebody else's, which their text tells before it is parsed."""
+    """Lines of one file about the job; most lines are about others and are skipped by their text, without being
+    parsed."""
     mark = f'"job_id": {job_id}'
     try:
         if file.stat().st_mtime < since.timestamp():
@@ -51,7 +53,7 @@ def _of_file(file: Path, job_id: int, since: datetime) -> Iterator[LogLine]:
             for text in opened:
                 if mark in text and len(text) < _LARGEST_LINE and (line := _parsed(text, job_id)) is not None:
                     yield line
-    except OSError:  # not there, or turned over meanwhile
+    except OSError:  # missing, or rotated meanwhile
         return
 
 
@@ -67,5 +69,5 @@ def _parsed(text: str, job_id: int) -> LogLine | None:
             details={name: str(value) for name, value in said.items() if name not in _KNOWN and value is not None},
             exception=str(said.get("exception", "")),
         )
-    except (ValueError, TypeError, KeyError, AttributeError):  # a line that was cut by a crash
+    except (ValueError, TypeError, KeyError, AttributeError):  # a line truncated by a crash
         return None

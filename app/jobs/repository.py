@@ -12,14 +12,14 @@ from app.jobs.states import JobState
 
 
 def get_one(session: Session, job_id: int) -> JobRow:
-    """Raises NotFoundError."""
+    """The job with that id. Raises NotFoundError."""
     if (row := session.get(JobRow, job_id)) is None:
         raise NotFoundError("job", job_id)
     return row
 
 
 def held_by_or_none(session: Session, job_id: int, worker: str) -> JobRow | None:
-    """The job, while it runs and is this worker's."""
+    """The job, if it is running and held by this worker."""
     return session.scalar(
         select(JobRow).where(JobRow.id == job_id, JobRow.worker == worker, JobRow.state == JobState.RUNNING)
     )
@@ -28,7 +28,7 @@ def held_by_or_none(session: Session, job_id: int, worker: str) -> JobRow | None
 def page(
     session: Session, *, states: Collection[JobState], campaign_id: int | None, before_id: int | None, limit: int
 ) -> tuple[Sequence[JobRow], int]:
-    """The newest jobs before that id, one more than `limit`, and the number of all."""
+    """The newest `limit` + 1 jobs before that id, and the total count."""
     wanted = select(JobRow)
     if states:
         wanted = wanted.where(JobRow.state.in_(states))
@@ -41,7 +41,7 @@ def page(
 
 
 def first_waiting(session: Session, kinds: Collection[str]) -> JobRow | None:
-    """The job that has waited longest."""
+    """The oldest queued job of these kinds."""
     return session.scalar(
         select(JobRow).where(JobRow.state == JobState.QUEUED, JobRow.kind.in_(kinds)).order_by(JobRow.id).limit(1)
     )
@@ -58,7 +58,7 @@ def running(session: Session, *, lease_before: datetime | None = None) -> Sequen
 def latest_of_order(
     session: Session, kind: str, name: str, states: Collection[JobState], *, with_result: bool = False
 ) -> JobRow | None:
-    """The newest job whose order has that name, in one of the states; `with_result`: among those that keep one."""
+    """The newest job whose order has that name, in one of the states; `with_result`: of those that have a result."""
     wanted = select(JobRow).where(
         JobRow.kind == kind, JobRow.order["name"].as_string() == name, JobRow.state.in_(states)
     )
@@ -68,7 +68,7 @@ def latest_of_order(
 
 
 def drop_older_results(session: Session, row: JobRow, name: str) -> None:
-    """Only the newest result of an order is kept."""
+    """Drop all but the newest result of an order."""
     session.execute(
         update(JobRow)
         .where(JobRow.kind == row.kind, JobRow.order["name"].as_string() == name, JobRow.id < row.id)

@@ -21,7 +21,7 @@ def list_jobs(
     limit: Limit = 50,
     cursor: CursorText = None,
 ) -> Page[Job]:
-    """Jobs, the newest first."""
+    """Jobs, newest first."""
     return service.list_jobs(session, states=state or [], campaign_id=campaign_id, limit=limit, cursor=cursor)
 
 
@@ -32,17 +32,17 @@ def get_job(session: Reader, job_id: Id) -> Job:
 
 @router.get("/{job_id}/log")
 def get_job_log(session: Reader, settings: CurrentSettings, job_id: Id, limit: Limit = 100) -> JobLog:
-    """What the worker wrote down about a job, its last lines."""
+    """The last lines of the worker's log about a job."""
     return service.get_log(session, job_id, settings.data_dir, limit=limit)
 
 
 @router.post("/{job_id}/cancel")
 def cancel_job(act: IdempotentPost, job_id: Id) -> Job:
-    """End a job that waits or runs; what it has computed is dropped."""
+    """Cancel a job that is queued or running; what it has computed is discarded."""
     return act(Job, lambda session: service.cancel_job(session, job_id))
 
 
 @router.post("/{job_id}/retry")
 def retry_job(act: IdempotentPost, job_id: Id) -> Job:
-    """Let a failed or cancelled job run again."""
+    """Queue a failed or cancelled job again."""
     return act(Job, lambda session: service.retry_job(session, job_id))

@@ -1,4 +1,4 @@
-"""What a job looks like from outside."""
+"""API schemas of jobs."""
 
 from datetime import datetime
 from typing import Annotated
@@ -10,7 +10,7 @@ from app.schemas import Trouble
 
 
 class Job(BaseModel):
-    """Numeric work: a proposal, a reproduction."""
+    """Numeric work, such as a proposal or a reproduction."""
 
     id: int
     kind: str
@@ -39,7 +39,7 @@ class JobLogLine(BaseModel):
 
 
 class JobLog(BaseModel):
-    """The last lines about a job, the oldest first; `total` counts all that are kept."""
+    """The last lines about a job, oldest first; `total` counts all that are kept."""
 
     lines: list[JobLogLine]
     total: int

@@ -1,4 +1,5 @@
-"""Numeric work as rows: written in the transaction that needs it, carried out by a worker, and again after a crash.
+"""Jobs: numeric work as rows, written in the transaction that needs it, carried out by a worker, repeated after a
+crash.
 
 For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job`, `fail_job` or
 `cancel_superseded_job`; `requeue_job` and `requeue_or_fail_job` when it has to end before that.
@@ -25,22 +26,22 @@ from app.schemas import Page, Trouble
 
 LEAST_PACE_S: Final = 30.0
 LEAST_PACE_SHARE: Final = 0.1
-"""Before so many seconds or such a share the pace says nothing about the rest: starting takes its time too."""
+"""Until this many seconds or this share, the remaining time is not estimated, because the start takes time too."""
 
 MAX_ATTEMPTS: Final = 3
-"""A job that lost its worker so many times probably killed it, and is failed."""
+"""A job that lost its worker this many times has probably killed it, and is failed."""
 
 
 class SupersededError(GainlineError):
-    """What a job was to compute, a newer state has overtaken: nothing failed, and nobody wants it any more."""
+    """The job's result is no longer needed, because a newer state has replaced what it was for. Not a failure."""
 
 
 def enqueue_job(
     session: Session, kind: str, *, campaign_id: int | None = None, order: JsonObject | None = None
 ) -> JobRow:
-    """A job that waits. One of the same kind for the same campaign that still waits serves for both.
+    """Queue a job, or return a queued one of the same kind for the same campaign.
 
-    `order` says what exactly is to be done; its `name` is what `latest_ordered` finds the job by.
+    `order` says what exactly is to be done; `latest_ordered` finds the job by its `name`.
     """
     if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
         return waiting
@@ -51,7 +52,7 @@ def enqueue_job(
 
 
 def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s: float) -> JobRow | None:
-    """The job that has waited longest, now this worker's until the lease ends; None when nothing waits."""
+    """Claim the oldest queued job for this worker until the lease ends; None when there is none."""
     if (row := repository.first_waiting(session, kinds)) is None:
         return None
     _move(row, JobState.RUNNING)
@@ -63,10 +64,10 @@ def claim_job(session: Session, *, worker: str, kinds: Collection[str], lease_s:
 
 
 def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float) -> bool:
-    """Extend the lease. False when the job is no longer this worker's: stop it."""
+    """Extend the lease. False when the job is no longer held by this worker, which must then stop it."""
     if repository.held_by_or_none(session, job_id, worker) is None:
         return False
-    # Not through the row: a heartbeat alone is no change that a browser has to hear of.
+    # Not through the row: a heartbeat alone must not publish a change event.
     session.execute(
         update(JobRow)
         .where(JobRow.id == job_id)
@@ -77,8 +78,10 @@ def heartbeat_job(session: Session, job_id: int, *, worker: str, lease_s: float)
 
 
 def report_progress(session: Session, job_id: int, share: float, doing: str, *, worker: str, lease_s: float) -> bool:
-    """How far it is: a share of 0 … 1 and a few words; the lease is extended too. False when the job is no longer this
-    worker's: stop it."""
+    """Report progress: a share of 0 … 1 and a few words; extends the lease too.
+
+    False when the job is no longer held by this worker, which must then stop it.
+    """
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
@@ -88,8 +91,10 @@ def report_progress(session: Session, job_id: int, share: float, doing: str, *, 
 
 
 def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject | None = None) -> bool:
-    """The job is done; of jobs with an order only the newest result of each is kept. False, and nothing changes, when
-    it was cancelled, deleted or given away meanwhile."""
+    """Finish a job; only the newest result of each order is kept.
+
+    False, without a change, when the job was cancelled, deleted or given to another worker meanwhile.
+    """
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
@@ -102,8 +107,10 @@ def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject
 
 
 def requeue_job(session: Session, job_id: int, *, worker: str) -> bool:
-    """The worker ends, in good order: the job waits again as if it had not been begun. False when it was no longer
-    this worker's."""
+    """Queue the job again as if it had not been started, because the worker shuts down.
+
+    False when the job was no longer held by this worker.
+    """
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
@@ -113,8 +120,10 @@ def requeue_job(session: Session, job_id: int, *, worker: str) -> bool:
 
 
 def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> bool:
-    """What computed it went away: it waits again, or is failed when that has happened too often. False when it was no
-    longer this worker's."""
+    """Queue the job again after its process died, or fail it when that has happened too often.
+
+    False when the job was no longer held by this worker.
+    """
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
@@ -123,7 +132,7 @@ def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> bool:
 
 
 def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str) -> bool:
-    """The job cannot be done; the error is kept for a person. False when it was no longer this worker's."""
+    """Fail the job and store the error for a person. False when the job was no longer held by this worker."""
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
@@ -132,8 +141,10 @@ def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str
 
 
 def cancel_superseded_job(session: Session, job_id: int, error: SupersededError, *, worker: str) -> bool:
-    """What it was to compute is no longer wanted: it is cancelled, and says why. False when it was no longer this
-    worker's."""
+    """Cancel a job whose result is no longer needed, and store the reason.
+
+    False when the job was no longer held by this worker.
+    """
     row = repository.held_by_or_none(session, job_id, worker)
     if row is None:
         return False
@@ -142,22 +153,22 @@ def cancel_superseded_job(session: Session, job_id: int, error: SupersededError,
 
 
 def is_withdrawn(row: JobRow) -> bool:
-    """Whether a newer state cancelled it, and not a person."""
+    """Whether it was cancelled because it was superseded, and not by a person."""
     return row.state == JobState.CANCELLED and row.problem is not None
 
 
 def requeue_running_jobs(session: Session) -> list[int]:
-    """At a worker's start, when no other worker can be there: whatever ran waits again."""
+    """Queue all running jobs again at a worker's start, when no other worker can be running."""
     return [_requeue(row) for row in repository.running(session)]
 
 
 def requeue_expired_jobs(session: Session) -> list[int]:
-    """Jobs whose worker fell silent wait again."""
+    """Queue jobs again whose lease has expired."""
     return [_requeue(row) for row in repository.running(session, lease_before=utc_now())]
 
 
 def latest_job(session: Session, campaign_id: int, kind: str) -> JobRow | None:
-    """The newest job of that kind for a campaign, whatever became of it."""
+    """The newest job of that kind for a campaign, in any state."""
     return repository.latest_of_campaign(session, campaign_id, kind)
 
 
@@ -174,7 +185,7 @@ def latest_result(session: Session, kind: str, name: str) -> JobRow | None:
 def list_jobs(
     session: Session, *, states: Collection[JobState], campaign_id: int | None, limit: int, cursor: str | None
 ) -> Page[Job]:
-    """The newest first."""
+    """Page of jobs, newest first."""
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.page(session, states=states, campaign_id=campaign_id, before_id=before, limit=limit)
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
@@ -186,14 +197,14 @@ def get_job(session: Session, job_id: int) -> Job:
 
 
 def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> JobLog:
-    """What the worker wrote down about it. Raises NotFoundError."""
+    """Log lines of a job. Raises NotFoundError."""
     row = repository.get_one(session, job_id)
     lines, total = lines_of_job(data_dir, job_id, since=row.created_at, limit=limit)
     return JobLog.model_validate({"lines": lines, "total": total}, from_attributes=True)
 
 
 def cancel_job(session: Session, job_id: int) -> Job:
-    """Raises ConflictError when it is over already."""
+    """Cancel a job. Raises ConflictError when it has ended already."""
     row = repository.get_one(session, job_id)
     check_action(ACTIONS, "cancel", row.state, _name(row))
     _move(row, JobState.CANCELLED)
@@ -203,7 +214,7 @@ def cancel_job(session: Session, job_id: int) -> Job:
 
 
 def retry_job(session: Session, job_id: int) -> Job:
-    """Raises ConflictError unless it failed or was cancelled."""
+    """Queue a job again. Raises ConflictError unless it failed or was cancelled."""
     row = repository.get_one(session, job_id)
     check_action(ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
@@ -233,12 +244,12 @@ def job_view(row: JobRow) -> Job:
 
 
 def job_problem(row: JobRow) -> Trouble | None:
-    """Why a job failed, or was withdrawn."""
+    """Why a job failed or was superseded."""
     return None if row.problem is None else Trouble.model_validate(row.problem)
 
 
 def _remaining_s(row: JobRow) -> float | None:
-    """By the pace so far; None before it can be told."""
+    """Remaining time at the pace so far, s; None before it can be estimated."""
     if row.state != JobState.RUNNING or row.started_at is None or not row.done_share:
         return None
     elapsed_s = (utc_now() - row.started_at).total_seconds()
@@ -248,7 +259,7 @@ def _remaining_s(row: JobRow) -> float | None:
 
 
 def _ordered(row: JobRow) -> str:
-    """The name in its order, empty without one."""
+    """Name in the job's order; empty without an order."""
     return str((row.order or {}).get("name", ""))
 
 

@@ -1,4 +1,4 @@
-"""The life of a job."""
+"""States of a job."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -6,13 +6,13 @@ from typing import Final
 
 
 class JobState(StrEnum):
-    """Numeric work. It is pure, so a job whose worker died simply waits again.
+    """States of numeric work. It is pure, so a job whose worker died is queued again.
 
     queued ──→ running ──→ done
       ↑  │        ├──────→ failed ───→ queued (retried)
       │  │        ├──────→ cancelled ─→ queued (retried)
       │  └─→ cancelled
-      └───────────┘ the worker went away
+      └───────────┘ the worker died or shut down
     """
 
     QUEUED = "queued"
@@ -34,4 +34,4 @@ ACTIONS: Final[Mapping[str, frozenset[JobState]]] = {
     "cancel": frozenset({JobState.QUEUED, JobState.RUNNING}),
     "retry": frozenset({JobState.FAILED, JobState.CANCELLED}),
 }
-"""What a person may do with a job, and in which states."""
+"""Actions that a person may take on a job, and in which states."""

@@ -1,4 +1,4 @@
-"""The runner of jobs: it claims those of its kind and carries them out, whatever they are."""
+"""Job runner: claims jobs of one kind and carries them out."""
 
 from collections.abc import Callable
 from concurrent.futures import CancelledError
@@ -20,7 +20,7 @@ _log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class ClaimedJob:
-    """A claimed job, apart from its row."""
+    """Data of a claimed job, detached from its row."""
 
     id: int
     campaign_id: int | None
@@ -28,18 +28,18 @@ class ClaimedJob:
 
 
 def recover(database: Database) -> None:
-    """After a worker's start: whatever ran waits again. Raises StorageError."""
+    """Queue all running jobs again after a worker's start. Raises StorageError."""
     with database.write() as session:
         for job_id in jobs.requeue_running_jobs(session):
             _log.warning("job waits again: its worker ended", job_id=job_id)
 
 
 class JobRunner:
-    """Claims jobs of one kind, at most `room` at a time. `claim` and `heartbeat` belong to one thread, `carry_out` to
+    """Claims jobs of one kind, at most `room` at a time. `claim` and `heartbeat` are for one thread, `carry_out` for
     any.
 
-    `perform(job)` does the work and stores what came of it. It may raise GainlineError, which is kept with the job for
-    a person, SupersededError when nobody wants it any more, and CancelledError when the worker ends.
+    `perform(job)` does the work and stores the result. It may raise GainlineError, which is stored with the job for a
+    person, SupersededError when the result is no longer needed, and CancelledError when the worker ends.
     """
 
     def __init__(
@@ -65,12 +65,11 @@ class JobRunner:
 
     @property
     def running_count(self) -> int:
-        """How many jobs are claimed and not finished."""
+        """Number of jobs that are claimed and not finished."""
         return len(self._at_work)
 
     def claim(self) -> ClaimedJob | None:
-        """The job that has waited longest, now this worker's; None when none waits or the runner is full. Raises
-        StorageError."""
+        """Claim the oldest queued job; None when there is none or the runner is full. Raises StorageError."""
         if self.running_count >= self._room:
             return None
         with self._database.write() as session:
@@ -82,8 +81,10 @@ class JobRunner:
         return job
 
     def heartbeat(self) -> None:
-        """When it is time, extend the leases of the jobs at work; those given up (their result found no room on the
-        disk) wait again once their lease is over. Raises StorageError."""
+        """Extend the leases of the running jobs when due, and queue jobs again whose lease has expired.
+
+        The latter are jobs that were given up because their result could not be stored. Raises StorageError.
+        """
         if self._clock.now_s() < self._beat_due_s:
             return
         self._beat_due_s = self._clock.now_s() + self._lease_s / HEARTBEATS_PER_LEASE
@@ -93,7 +94,7 @@ class JobRunner:
             jobs.requeue_expired_jobs(session)
 
     def carry_out(self, job: ClaimedJob) -> None:
-        """The whole job, from the stored order to the stored result. Raises nothing."""
+        """Carry out a job, from the stored order to the stored result. Raises nothing."""
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
             began_s = self._clock.now_s()
             ordered = ", ".join(f"{name}: {value}" for name, value in job.order.items())
@@ -109,7 +110,7 @@ class JobRunner:
                 self._withdraw(job, error)
             except GainlineError as error:
                 self._fail(job, error)
-            except Exception as error:  # noqa: BLE001 - the edge of the thread
+            except Exception as error:  # noqa: BLE001 - outermost frame of the thread
                 _log.exception("job failed by a mistake of the program")
                 self._fail(job, internal_error(f"{type(error).__name__}: {error}"))
             finally:
@@ -132,7 +133,7 @@ class JobRunner:
 
 
 def internal_error(what: str) -> GainlineError:
-    """The error that a person sees when the program itself is to blame."""
+    """Error shown to a person after an internal error."""
     return GainlineError(
         f"The program made a mistake ({what}).",
         hint="Try again; if it happens again, report it with the job's log.",
