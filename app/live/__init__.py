@@ -1,2 +1,2 @@
-"""The live link between the worker, which flies, and the web process, which shows and aborts: it never waits for
+"""Live link between the worker, which flies, and the web process, which shows and aborts. It never waits for
 storage."""

@@ -1,4 +1,5 @@
-"""Where the worker listens: a socket file in the data folder, or in a short private one when that path is too long."""
+"""Address of the worker's socket: a file in the data folder, or in a short private folder when that path is too
+long."""
 
 import hashlib
 import os
@@ -14,7 +15,7 @@ LONGEST_PATH_BYTES: Final = 100
 
 
 def live_address(data_dir: Path) -> Path:
-    """The socket's path for this data folder; the same in every process that is given the same folder."""
+    """The socket's path for this data folder; the same in every process that uses the folder."""
     path = data_dir.resolve() / "worker.sock"
     if len(os.fsencode(path)) <= LONGEST_PATH_BYTES:
         return path
@@ -23,7 +24,8 @@ def live_address(data_dir: Path) -> Path:
 
 
 def _private_folder() -> Path:
-    """A folder of this user's own under the system's temporary folder. Raises InputError when somebody else owns it."""
+    """A folder of this user under the system's temporary folder. Raises InputError when it is not private to this
+    user."""
     folder = Path(tempfile.gettempdir()) / f"gainline-{os.getuid()}"
     if len(os.fsencode(folder)) > LONGEST_PATH_BYTES - len("/0123456789abcdef.sock"):
         folder = Path("/tmp") / folder.name  # noqa: S108 - made private and checked below

@@ -1,5 +1,5 @@
-"""The web process's end of the live link: it stays connected as long as there is a worker, and carries to it what
-cannot wait for the database."""
+"""The web process's end of the live link: stays connected while there is a worker, and sends it what cannot wait for
+the database."""
 
 import asyncio
 import itertools
@@ -34,7 +34,7 @@ FIRST_PAUSE_S: Final = 0.05
 LONGEST_PAUSE_S: Final = 0.5
 ANSWER_TIMEOUT_S: Final = 2.0
 ORDER_TIMEOUT_S: Final = 1.5
-"""What comes later is not carried out: that leaves the worker the time to say so."""
+"""A later request is not carried out; less than ANSWER_TIMEOUT_S, so that the worker has time to answer that."""
 PING_EVERY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
@@ -42,14 +42,14 @@ A = TypeVar("A", AbortAnswer, VehicleOrderAnswer, Pong)
 
 
 class LinkDownError(GainlineError):
-    """The worker cannot be reached, so nothing said to it would arrive."""
+    """The worker cannot be reached, so a message would not arrive."""
 
 
 class LiveClient:
-    """Keeps one connection to the worker at `path`, trying again for ever. One event loop only.
+    """Keeps one connection to the worker at `path` and reconnects indefinitely. For one event loop only.
 
-    `on_message` gets whatever the worker says; `on_link` is told when the connection comes and goes, and when the
-    worker ceases to answer and does again.
+    `on_message` receives the worker's messages. `on_link` is called when the connection is established or lost, and
+    when the worker stops or resumes answering.
     """
 
     def __init__(
@@ -69,11 +69,11 @@ class LiveClient:
 
     @property
     def answers(self) -> bool:
-        """Whether there is a worker that answered when it was last asked whether it is there."""
+        """Whether there is a worker that answered the last ping."""
         return self.connected and self._answers
 
     async def watch(self) -> None:
-        """Ask the worker again and again whether it is there, until cancelled."""
+        """Ping the worker periodically until cancelled."""
         while True:
             await asyncio.sleep(PING_EVERY_S)
             if self.connected:
@@ -104,12 +104,13 @@ class LiveClient:
             await self._listen(reader, writer)
 
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
-        """Tell the worker to end a flight and wait for its answer. Raises LinkDownError when it cannot be told."""
+        """Request that the worker aborts a flight, and wait for its answer. Raises LinkDownError when it cannot be
+        reached."""
         question = Abort(request=next(self._numbers), trial_id=trial_id, reason=reason, by_s=_deadline_s())
         return await self._ask(question, AbortAnswer)
 
     async def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
-        """Have the worker tell a vehicle to land or to stop its motors. Raises LinkDownError as `abort` does."""
+        """Request that the worker lands a vehicle or stops its motors. Raises LinkDownError as `abort` does."""
         question = VehicleOrder(
             request=next(self._numbers), vehicle_id=vehicle_id, order=order, reason=reason, by_s=_deadline_s()
         )

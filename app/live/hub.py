@@ -1,4 +1,4 @@
-"""Fans what happens out to the open event streams of the web process. One event loop only."""
+"""Distribution of events to the open event streams of the web process. For one event loop only."""
 
 import asyncio
 from collections import deque
@@ -11,17 +11,17 @@ from app.live.memory import LiveState
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleLinkState, VehicleStatus, encode
 
 WAITING_CHANGES: Final = 2000
-"""Changes a stream may lag behind before it is ended; its client comes back with the last id and misses none."""
+"""A stream that lags behind by more changes is ended; its client reconnects with the last id and misses none."""
 WAITING_TELEMETRY: Final = 100
-"""Live messages a stream may lag behind before the oldest are dropped: more than 3 s of one flight and its vehicle."""
+"""A stream that lags behind by more live messages loses the oldest; more than 3 s of one flight and its vehicle."""
 
 WRITTEN: Final = 2 * WAITING_TELEMETRY
-"""Live messages whose JSON is kept: every stream sends the same, and to write it again for each delays an abort."""
+"""Live messages whose JSON is cached: every stream sends the same, and encoding it for each would delay an abort."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """One row of the outbox: which thing changed. What it changed to is read over REST."""
+    """One row of the outbox: which thing changed. Clients read its new state over REST."""
 
     id: int
     topic: str
@@ -40,7 +40,7 @@ Live = PublishedMessage | LinkState
 
 
 class Subscription:
-    """What one stream has still to send: changes all and in order, and first; of telemetry the newest."""
+    """Queue of one stream: all changes in order and first, then the newest telemetry."""
 
     def __init__(self) -> None:
         self._changes: deque[Change] = deque()
@@ -58,7 +58,7 @@ class Subscription:
         self._ready.set()
 
     def end(self) -> None:
-        """The stream stops after the item it is sending."""
+        """End the stream after the item that it is sending."""
         self._open = False
         self._ready.set()
 
@@ -74,7 +74,7 @@ class Subscription:
 
 
 class Hub:
-    """Everything that has happened goes to every subscription; nothing waits for a slow one."""
+    """Sends every event to every subscription; never waits for a slow one."""
 
     def __init__(self) -> None:
         self._subscriptions: set[Subscription] = set()
@@ -84,8 +84,11 @@ class Hub:
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:
-        """A subscription to whatever comes from now on, and before it to how the vehicles are and what is in the air
-        since its command; over at once when the hub is closed."""
+        """Subscribe to all events from now on.
+
+        The subscription begins with the vehicles' states and the telemetry of running flights since their command. It
+        ends at once when the hub is closed.
+        """
         subscription = Subscription()
         for known in self._memory.snapshot():
             subscription.push(known)
@@ -102,7 +105,7 @@ class Hub:
         return len(self._subscriptions)
 
     def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
-        """How the vehicles are whose link is in that state."""
+        """Status of the vehicles whose link is in that state."""
         return self._memory.vehicles(state)
 
     def publish(self, item: Change | Live) -> None:
@@ -115,9 +118,9 @@ class Hub:
             subscription.push(item)
 
     def text(self, item: PublishedMessage) -> str:
-        """Its JSON, written once for all streams."""
+        """JSON of a message, encoded once for all streams."""
         known = self._written.get(id(item))
-        if known is None:  # the item is kept with its text, so that its id is nobody else's meanwhile
+        if known is None:  # the item is kept with its text, so that no other object can get its id
             known = self._written[id(item)] = item, encode(item).decode().rstrip()
             if len(self._written) > WRITTEN:
                 del self._written[next(iter(self._written))]

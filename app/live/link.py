@@ -1,4 +1,4 @@
-"""Everything live in the web process, as one thing: the outbox and the worker's telemetry in, event streams out."""
+"""Live part of the web process: reads the outbox and the worker's telemetry, and feeds the event streams."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -23,11 +23,11 @@ from app.live.tail import OutboxTail
 
 T = TypeVar("T")
 BEAT_S: Final = 3.0
-"""How often every stream says something, though nothing happens: whoever hears less knows that the line is dead."""
+"""Interval of a message on every stream, so that a client detects a dead connection by longer silence."""
 
 
 class Live:
-    """The hub of the event streams, and the way to the worker."""
+    """The hub of the event streams, and the connection to the worker."""
 
     def __init__(self, data_dir: Path) -> None:
         self.hub = Hub()
@@ -46,15 +46,16 @@ class Live:
         return "running" if self.client.answers else "not answering"
 
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
-        """Past the database, straight to the worker. Raises LinkDownError when it cannot be told."""
+        """Abort a flight directly at the worker, without the database. Raises LinkDownError when it cannot be
+        reached."""
         return await self.client.abort(trial_id, reason)
 
     async def send_vehicle_command(self, vehicle_id: int, order: VehicleCommandKind, reason: str) -> VehicleOrderAnswer:
-        """Land or motors off, the same way. Raises LinkDownError when the worker cannot be told."""
+        """Send land or motors off directly to the worker. Raises LinkDownError when it cannot be reached."""
         return await self.client.order(vehicle_id, order, reason)
 
     async def beat(self) -> None:
-        """Say whether the worker is there, again and again, until cancelled."""
+        """Publish periodically whether the worker is there, until cancelled."""
         while True:
             await asyncio.sleep(BEAT_S)
             self.hub.publish(LinkState(worker=self.client.answers))
@@ -70,7 +71,7 @@ class Live:
 
 @asynccontextmanager
 async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
-    """Runs between the start and the end of the web process."""
+    """Run the live link from the start to the end of the web process."""
     live = Live(data_dir)
     tail = OutboxTail(database, _on_loop(asyncio.get_running_loop(), live.hub.publish))
     await asyncio.to_thread(tail.start)
@@ -88,7 +89,7 @@ async def live_link(data_dir: Path, database: Database) -> AsyncIterator[Live]:
 
 
 def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[T], None]) -> Callable[[T], None]:
-    """The same call, made from any thread; what comes after the loop has ended is for nobody."""
+    """Wrap a call so that it may be made from any thread; calls after the loop has ended are dropped."""
 
     def later(item: T) -> None:
         with suppress(RuntimeError):

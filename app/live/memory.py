@@ -1,5 +1,7 @@
-"""What streams that join late are told first: what has been measured so far of each flight in the air, and how the
-vehicles are. One event loop only."""
+"""Present state for streams that join late: telemetry so far of each running flight, and the vehicles' status.
+
+For one event loop only.
+"""
 
 import time
 from collections.abc import Callable
@@ -11,8 +13,10 @@ _OVER = frozenset({"landed", "ended"})
 
 
 class LiveState:
-    """Grows with the telemetry of a flight and forgets it when the flight is over; of a vehicle's status it keeps the
-    newest. `clock_s` tells how old each is when it is told again: of a worker that hangs nothing newer comes."""
+    """Accumulates the telemetry of each flight until it is over, and keeps each vehicle's newest status.
+
+    `clock_s` gives the age of a message when it is sent again: from a worker that hangs, no newer one comes.
+    """
 
     def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._clock_s = clock_s
@@ -30,13 +34,13 @@ class LiveState:
                 self._flights[message.trial_id] = self._grown(message), self._clock_s()
 
     def forget_all(self) -> None:
-        """The worker is gone, and with it whatever flew or was connected."""
+        """Forget everything, after the loss of the worker."""
         self._flights.clear()
         self._vehicles.clear()
 
     def snapshot(self) -> list[PublishedMessage]:
-        """One message for each vehicle, and one for each flight with everything measured since its command, each with
-        its age."""
+        """One message for each vehicle, and one for each flight with its telemetry since the command, each with its
+        age."""
         now_s = self._clock_s()
         vehicles = (replace(status, age_s=now_s - heard_s) for status, heard_s in self._vehicles.values())
         flights = (
@@ -50,7 +54,7 @@ class LiveState:
         return [status for status, _ in self._vehicles.values() if status.state == state]
 
     def _grown(self, message: Telemetry) -> Telemetry:
-        """The message with everything measured before it."""
+        """The message with all earlier samples of the flight."""
         if message.trial_id not in self._flights:
             return replace(message, samples=list(message.samples))
         before, _ = self._flights[message.trial_id]

@@ -1,4 +1,4 @@
-"""What the worker and the web process say to each other: one JSON object a line, told apart by `type`."""
+"""Messages between the worker and the web process: one JSON object per line, distinguished by `type`."""
 
 from dataclasses import dataclass, field
 from functools import cache
@@ -20,10 +20,12 @@ VehicleCommandKind = Literal["land", "motors off"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Telemetry:
-    """What was measured since the last message of this flight: rows of `columns`, the first of which is the seconds
-    since the command and the second the scored channel. `error_so_far` is the error up to `time_s`, in the experiment's
-    unit; None until the first scored sample. `age_s` is how long ago the worker said it: of what a stream that joins
-    late is told once more."""
+    """Samples since the last message of this flight.
+
+    Rows of `columns`: the first is the time since the command, s, the second the scored channel. `error_so_far` is the
+    error up to `time_s`, in the experiment's unit; None until the first scored sample. `age_s` is the message's age, s,
+    when it is sent again to a stream that joins late.
+    """
 
     campaign_id: int
     trial_id: int
@@ -37,8 +39,8 @@ class Telemetry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightPhase:
-    """A flight has moved on. It may run ahead of the database, which stays the record; `note` says what a person ought
-    to know meanwhile."""
+    """New phase of a flight. It may be ahead of the database, which remains the record; `note` is information for a
+    person."""
 
     campaign_id: int
     trial_id: int
@@ -49,10 +51,13 @@ class FlightPhase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleStatus(Condition):
-    """How a vehicle with a link of its own is; `at` is UTC in ISO 8601. While nothing of it is heard the state is
-    `gone`, and `not answering` while the process that has its link tells nothing; the rest is as last heard then, and
-    `trouble` says what the latter means. `concern` says why it may only be observed; empty when it may fly. `age_s` as
-    in `Telemetry`; the other ages are as they were when it was said."""
+    """Status of a connected vehicle; `at` is UTC in ISO 8601.
+
+    The state is `gone` while nothing is received from the vehicle, and `not answering` while the process that has its
+    link sends nothing; the other fields are then as last received, and in the latter case `trouble` explains it.
+    `concern` says why the vehicle may only be observed; empty when it may fly. `age_s` as in `Telemetry`; the other
+    ages are as of when the status was sent.
+    """
 
     vehicle_id: int
     state: VehicleLinkState
@@ -64,7 +69,7 @@ class VehicleStatus(Condition):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerHello:
-    """First line of the worker to every client: who it is and what it flies."""
+    """First line from the worker to every client: its identity and the trials that it is flying."""
 
     pid: int
     version: str
@@ -74,8 +79,11 @@ class WorkerHello:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abort:
-    """End this trial's flight now: safe gains, land. `request` comes back in the answer. After `by_s` of the computer's
-    monotonic clock it is not carried out any more, and whoever asked is told that it could not be."""
+    """Request to the worker: end this trial's flight now, with the safe gains restored. The answer carries the same
+    `request`.
+
+    Not carried out after `by_s` of this computer's monotonic clock, s; the answer then says so.
+    """
 
     request: int
     trial_id: int
@@ -86,7 +94,7 @@ class Abort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AbortAnswer:
-    """`accepted` is False when the worker is not flying that trial."""
+    """Answer to Abort; `accepted` is False when the worker is not flying that trial."""
 
     request: int
     trial_id: int
@@ -96,8 +104,8 @@ class AbortAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleOrder:
-    """Have this vehicle land, or stop its motors at any height, now and whatever it does. `request` and `by_s` as in
-    `Abort`."""
+    """Request to the worker: land this vehicle, or stop its motors at any height, now and whatever it is doing.
+    `request` and `by_s` as in `Abort`."""
 
     request: int
     vehicle_id: int
@@ -109,8 +117,10 @@ class VehicleOrder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleOrderAnswer:
-    """`accepted` once the process that has the vehicle's link has passed the order on; `problem` says why it was not,
-    and then it is not carried out later."""
+    """Answer to VehicleOrder; `accepted` once the process that has the vehicle's link has forwarded the command.
+
+    `problem` says why it was not forwarded; it is then not carried out later.
+    """
 
     request: int
     vehicle_id: int
@@ -121,7 +131,7 @@ class VehicleOrderAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ping:
-    """Asked of the worker again and again: one that hangs does not answer."""
+    """Request that the worker answers with Pong; a worker that hangs does not."""
 
     request: int
     type: Literal["ping"] = "ping"
@@ -134,7 +144,7 @@ class Pong:
 
 
 PublishedMessage = Telemetry | FlightPhase | VehicleStatus
-"""What streams show, as it comes."""
+"""Messages that the event streams pass on unchanged."""
 Answer = AbortAnswer | VehicleOrderAnswer | Pong
 FromWorker = PublishedMessage | WorkerHello | Answer
 ToWorker = Abort | VehicleOrder | Ping
@@ -143,19 +153,20 @@ Message = FromWorker | ToWorker
 
 @cache
 def _adapter() -> "TypeAdapter[Message]":
-    """Made when something is first written or read: the processes that fly make messages and neither."""
+    """The adapter, created at its first use, because the processes that fly create messages but neither encode nor
+    decode them."""
     from pydantic import Field, TypeAdapter  # noqa: PLC0415
 
     return TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
 def encode(message: Message) -> bytes:
-    """One line, its end included."""
+    """Encode a message as one line, including its end."""
     return _adapter().dump_json(message) + b"\n"
 
 
 def decode(line: bytes) -> Message:
-    """Raises InputError when the line is none of the messages above."""
+    """Decode a line. Raises InputError when it is none of the messages above."""
     from pydantic import ValidationError  # noqa: PLC0415
 
     try:

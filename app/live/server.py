@@ -1,8 +1,7 @@
-"""The worker's end of the live link: it listens, publishes, and takes aborts and orders, on a thread of its
-own.
+"""The worker's end of the live link: listens, publishes, and receives aborts and commands, in its own thread.
 
-Neither direction waits for storage or for a flight: an abort is handed on from the socket's thread at once, and a
-client too slow to read loses telemetry instead of holding up the flight.
+Neither direction waits for storage or for a flight: an abort is forwarded from the socket's thread at once, and a
+client that reads too slowly loses telemetry instead of delaying the flight.
 """
 
 import asyncio
@@ -38,11 +37,11 @@ from app.live.messages import (
 )
 
 SLOW_CLIENT_BYTES: Final = 256 * 1024
-"""Unread bytes beyond which a client gets neither telemetry nor a vehicle's status until it has caught up."""
+"""A client with more unread bytes gets neither telemetry nor vehicle status until it has caught up."""
 STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
-"""Unread bytes beyond which a client is dropped; it reconnects and reads the database."""
+"""A client with more unread bytes is disconnected; it reconnects and reads the database."""
 CONFIRMATION_S: Final = 0.25
-"""How long after the time of an order the word is waited for that it went out just in time."""
+"""How long after a command's deadline to wait for the answer that it was forwarded in time."""
 LATE: Final = "The order reached the worker too late and is not carried out: use the vehicle's own remote control now."
 UNCONFIRMED: Final = (
     "The process that has the vehicle's link did not answer, and does not carry the order out later: use the vehicle's "
@@ -55,10 +54,10 @@ _log = structlog.get_logger(__name__)
 class LiveServer:
     """Listens at `path` between enter and exit.
 
-    `abort(trial_id, reason)` is called on the socket's thread and says whether that trial flies;
-    `order(vehicle_id, order, reason, by_s)` will say why that vehicle could not be told, or nothing once it was;
-    `hello()` describes the worker to a new client. All must return at once. What comes after its time, because this
-    process stood still, is not carried out.
+    `abort(trial_id, reason)` is called on the socket's thread and returns whether that trial is flying.
+    `order(vehicle_id, order, reason, by_s)` returns a future with why the command did not reach the vehicle, or "" if
+    it did. `hello()` describes the worker to a new client. All must return at once. A request that is handled after its
+    deadline, because this process was suspended, is not carried out.
     """
 
     def __init__(
@@ -94,7 +93,7 @@ class LiveServer:
         self._path.unlink(missing_ok=True)
 
     def publish(self, message: PublishedMessage) -> None:
-        """Send to every client, from any thread, without waiting."""
+        """Send to every client, without blocking. May be called from any thread."""
         self._loop.call_soon_threadsafe(self._send_all, message)
 
     def _run(self) -> None:
@@ -144,7 +143,8 @@ class LiveServer:
         writer.write(encode(answer))
 
     async def _pass_on(self, ordered: VehicleOrder, writer: asyncio.StreamWriter) -> None:
-        """Answer as soon as the vehicle's process has, and soon after its time when that says nothing."""
+        """Forward a command and send the answer: when the vehicle's process answers, or shortly after the deadline if
+        it does not."""
         problem = LATE
         if _is_in_time(ordered.by_s):
             told = asyncio.wrap_future(self._order(ordered.vehicle_id, ordered.order, ordered.reason, ordered.by_s))
@@ -170,9 +170,9 @@ def _is_in_time(by_s: float) -> bool:
 
 
 def _listen(path: Path) -> socket.socket:
-    """A bound socket that only this user may open: nobody can connect before it listens, which is after the chmod.
+    """A bound socket that only this user may open; no client can connect before it listens, which is after the chmod.
 
-    The caller holds the worker's lock, so a file in the way belongs to a dead worker.
+    The caller holds the worker's lock, so an existing file belongs to a dead worker.
     """
     path.unlink(missing_ok=True)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

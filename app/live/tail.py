@@ -1,4 +1,4 @@
-"""Follows the outbox from the web process and hands every change on, in order and once."""
+"""Reads the outbox in the web process and publishes every change, in order and once."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ _log = structlog.get_logger(__name__)
 
 
 def changes_after(database: Database, event_id: int) -> Iterator[Change]:
-    """Every change after that event up to now, read in short transactions."""
+    """All changes after that event up to now, read in short transactions."""
     while True:
         with database.read() as session:
             batch = [
@@ -35,7 +35,7 @@ def changes_after(database: Database, event_id: int) -> Iterator[Change]:
 
 
 class OutboxTail:
-    """A thread that calls `publish(change)` for every event committed from `start` on."""
+    """A thread that calls `publish(change)` for every event committed after `start`."""
 
     def __init__(self, database: Database, publish: Callable[[Change], None]) -> None:
         self._database = database
@@ -44,7 +44,7 @@ class OutboxTail:
         self._thread = threading.Thread(target=self._run, name="outbox tail", daemon=True)
 
     def start(self) -> None:
-        """Takes note of where the outbox ends now, then follows it."""
+        """Note the present end of the outbox, and start the thread."""
         with self._database.read() as session:
             self._last = latest_event_id(session)
         self._thread.start()

@@ -1,4 +1,4 @@
-"""Notices that another connection has written to the database, for the price of one PRAGMA a look."""
+"""Detects commits of other connections to the database, at the cost of one PRAGMA per poll."""
 
 import sqlite3
 import threading
@@ -11,9 +11,9 @@ POLL_INTERVAL_S: Final = 0.02
 
 
 class DatabaseWatch:
-    """Follows SQLite's `PRAGMA data_version`, which changes with every commit of any other connection.
+    """Polls SQLite's `PRAGMA data_version`, which changes with every commit of any other connection.
 
-    Belongs to the thread that enters it. The file must exist.
+    For the thread that enters it. The file must exist.
     """
 
     def __init__(self, database: Path) -> None:
@@ -30,8 +30,8 @@ class DatabaseWatch:
         self._connection.close()
 
     def changed(self) -> bool:
-        """Whether anything was committed since the last look; true at the first, and when it cannot be told: whoever
-        then reads the database meets the trouble itself."""
+        """Whether anything was committed since the last call; True at the first call, and when the PRAGMA fails, so
+        that the caller reads the database and gets the error itself."""
         try:
             (version,) = self._connection.execute("PRAGMA data_version").fetchone()
         except sqlite3.OperationalError:
@@ -40,6 +40,6 @@ class DatabaseWatch:
         return seen != self._seen
 
     def wait(self, stop: threading.Event, timeout_s: float) -> bool:
-        """Sleep until something is committed (true), `stop` is set or the time is over (false)."""
+        """Wait until something is committed (True), or until `stop` is set or the timeout has passed (False)."""
         looks = max(1, round(timeout_s / POLL_INTERVAL_S))
         return any(self.changed() for _ in range(looks) if not stop.wait(POLL_INTERVAL_S))
