@@ -1,4 +1,4 @@
-"""A consistent copy of the database, taken while others read and write."""
+"""A consistent copy of the database, taken while other connections read and write."""
 
 import shutil
 import sqlite3
@@ -13,18 +13,16 @@ from app.errors import StorageError
 
 _SUFFIX: Final = "gainline.sqlite3"
 SPARE_BYTES: Final = 2**28
-"""What a copy must leave free for what is flown meanwhile."""
+"""Disk space that a copy must leave free for flights that take place meanwhile."""
 
 
 def take_backup(database_file: Path, require_intact: Callable[[Path], None]) -> BinaryIO:
-    """The copy as an open file without a name, so that nothing is left behind once it is closed.
+    """Copy the database to an open file without a name, so that nothing is left once it is closed.
 
-    It is looked at before it is given away: SQLite's own check, then `require_intact`, which raises StorageError for
-    what is damaged in what the copy holds.
-
-    It is one moment's state: the write-ahead log lets writers go on meanwhile, and what they commit is not in it. It
-    lies beside the database until then, and needs as much space. Raises StorageError, before anything is written where
-    there is hardly more than that.
+    The copy is verified first: by SQLite's own check, and by `require_intact`, which raises StorageError for damaged
+    content. It holds the state of one moment: the write-ahead log lets writers continue, and what they commit is not in
+    it. While it is made it is stored beside the database and needs as much space. Raises StorageError, before anything
+    is written, when there is too little space.
     """
     _require_room(database_file)
     with (
@@ -33,7 +31,7 @@ def take_backup(database_file: Path, require_intact: Callable[[Path], None]) -> 
     ):
         copied = Path(folder) / _SUFFIX
         with closing(sqlite3.connect(database_file)) as source, closing(sqlite3.connect(copied)) as copy:
-            copy.execute("PRAGMA synchronous = OFF")  # nobody needs half a copy after a power cut
+            copy.execute("PRAGMA synchronous = OFF")  # after a power cut the copy is worthless anyway
             source.backup(copy)
             _require_sound(copy)
         require_intact(copied)
@@ -63,7 +61,7 @@ def _require_room(database_file: Path) -> None:
 
 
 def database_bytes(database_file: Path) -> int:
-    """What a copy takes now: with what lies in the write-ahead log still. Raises StorageError."""
+    """Size of a copy made now, including the content of the write-ahead log. Raises StorageError."""
     with translated(database_file), closing(sqlite3.connect(database_file)) as source:
         (pages,), (page_bytes,) = (source.execute(f"PRAGMA {of}").fetchone() for of in ("page_count", "page_size"))
     return int(pages) * int(page_bytes)

@@ -1,4 +1,4 @@
-"""Requests that may come twice: the first one's answer is kept in the transaction that carried it out."""
+"""Idempotent requests: the first answer is stored in the transaction that carried the request out."""
 
 from collections.abc import Callable
 from datetime import timedelta
@@ -17,10 +17,10 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def carry_out_once(session: Session, key: str, fingerprint: str, answer: type[M], work: Callable[[Session], M]) -> M:
-    """Call `work`, or give the answer it gave before to this key.
+    """Call `work`, or return its stored answer for this key.
 
-    The session must hold the write lock: two requests with one key then come one after the other.
-    Raises KeyReusedError when the key came with another request.
+    The session must hold the write lock, so that two requests with one key run one after another. Raises KeyReusedError
+    when the key came with another request.
     """
     if (known := session.get(IdempotencyRow, key)) is not None:
         if known.fingerprint != fingerprint:

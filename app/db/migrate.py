@@ -1,6 +1,6 @@
-"""Bringing a database to the program's revision, and refusing one that is not there.
+"""Migration of a database to the program's revision, and the refusal of one that is at another revision.
 
-Alembic is imported when there is something to migrate: most starts find the database up to date.
+Alembic is imported only when there is something to migrate: at most starts the database is up to date.
 """
 
 from pathlib import Path
@@ -21,7 +21,7 @@ _COMMAND: Final = "gainline serve"
 
 
 def migrate(database_file: Path) -> None:
-    """Create the database, or bring it up to date; nothing is changed when that fails.
+    """Create the database, or migrate it to the program's revision; nothing is changed when that fails.
 
     Raises SchemaError when it was written by a newer program, StorageError when it cannot be opened or written.
     """
@@ -51,7 +51,7 @@ def migrate(database_file: Path) -> None:
 
 
 def require_current(database_file: Path) -> None:
-    """Raises SchemaError, with the command to run, unless the database is at the program's revision."""
+    """Raise SchemaError, with the command to run, unless the database is at the program's revision."""
     held = revision_of(database_file)
     if held == REVISION:
         return
@@ -64,7 +64,7 @@ def require_current(database_file: Path) -> None:
 
 
 def revision_of(database_file: Path) -> str | None:
-    """The revision that the database is at; None for an empty one. Raises StorageError when it cannot be read."""
+    """The database's revision; None for an empty one. Raises StorageError when it cannot be read."""
     with translated(database_file):
         return read_revision(database_file)
 
@@ -76,7 +76,7 @@ def _known_revisions() -> set[str]:
 
 
 def _config() -> "Config":
-    """The migrations lie inside an installed package, and beside `app` in a checkout."""
+    """Alembic's configuration; the migrations are inside an installed package, and beside `app` in a checkout."""
     from alembic.config import Config
 
     packaged = _APP / "migrations"

@@ -1,4 +1,4 @@
-"""The tables. States are checked by the database too; what moves between them is in each slice's `states.py`."""
+"""The tables. The database checks the states too; the transitions between them are in each slice's `states.py`."""
 
 from collections.abc import Iterable
 from datetime import datetime
@@ -42,7 +42,7 @@ NAMING: Final = {
 
 _JSON: Final = JSON(none_as_null=True)
 _NEVER_REUSE_IDS: Final = {"sqlite_autoincrement": True}
-"""Else SQLite gives a deleted row's id to the next one, and an open page would show somebody else's."""
+"""Otherwise SQLite gives a deleted row's id to the next one, and an open page would show the wrong row."""
 
 
 class Base(DeclarativeBase):
@@ -67,12 +67,12 @@ def _state_check(states: type[StrEnum], *, column: str = "state") -> CheckConstr
 
 
 def _state_type(states: type[StrEnum]) -> Enum:
-    """Stored as its text; the check is a constraint of its own, so that a migration can change it."""
+    """Column type of a state, stored as text; the check is a separate constraint, so that a migration can change it."""
     return Enum(states, native_enum=False, length=20, values_callable=lambda every: [state.value for state in every])
 
 
 class Reported:
-    """A row whose changes are told to the browsers."""
+    """A row whose changes are published to the browsers."""
 
     def reported_as(self) -> tuple[Topic, int, int | None]:
         """Topic, the row's id, and the campaign that it belongs to."""
@@ -82,10 +82,10 @@ class Reported:
 class VehicleRow(Base, Reported):
     """Something that can fly a trial.
 
-    A simulation's row is made when the first campaign wants its kind, and shared; its settings stand in each campaign.
-    A registered vehicle has a row and settings of its own. `held` are the gains it said it has, `concern` why it is
-    quarantined, or was when its link was closed. `operator…`: who is in control, until when, and the digest of the
-    token that shows it. `version` counts the edits that people made.
+    A simulation's row is created by the first campaign that uses its kind, and shared; its settings are in each
+    campaign. A registered vehicle has a row and settings of its own. `held` are the gains that it reported; `concern`
+    is why it is quarantined, or was when its link was closed. `operator…`: the operator in control, until when, and the
+    digest of the lease token. `version` counts people's edits.
     """
 
     __tablename__ = "vehicle"
@@ -122,9 +122,9 @@ _ACT_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_ACT_STATES))
 
 
 class VehicleActRow(Base, Reported):
-    """What a registered vehicle was asked beside its flights, who asked and why, and what it answered.
+    """An act: a request to a registered vehicle beside its flights, who made it and why, and the vehicle's answer.
 
-    Written before anything is sent, but for landing and motors off, which wait for nothing and are written afterwards.
+    Written before anything is sent; except for land and motors off, which are sent at once and recorded afterwards.
     """
 
     __tablename__ = "vehicle_act"
@@ -163,8 +163,11 @@ class VehicleActRow(Base, Reported):
 
 
 class CampaignRow(Base, Reported):
-    """One vehicle, one experiment, one strategy. `version` counts the edits that people made; `safe_gains` are the
-    vehicle's at the first flight, from which on they are part of the frozen definition."""
+    """One vehicle, one experiment, one strategy.
+
+    `version` counts people's edits. `safe_gains` are the vehicle's at the first flight, after which they are part of
+    the frozen definition.
+    """
 
     __tablename__ = "campaign"
     __table_args__ = (
@@ -225,9 +228,12 @@ class TrajectoryRow(Base):
 
 
 class TrialRow(Base, Reported):
-    """One flight of one policy. `predicted_interval` is the proposal's own, copied; `repaired_error` what the flight
-    would score without its `glitches`; `curve` the scored output in a few [time_s, value] pairs, for small plots;
-    `ending` says how the record ends, whatever the trial is classed as, `abort_cause` why it was broken off."""
+    """One flight of one policy.
+
+    `predicted_interval` is copied from the proposal. `repaired_error` is what the flight would score without its
+    `glitches`. `curve` is the scored output in a few [time_s, value] pairs, for small plots. `ending` says how the
+    record ends, whatever the trial's class; `abort_cause` why the flight was aborted.
+    """
 
     __tablename__ = "trial"
     __table_args__ = (
@@ -274,7 +280,7 @@ class TrialRow(Base, Reported):
 
 
 class TrialPhotoRow(Base, Reported):
-    """A picture of a flight, as it was handed in."""
+    """A picture of a flight, as uploaded."""
 
     __tablename__ = "trial_photo"
     __table_args__ = (_NEVER_REUSE_IDS,)
@@ -292,7 +298,7 @@ class TrialPhotoRow(Base, Reported):
 
 
 class ControllerCheckRow(Base, Reported):
-    """A recorded controller held against the replica, with all that its page draws."""
+    """A recorded controller compared with the replica, with all data of its page."""
 
     __tablename__ = "controller_check"
     __table_args__ = (_NEVER_REUSE_IDS,)
@@ -312,13 +318,13 @@ _UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_STATES))
 
 
 class FlightRow(Base, Reported):
-    """One order to a vehicle: what it was asked, written before it is sent, and what it answered.
+    """One request to a vehicle, written before it is sent, and what the vehicle answered.
 
-    One of mode `stage` waits with its gains on the vehicle until `take_off_at` is set by an operator's act, or
-    `stand_down` says why it is not to fly. `safe_gains` are those to be restored after it, `restored` what was read
-    back then; `battery` is the label of the one that was in.
+    A flight of mode `stage` waits with its gains on the vehicle until an operator sets `take_off_at`, or `stand_down`
+    says why it is not to fly. `safe_gains` are those to be restored after it, `restored` those read back then;
+    `battery` is the label of the installed battery.
 
-    A line of the vehicle's ledger: while it is there, neither its trial nor its campaign can be deleted.
+    A line of the vehicle's ledger: while it exists, neither its trial nor its campaign can be deleted.
     """
 
     __tablename__ = "flight"
@@ -365,7 +371,7 @@ class FlightRow(Base, Reported):
 
 
 class ProposalRow(Base, Reported):
-    """What a strategy proposed from one history; stale as soon as the campaign's history has another digest."""
+    """A strategy's proposal from one history; stale as soon as the campaign's history has another digest."""
 
     __tablename__ = "proposal"
     __table_args__ = (_NEVER_REUSE_IDS,)
@@ -392,8 +398,11 @@ class ProposalRow(Base, Reported):
 
 
 class JobRow(Base, Reported):
-    """Numeric work in waiting, running or done: `order` says what exactly, `done_share` (0 … 1) and `doing` how far it
-    is, `result` what came of it, read only when asked for. `lease_until` passes when its worker falls silent."""
+    """Numeric work: queued, running or done.
+
+    `order` says what exactly is to be done, `done_share` (0 … 1) and `doing` the progress. `result` is loaded only on
+    access. `lease_until` passes when the worker stops renewing it.
+    """
 
     __tablename__ = "job"
     __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"), _NEVER_REUSE_IDS)
@@ -419,7 +428,7 @@ class JobRow(Base, Reported):
 
 
 class EventRow(Base):
-    """The outbox: what changed, in the order in which it changed."""
+    """The outbox: what changed, in order."""
 
     __tablename__ = "event"
     __table_args__ = (_NEVER_REUSE_IDS,)
@@ -432,7 +441,7 @@ class EventRow(Base):
 
 
 class IdempotencyRow(Base):
-    """The answer that a request with this key got, so that the same request sent again gets the same answer."""
+    """The answer to the first request with this key, returned when the same request is sent again."""
 
     __tablename__ = "idempotency_key"
 

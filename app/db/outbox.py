@@ -1,6 +1,7 @@
 """Change events, written in the transaction of the change itself, so that none is lost and none is false.
 
-The web process reads them in order and tells the browsers. They say that a thing changed, not what it became.
+The web process reads them in order and publishes them to the browsers. They say that a thing changed, not its new
+state.
 """
 
 from collections.abc import Sequence
@@ -14,12 +15,12 @@ from app.db.models import EventRow, Reported
 from app.db.types import utc_now
 
 KEPT_EVENTS: Final = 10_000
-"""A browser that was away for longer than this many changes loads everything anew."""
+"""A browser that missed more changes than this loads everything again."""
 _PRUNE_EVERY: Final = 500
 
 
 def record_changes(session: Session, _context: UOWTransaction) -> None:
-    """After-flush hook: one event row for each reported row that was added, changed or deleted."""
+    """After-flush hook: write one event row for each reported row that was added, changed or deleted."""
     changed = [row for row in (*session.new, *session.dirty, *session.deleted) if isinstance(row, Reported)]
     if not changed:
         return
@@ -33,22 +34,22 @@ def record_changes(session: Session, _context: UOWTransaction) -> None:
 
 
 def latest_event_id(session: Session) -> int:
-    """The id of the newest event; 0 before the first."""
+    """Id of the newest event; 0 before the first."""
     return session.scalar(select(func.max(EventRow.id))) or 0
 
 
 def latest_event_before(session: Session, at: datetime) -> int:
-    """The id of the newest event before that time; 0 where there is none."""
+    """Id of the newest event before that time; 0 if there is none."""
     newest = select(EventRow.id).where(EventRow.at < at).order_by(EventRow.id.desc()).limit(1)
     return session.scalar(newest) or 0
 
 
 def holds_everything_after(session: Session, event_id: int) -> bool:
-    """Whether every event after this one is still here; false also for an id that was never given out."""
+    """Whether every event after this one is still stored; False also for an id that does not exist yet."""
     oldest, latest = session.execute(select(func.min(EventRow.id), func.max(EventRow.id))).one()
     return bool((oldest or 1) - 1 <= event_id <= (latest or 0))
 
 
 def events_after(session: Session, event_id: int, *, limit: int) -> Sequence[EventRow]:
-    """The next events in their order, at most `limit`."""
+    """The next events in order, at most `limit`."""
     return session.scalars(select(EventRow).where(EventRow.id > event_id).order_by(EventRow.id).limit(limit)).all()

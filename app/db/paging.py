@@ -1,4 +1,5 @@
-"""Cursors: where a page ended, so that the next one begins there whatever was added or changed meanwhile."""
+"""Cursors: the position where a page ended, so that the next page begins there whatever was added or changed
+meanwhile."""
 
 import base64
 import binascii
@@ -9,17 +10,18 @@ from typing import Final
 from app.errors import InputError, Problem
 
 Position = tuple[str | float, int]
-"""The sorting value of a page's last item, and its id, which decides among equals."""
+"""The sort value of a page's last item, and its id, which decides among equal values."""
 _LARGEST_ID: Final = 2**63 - 1
 
 
 def encode_cursor(order: str, position: Position) -> str:
-    """Text for an address; it holds the order too, because it means nothing in another one."""
+    """Encode a position as text for a URL; the sort order is included, because the position is valid only in that
+    order."""
     return base64.urlsafe_b64encode(json.dumps([order, *position]).encode()).decode().rstrip("=")
 
 
 def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Position:
-    """Raises InputError when the text is no cursor of this order with a sorting value of this kind."""
+    """Decode a cursor. Raises InputError unless it is one of this order, with a sort value of this kind."""
     try:
         found = json.loads(base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True))
         said, value, identity = found
@@ -34,7 +36,7 @@ def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Posit
 
 
 def instant(text: str | float) -> datetime:
-    """A sorting value that is a time. Raises InputError when it is none."""
+    """Convert a sort value to a time. Raises InputError when it is not one."""
     try:
         when = datetime.fromisoformat(str(text))
     except ValueError:

@@ -1,4 +1,4 @@
-"""Which revision of the database this program works with. It imports next to nothing: every start asks."""
+"""The database revision that this program works with. Imports very little, because every start needs it."""
 
 import sqlite3
 from contextlib import closing
@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Final
 
 REVISION: Final = "0005"
-"""The newest of the migrations."""
+"""Revision of the newest migration."""
 
 
 def read_revision(database_file: Path) -> str | None:
-    """The revision that the database is at; None for an empty one, or none. Raises sqlite3.Error when it, or the
-    beginning of any of its tables, cannot be read."""
+    """The database's revision; None if it is empty or missing.
+
+    Raises sqlite3.Error when the file, or the beginning of any of its tables, cannot be read.
+    """
     if not database_file.exists():
         return None
     with closing(sqlite3.connect(f"{database_file.resolve().as_uri()}?mode=ro", uri=True)) as connection:
@@ -24,8 +26,7 @@ def read_revision(database_file: Path) -> str | None:
 
 
 def is_current(database_file: Path) -> bool:
-    """Whether the database is there, can be read, and is at this revision. What else there may be is for
-    `app.db.migrate` to tell."""
+    """Whether the database exists, can be read, and is at this revision. `app.db.migrate` handles all other cases."""
     try:
         return read_revision(database_file) == REVISION
     except sqlite3.Error:

@@ -1,7 +1,7 @@
 """Connections and transactions: SQLite with a write-ahead log, one transaction per request or task.
 
-Writers begin with BEGIN IMMEDIATE. A transaction that starts as a reader and then writes can fail in the middle,
-because somebody else wrote in between; one that takes the write lock first waits for its turn at the start instead.
+Writers begin with BEGIN IMMEDIATE. A transaction that starts as a reader and then writes can fail midway because
+another connection wrote in between; one that takes the write lock first waits for it at its start instead.
 """
 
 import sqlite3
@@ -25,9 +25,9 @@ _BEGIN: Final = "gainline_begin"
 
 
 def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
-    """An engine on a SQLite file; nothing is opened before the first statement.
+    """An engine for a SQLite file; nothing is opened before the first statement.
 
-    Without `foreign_keys` a migration can rebuild a table without deleting what refers to it.
+    Without `foreign_keys` a migration can rebuild a table without deleting the rows that refer to it.
     """
     engine = create_engine(
         URL.create("sqlite+pysqlite", database=str(database_file)),
@@ -44,8 +44,11 @@ def open_engine(database_file: Path, *, foreign_keys: bool = True) -> Engine:
 
 
 def _read_json(text: str | bytes) -> object:
-    """As the library reads it, which takes a third of the time of Python's own for the thousands of small curves of a
-    page. Raises sqlite3.DatabaseError for what was JSON when it was written."""
+    """Parse JSON by pydantic's parser, which takes a third of the time of `json` for the thousands of small curves of a
+    page.
+
+    Raises sqlite3.DatabaseError for malformed JSON, because the row held valid JSON when it was written.
+    """
     try:
         return from_json(text)
     except ValueError as error:
@@ -53,10 +56,10 @@ def _read_json(text: str | bytes) -> object:
 
 
 def _on_connect(connection: sqlite3.Connection, _entry: ConnectionPoolEntry) -> None:
-    connection.isolation_level = None  # the "begin" event says how a transaction begins, not the driver
+    connection.isolation_level = None  # the "begin" event begins transactions, not the driver
     for pragma in (
         "journal_mode = WAL",
-        "synchronous = FULL",  # the spool gives a record up once it is committed
+        "synchronous = FULL",  # the spool deletes a record once it is committed
         "foreign_keys = ON",
         f"busy_timeout = {_BUSY_TIMEOUT_MS}",
     ):
@@ -83,13 +86,13 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """A consistent view of the database; whatever was changed in it is dropped."""
+        """A consistent view of the database; changes made in it are discarded."""
         with translated(self.file), self._readers() as session:
             yield session
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """One transaction that holds the write lock: committed when the block ends, undone when it raises."""
+        """One transaction that holds the write lock: committed when the block ends, rolled back when it raises."""
         with translated(self.file), self._writers.begin() as session:
             yield session
 
@@ -99,7 +102,7 @@ class Database:
 
 @contextmanager
 def translated(database_file: Path) -> Iterator[None]:
-    """Tell apart what a person can do something about. Raises StorageError for these, the rest passes."""
+    """Raise StorageError for driver errors that a person can do something about; let the others pass."""
     try:
         yield
     except (DBAPIError, sqlite3.Error) as error:
@@ -109,7 +112,7 @@ def translated(database_file: Path) -> Iterator[None]:
 
 
 def _storage_error(error: DBAPIError | sqlite3.Error, database_file: Path) -> StorageError | None:
-    """The storage trouble behind a driver's error, or None when it is of another kind."""
+    """StorageError for a driver's error, or None when it is of another kind."""
     message = str(error.orig if isinstance(error, DBAPIError) else error).lower()
     for words, (happened, hint) in _TROUBLES.items():
         if words in message:

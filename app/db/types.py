@@ -1,4 +1,4 @@
-"""Column types that SQLite lacks, and the clock that writes them."""
+"""Column types that SQLite lacks, and the present time."""
 
 from datetime import UTC, datetime
 
@@ -11,7 +11,7 @@ def utc_now() -> datetime:
 
 
 class UtcDateTime(TypeDecorator[datetime]):
-    """An instant: aware in Python, stored as UTC. A naive time is refused, because nobody can say when it was."""
+    """An instant: timezone-aware in Python, stored as UTC. A naive time is refused because it is ambiguous."""
 
     impl = DateTime
     cache_ok = True
