@@ -1,1 +1,2 @@
-"""A campaign as one file: out of one installation, and into another with every number as it was."""
+"""Campaign bundles: export of a campaign as one file, and import into another installation with every number
+unchanged."""

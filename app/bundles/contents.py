@@ -1,8 +1,8 @@
-"""What a bundle holds, version 2, and what of it can be believed.
+"""Schema of a bundle, version 2, with the validation of its contents.
 
-A zip of `manifest.json` (who wrote it, and the SHA-256 of every other part), `contents.json` (the campaign, after those
-that it starts from), and one part for each record, photo and telemetry log. A record is stored as in the database
-(`app.trials.codec`), with its own checksum. Version 1 lacks `abort_cause`.
+A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
+campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
+in the database (`app.trials.codec`), with its own checksum. Version 1 lacks `abort_cause`.
 """
 
 from functools import cache
@@ -27,7 +27,7 @@ MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
 MAX_CAMPAIGNS: Final = 20
-"""In one bundle."""
+"""Maximum number of campaigns in one bundle."""
 
 JsonObject = dict[str, Any]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -41,7 +41,8 @@ Options = Annotated[dict[ShortText, OptionValue], Field(max_length=100)]
 
 
 def _fits(kind: Any) -> AfterValidator:
-    """The same object, once it has been seen to be one of this kind: stored numbers must not change their type."""
+    """Validator that returns the same object if it is valid for this type; stored numbers must not change their
+    type."""
 
     @cache
     def adapter() -> TypeAdapter[Any]:
@@ -67,7 +68,7 @@ class _Strict(BaseModel):
 
 
 class Manifest(_Strict):
-    """`parts`: the SHA-256 of every other file in the zip, by its name."""
+    """Manifest of a bundle. `parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
     version: Literal[1, 2]
@@ -97,7 +98,7 @@ class Photo(_Strict):
 
 
 class Trial(_Strict):
-    """As the database has it. `proposal` counts the campaign's proposals from 0."""
+    """A trial as in the database. `proposal` is an index into the campaign's proposals, from 0."""
 
     number: Annotated[int, Field(ge=1, le=2**31)]
     state: TrialState
@@ -152,7 +153,7 @@ class Proposal(_Strict):
 
 
 class Vehicle(_Strict):
-    """What the campaign was flown on, as it was called there."""
+    """The vehicle that the campaign was flown on, as named in the other installation."""
 
     kind: ShortText
     name: Name
@@ -163,7 +164,7 @@ class Vehicle(_Strict):
 
 
 class Campaign(_Strict):
-    """`id` is the one that it had; the new one is its own."""
+    """A campaign. `id` is the one in the other installation; the imported campaign gets a new one."""
 
     id: Annotated[int, Field(ge=1, le=2**63 - 1)]
     name: Name
@@ -192,13 +193,13 @@ class Campaign(_Strict):
         return self
 
     def records(self) -> list[tuple[str, Record]]:
-        """Every record with the field that it stands in."""
+        """Every record with the name of its field."""
         flown = [(f"trials.{i}.record", trial.record) for i, trial in enumerate(self.trials)]
         predicted = [(f"proposals.{i}.predicted", proposal.predicted) for i, proposal in enumerate(self.proposals)]
         return [(field, record) for field, record in (*flown, *predicted) if record is not None]
 
 
 class Contents(_Strict):
-    """The campaign last, after those that it starts from, the first of them first."""
+    """The campaign comes last, after those that it starts from, the first of them first."""
 
     campaigns: Annotated[list[Campaign], Field(min_length=1, max_length=MAX_CAMPAIGNS)]

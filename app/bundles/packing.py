@@ -1,4 +1,4 @@
-"""A campaign on its way out: rows into the parts of a zip."""
+"""Export of a campaign: writes rows as the parts of a zip."""
 
 import hashlib
 import json
@@ -36,11 +36,11 @@ from app.trials.photos import ENDINGS, media_type_of
 from app.trials.telemetry_logs import log_of_trial, telemetry_log
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
-"""The time that every part says it has, so that the same campaign makes the same parts."""
+"""Time stamp of every part, so that the same campaign makes the same parts."""
 
 
 class Packer:
-    """Writes the parts of one bundle, each as soon as it is read, and remembers what the manifest says of them."""
+    """Writes the parts of one bundle, each as soon as it is read, and collects their digests for the manifest."""
 
     def __init__(self, session: Session, data_dir: Path, out: IO[bytes]) -> None:
         self._session = session
@@ -50,9 +50,11 @@ class Packer:
         self._digests: dict[str, str] = {}
 
     def pack(self, campaigns: Sequence[CampaignRow]) -> None:
-        """All of it; the campaign last, after those that it starts from. Raises ConflictError for what a bundle cannot
-        hold, StorageError naming the trial for a record or photo that is damaged, or when the file does not hold what
-        was written to it."""
+        """Write the bundle; the campaign comes last, after those that it starts from.
+
+        Raises ConflictError for what a bundle cannot hold, StorageError that names the trial when a record or photo is
+        damaged, and StorageError when the file does not hold what was written to it.
+        """
         with self._zip:
             try:
                 contents = Contents(campaigns=[self._campaign(row) for row in campaigns])
@@ -66,7 +68,7 @@ class Packer:
         self._verify()
 
     def _verify(self) -> None:
-        """Read every part back as it lies in the file."""
+        """Read every part back from the file."""
         try:
             with zipfile.ZipFile(self._out) as written:
                 spoilt = [name for name, digest in self._digests.items() if _digest(written.read(name)) != digest]
@@ -76,7 +78,7 @@ class Packer:
             raise _not_written(f"{spoilt[0]} is not what was written")
 
     def _write(self, name: str, data: bytes, *, squeeze: bool = False) -> str:
-        """`squeeze`: for what is not compressed already."""
+        """Write a part; `squeeze` compresses what is not compressed already."""
         described = zipfile.ZipInfo(name, _EPOCH)
         described.compress_type = zipfile.ZIP_DEFLATED if squeeze else zipfile.ZIP_STORED
         self._zip.writestr(described, data)
@@ -161,7 +163,7 @@ class Packer:
         return Photo(part=part, media_type=row.media_type, added_at=row.added_at)
 
     def _telemetry(self, row: TrialRow, flight: int | None) -> str | None:
-        """Of the trial's last flight, or the log that came with an earlier bundle."""
+        """Telemetry log of the trial's last flight, or the one imported with an earlier bundle."""
         logs = [log_of_trial(self._data_dir, row.id)]
         if flight is not None:
             logs.insert(0, telemetry_log(self._data_dir, flight))
@@ -170,7 +172,7 @@ class Packer:
 
 
 def _too_much(error: ValidationError) -> ConflictError:
-    """What the database holds and a bundle may not: longer lists, mostly."""
+    """Error for what the database holds and a bundle may not, mostly lists that are too long."""
     first = error.errors(include_url=False, include_input=False)[0]
     where = ".".join(map(str, first["loc"]))
     return ConflictError(
@@ -180,7 +182,7 @@ def _too_much(error: ValidationError) -> ConflictError:
 
 
 def _vehicle(row: VehicleRow) -> Vehicle:
-    """One that stands for another is told of as that one."""
+    """The vehicle's description; for a placeholder, that of the vehicle it stands for."""
     said = Vehicle.model_validate(row)
     if (origin := origin_of(row)) is None:
         return said

@@ -1,6 +1,7 @@
-"""A bundle on its way in: nothing of it is believed before it was looked at.
+"""Reading of a bundle: nothing in it is trusted before it is checked.
 
-Parts are read by name and never written where they say; each is bounded while it is read, whatever it claims to hold.
+Parts are read by name and never written to the paths that they state; each is size-limited while it is read, whatever
+size it claims.
 """
 
 import hashlib
@@ -26,16 +27,17 @@ from app.trials.photos import media_type_of
 
 MAX_PARTS: Final = 20_000
 MAX_DIRECTORY_BYTES: Final = 4 * 2**20
-"""Of the zip's own list of its parts."""
+"""Maximum size of the zip's own directory."""
 MAX_MANIFEST_BYTES: Final = 4 * 2**20
-"""So many parts with their names and digests need less."""
+"""More than MAX_PARTS names with digests need."""
 MAX_JSON_BYTES: Final = 64 * 2**20
 MAX_VALUES: Final = 2_000_000
-"""In one JSON part: each takes some hundred times the room of the two bytes that it may be written with."""
+"""Maximum number of values in one JSON part: in memory each takes some hundred times the two bytes that it may have in
+the file."""
 MAX_PART_BYTES: Final = 256 * 2**20
 MAX_TOTAL_BYTES: Final = 4 * 2**30
 MAX_NUMBERS: Final = 20_000_000
-"""In one record: columns times samples."""
+"""Maximum count of numbers in one record: columns times samples."""
 _IN_MEMORY_BYTES: Final = 64 * 2**20
 _METHODS: Final = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 _ENCRYPTED: Final = 0x1
@@ -45,7 +47,7 @@ M = TypeVar("M", bound=BaseModel)
 
 
 class _Unpacked:
-    """Parts that were looked at, set aside: what stores them within a transaction has but to read them."""
+    """Checked parts in a temporary file, so that the transaction that stores them only has to read them."""
 
     def __init__(self) -> None:
         self._file = tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES, prefix="gainline-bundle-")  # noqa: SIM115  # until `close`
@@ -56,7 +58,7 @@ class _Unpacked:
         self._file.write(data)
 
     def get(self, name: str) -> bytes | None:
-        """None for a part that was not kept."""
+        """The part's data; None if it was not kept."""
         if (place := self._places.get(name)) is None:
             return None
         self._file.seek(place[0])
@@ -67,7 +69,7 @@ class _Unpacked:
 
 
 class _Opening:
-    """A file as `zipfile` reads it: while it is opened, never more at once than the directory may take."""
+    """A file for `zipfile` that limits each read to the size of the directory while the zip is being opened."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -81,10 +83,10 @@ class _Opening:
 
 
 class Bundle:
-    """An opened bundle whose manifest and contents were read; `check` looks at everything else, and unpacks it."""
+    """An opened bundle with its manifest and contents read; `check` checks and unpacks everything else."""
 
     def __init__(self, file: BinaryIO) -> None:
-        """Raises InputError naming what is wrong with it."""
+        """Open a bundle and read its contents. Raises InputError that names what is wrong with it."""
         opening = _Opening(file)
         try:
             self._zip = zipfile.ZipFile(opening)
@@ -97,7 +99,7 @@ class Bundle:
         if odd := sorted(listed ^ set(self._zip.namelist())):
             _refuse(f"{MANIFEST}: parts", f"and the files in the zip are not the same: {odd[0][:80]!r}")
         self.contents = _parsed(CONTENTS, self._listed(CONTENTS, MAX_JSON_BYTES), Contents)
-        self._unpacked = _Unpacked()  # last: a bundle that is refused has nothing to close
+        self._unpacked = _Unpacked()  # last, because a refused bundle must have nothing to close
 
     def __enter__(self) -> Self:
         return self
@@ -109,7 +111,7 @@ class Bundle:
         self._unpacked.close()
 
     def part(self, name: str, limit: int = MAX_PART_BYTES) -> bytes:
-        """A part as it was written. Raises InputError when it is missing, too large, or not the one of the manifest."""
+        """Data of a part. Raises InputError when it is missing, too large, or does not match the manifest."""
         if (kept := self._unpacked.get(name)) is not None:
             return kept
         data = self._listed(name, limit)
@@ -117,7 +119,7 @@ class Bundle:
         return data
 
     def check(self) -> None:
-        """Look at every record and photo: checksums, sizes, kinds. Raises InputError naming the first that is wrong."""
+        """Check every record and photo: checksums, sizes, types. Raises InputError that names the first invalid one."""
         used = {CONTENTS}
         for place, campaign in enumerate(self.contents.campaigns):
             field = f"{CONTENTS}: campaigns.{place}"
@@ -159,7 +161,7 @@ class Bundle:
             _refuse("file", f"would unpack to {total / 2**30:.1f} GiB; {MAX_TOTAL_BYTES / 2**30:g} GiB is the most")
 
     def _read(self, name: str, limit: int) -> bytes:
-        """At most `limit` bytes are ever unpacked, whatever the directory says."""
+        """Read a part; never unpacks more than `limit` + 1 bytes, whatever the directory states."""
         try:
             with self._zip.open(name) as stream:
                 data = stream.read(limit + 1)
@@ -181,7 +183,7 @@ class Bundle:
             plain = zstandard.get_frame_parameters(data).content_size
         except zstandard.ZstdError as error:
             _refuse(f"{field}.part", f"cannot be unpacked: {error}")
-        if plain != _WIDTH * size:  # else the library would take the room that the frame asks for
+        if plain != _WIDTH * size:  # otherwise the library would allocate the size that the frame states
             _refuse(f"{field}.part", f"would unpack to {plain} bytes, not the {_WIDTH * size} of its samples")
         try:
             trajectory = unpack(packed(record, data))
@@ -197,7 +199,7 @@ class Bundle:
 
 
 def packed(record: Record, data: bytes) -> Packed:
-    """As the codec knows it."""
+    """Convert a record to the codec's type."""
     return Packed(
         codec=record.codec,
         columns=record.columns,
@@ -211,7 +213,7 @@ def packed(record: Record, data: bytes) -> Packed:
 
 
 def _output_of(field: str, campaign: Campaign) -> str:
-    """The channel that its flights are scored by. Raises InputError when its gains are not the experiment's."""
+    """Scored channel of the campaign's experiment. Raises InputError when the gains are not the experiment's."""
     experiment = EXPERIMENTS.get(str(campaign.definition.get("experiment")))
     if experiment is None:
         _refuse(f"{field}.definition.experiment", "is none that this version knows")

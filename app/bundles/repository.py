@@ -1,4 +1,4 @@
-"""Queries on what a bundle holds beside the trials."""
+"""Queries on the contents of a bundle besides the trials."""
 
 from collections.abc import Sequence
 
@@ -9,14 +9,14 @@ from app.db.models import FlightRow, ProposalRow, TrialPhotoRow, TrialRow
 
 
 def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
-    """In the order in which they were made."""
+    """Proposals of a campaign, in the order in which they were made."""
     return session.scalars(
         select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id)
     ).all()
 
 
 def photos(session: Session, campaign_id: int) -> Sequence[TrialPhotoRow]:
-    """Of all its trials, in the order in which they were added; without the pictures."""
+    """Photos of all its trials, without the picture data, in the order in which they were added."""
     return session.scalars(
         select(TrialPhotoRow)
         .join(TrialPhotoRow.trial)
@@ -26,6 +26,6 @@ def photos(session: Session, campaign_id: int) -> Sequence[TrialPhotoRow]:
 
 
 def flights(session: Session, campaign_id: int) -> Sequence[tuple[int, int]]:
-    """Trial and flight ids, the oldest first."""
+    """Trial and flight ids, oldest flight first."""
     wanted = select(FlightRow.trial_id, FlightRow.id).where(FlightRow.campaign_id == campaign_id)
     return [(trial_id, flight_id) for trial_id, flight_id in session.execute(wanted.order_by(FlightRow.id))]

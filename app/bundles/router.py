@@ -1,4 +1,4 @@
-"""Bundles over HTTP: a campaign out as one file, and in again."""
+"""Bundles over HTTP: export of a campaign as one file, and import."""
 
 import tempfile
 from pathlib import Path
@@ -22,7 +22,7 @@ router = APIRouter(prefix="/api", tags=["bundles"])
     responses={200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}},
 )
 def get_bundle(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> FileResponse:
-    """The whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log."""
+    """Export the whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log."""
     with tempfile.NamedTemporaryFile(prefix="gainline-bundle-", suffix=".zip", delete=False) as file:
         path = Path(file.name)
         try:
@@ -42,8 +42,8 @@ def get_bundle(database: CurrentDatabase, settings: CurrentSettings, campaign_id
 
 @router.post("/bundles", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)
 def bring_in_bundle(record: Record, settings: CurrentSettings) -> Campaign:
-    """A new campaign from a bundle, every number as it was. What was flown on a registered vehicle becomes history: it
-    can be read, compared and cloned, and nothing flies from it."""
+    """Import a bundle as a new campaign, with every number unchanged. What was flown on a registered vehicle becomes
+    history: it can be read, compared and cloned, but not flown."""
     with Bundle(record.file) as bundle:
         bundle.check()
         return record.once(Campaign, lambda session: store_bundle(session, bundle, settings.data_dir))

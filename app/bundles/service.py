@@ -1,4 +1,4 @@
-"""Campaigns out as one file, and in again: new ids, and every number as it was."""
+"""Export of a campaign as one file, and import with new ids and every number unchanged."""
 
 from pathlib import Path
 from typing import IO
@@ -17,9 +17,10 @@ from app.trials import history
 
 
 def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[bytes]) -> str:
-    """Write the campaign, after those that it starts from; gives the name for the file.
+    """Write the campaign, after those that it starts from; returns the file name.
 
-    Raises NotFoundError, BusyError while it has a flight under way, and ConflictError for more than a bundle holds.
+    Raises NotFoundError, BusyError while one of them has a flight under way, and ConflictError for more than a bundle
+    holds.
     """
     row = campaigns.get_row(session, campaign_id)
     chain = _chain(session, row)
@@ -33,8 +34,10 @@ def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[byt
 
 
 def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
-    """The campaign and those that it starts from, the first of them first: without them its first gains could not be
-    computed again, so none can be left out."""
+    """The campaign and those that it starts from, the first of them first.
+
+    None can be left out, because the campaign's first gains could not be computed again without it.
+    """
     chain = [row]
     while (donor := (chain[0].definition.get("start") or {}).get("donor")) is not None:
         found = campaigns.get_row(session, donor["campaign_id"])
@@ -52,9 +55,11 @@ def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
 
 
 def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> Campaign:
-    """A new campaign from a checked bundle, and those that it starts from. Raises InputError for what this version
-    cannot hold, ConflictError while anything flies: a large bundle holds the write lock for longer than a flight
-    waits."""
+    """Import a checked bundle: a new campaign, and those that it starts from.
+
+    Raises InputError for what this version cannot hold, and ConflictError while any flight is active, because a large
+    bundle holds the write lock for longer than a flight may wait.
+    """
     if (flight := history.any_flight_under_way(session)) is not None:
         raise ConflictError(
             f"Campaign {flight.campaign_id} has a flight asked for, staged or under way, and storing a bundle would "

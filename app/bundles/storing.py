@@ -1,4 +1,4 @@
-"""A bundle that was looked at, into rows: new ids for everything, every number and time as it was."""
+"""Import of a checked bundle: stores it as rows with new ids; every number and time is unchanged."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,15 +31,18 @@ _HINT: Final = "Bring it in with the version of Gainline that wrote it, or updat
 
 @dataclass(slots=True)
 class ImportedCampaigns:
-    """The campaigns that a bundle became, the wanted one last, and the telemetry logs to be kept once they are
-    committed: each by the trial's new id."""
+    """The campaigns imported from a bundle, the requested one last.
+
+    `telemetry`: the bundle parts with telemetry logs, by the trial's new id, to be written once the rows are committed.
+    """
 
     rows: list[CampaignRow] = field(default_factory=list)
     telemetry: dict[int, str] = field(default_factory=dict)
 
 
 def store(session: Session, bundle: Bundle) -> ImportedCampaigns:
-    """Raises InputError for what this version cannot hold. The bundle must have been checked."""
+    """Store the bundle's campaigns. The bundle must have been checked. Raises InputError for what this version cannot
+    hold."""
     arrived, new_ids = ImportedCampaigns(), dict[int, int]()
     for place, campaign in enumerate(bundle.contents.campaigns):
         row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
@@ -55,7 +58,7 @@ def store(session: Session, bundle: Bundle) -> ImportedCampaigns:
 
 
 def keep_telemetry(bundle: Bundle, arrived: ImportedCampaigns, data_dir: Path) -> None:
-    """Write the logs beside those of flights made here."""
+    """Write the telemetry logs beside those of local flights."""
     for trial_id, part in arrived.telemetry.items():
         file = log_of_trial(data_dir, trial_id)
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -86,7 +89,7 @@ def _campaign(session: Session, where: str, said: Campaign, new_ids: Mapping[int
 
 
 def _definition(where: str, said: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
-    """As it was, but for the new id of the campaign that it starts from."""
+    """The definition with the new id of the campaign that it starts from."""
     donor = (said.get("start") or {}).get("donor")
     if donor is not None and donor["campaign_id"] not in new_ids:
         raise _refused(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle")
@@ -98,7 +101,8 @@ def _definition(where: str, said: JsonObject, new_ids: Mapping[int, int]) -> Jso
 
 
 def _vehicle(session: Session, where: str, said: Campaign) -> tuple[VehicleRow, JsonObject]:
-    """A simulation is the same everywhere. Any other vehicle is not here, whatever it is called: it is history."""
+    """The vehicle's row and options: a simulation as it is, a placeholder for a registered vehicle, whatever its
+    name."""
     vehicle = said.vehicle
     if vehicle.registered:
         row = get_or_create_imported_vehicle(
@@ -124,7 +128,7 @@ def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, said: Pro
 def _trials(
     session: Session, bundle: Bundle, campaign: CampaignRow, said: Sequence[Trial], proposals: Sequence[ProposalRow]
 ) -> list[TrialRow]:
-    """Many at a time, for everybody else waits meanwhile; but no more than the memory can hold."""
+    """Store trials in large batches, because other writers wait meanwhile, but limited by memory."""
     made: list[TrialRow] = []
     waiting: list[TrajectoryRow | TrialPhotoRow] = []
     size = 0
@@ -144,7 +148,7 @@ def _trials(
 
 
 def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> None:
-    """Write what waits, and let go of its bytes."""
+    """Flush the waiting rows and release their data."""
     session.flush()
     for one in waiting:
         session.expire(one, ["data"])
@@ -171,14 +175,14 @@ def _record(bundle: Bundle, said: Record | None) -> TrajectoryRow | None:
 
 
 def _propose(session: Session, campaign: CampaignRow, proposals: Sequence[ProposalRow]) -> None:
-    """Where the last proposal does not hold any more under the new ids, it is computed again, to the same gains."""
+    """Request a proposal if the last one is stale under the new ids; the result has the same gains."""
     trials = history.trials_of(session, campaign.id)
     if not proposals or is_stale(session, campaign, proposals[-1], trials):
         request_proposal(session, campaign)
 
 
 def _fields(said: BaseModel, without: set[str]) -> JsonObject:
-    """Field by field as they came: a dump would make other types of stored numbers."""
+    """Fields of a model with their values as they came; a dump would change the types of stored numbers."""
     return {name: getattr(said, name) for name in type(said).model_fields.keys() - without}
 
 
