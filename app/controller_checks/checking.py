@@ -1,5 +1,7 @@
-"""Holding a recorded vertical loop against the replica, for the commands and the page alike: the log of a flight, or a
-trace with a row for every step."""
+"""Comparison of a recorded vertical loop with the replica, for the command line and the web page.
+
+The recording is the log of a flight, or a trace with a row for every step.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,8 +30,11 @@ _MAX_DIGITS: Final = 9
 
 @dataclass(frozen=True, slots=True)
 class LogCheck:
-    """What a log showed: its gains and where they are from, those that its commands follow from, and both parts of the
-    comparison with what there is to draw."""
+    """Result of checking a log.
+
+    Its gains and their source, the gains inferred from its commands, and both parts of the comparison with their
+    overlays.
+    """
 
     gains: Mapping[str, float]
     gains_from: str
@@ -44,13 +49,13 @@ class LogCheck:
 
     @property
     def better_gains(self) -> Mapping[str, float] | None:
-        """Other gains, which more of the commands follow from."""
+        """The inferred gains, if they differ: more of the commands follow from these."""
         return None if self.inferred is None or dict(self.inferred) == dict(self.gains) else self.inferred
 
 
 @dataclass(frozen=True, slots=True)
 class TraceCheck:
-    """A trace, the replica's outputs for it, shape (n, 7), and how far they are apart."""
+    """Result of checking a trace: the trace, the replica's outputs for it, shape (n, 7), and their differences."""
 
     trace: LoopTrace
     computed: NDArray[np.int64]
@@ -64,7 +69,7 @@ class TraceCheck:
 def check_recording(
     stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
 ) -> LogCheck | TraceCheck:
-    """Whichever the content says that it is. Raises InputError naming what cannot be read."""
+    """Check a log or a trace, whichever the content is. Raises InputError that names what cannot be read."""
     stream.seek(0)
     head = stream.read(_HEAD_BYTES)
     if is_paparazzi(head):
@@ -81,7 +86,7 @@ def check_recording(
 
 
 def check_trace(trace: LoopTrace) -> TraceCheck:
-    """Every output of every row."""
+    """Compare every output of every row."""
     computed = replayed(trace)
     return TraceCheck(trace, computed, compared(trace, computed))
 
@@ -89,8 +94,11 @@ def check_trace(trace: LoopTrace) -> TraceCheck:
 def check_log(
     stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
 ) -> LogCheck:
-    """A .data file of Paparazzi; the gains are those given, else the log's own, else those that its commands follow
-    from. Raises InputError when it has no VERT_LOOP, or nothing tells its gains."""
+    """Check a .data file of Paparazzi.
+
+    The gains are those given, else the log's own, else those inferred from its commands. Raises InputError when it has
+    no VERT_LOOP, or its gains cannot be determined.
+    """
     log, logged = read_loop_log(stream, companion)
     inferred = infer_gains(log)
     for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "worked out from the commands")):
@@ -108,7 +116,7 @@ def check_log(
 
 
 def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
-    """Gains from `KP,KI,KD`. Raises InputError naming `field`."""
+    """Parse gains from `KP,KI,KD`. Raises InputError that names `field`."""
     parts = given.split(",")
     if len(parts) != len(GAINS) or not all(_is_whole(part.strip()) for part in parts):
         raise InputError(

@@ -10,7 +10,7 @@ from app.errors import NotFoundError
 
 
 def get_one(session: Session, check_id: int) -> ControllerCheckRow:
-    """With its result. Raises NotFoundError."""
+    """The check with that id, with its result. Raises NotFoundError."""
     row = session.get(ControllerCheckRow, check_id, options=[undefer(ControllerCheckRow.result)])
     if row is None:
         raise NotFoundError("controller check", check_id)
@@ -18,7 +18,7 @@ def get_one(session: Session, check_id: int) -> ControllerCheckRow:
 
 
 def page(session: Session, *, before_id: int | None, limit: int) -> tuple[Sequence[ControllerCheckRow], int]:
-    """The newest checks before that id, one more than `limit`, and the number of all; without their results."""
+    """The newest `limit` + 1 checks before that id, without their results, and the total count."""
     wanted = select(ControllerCheckRow)
     if before_id is not None:
         wanted = wanted.where(ControllerCheckRow.id < before_id)

@@ -1,4 +1,4 @@
-"""What a check comes to, as plain data that is kept with it: words, one line for each signal, and what is drawn."""
+"""Result of a check as plain data for storage: sentences, one line for each signal, and curves."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
@@ -28,7 +28,7 @@ MARKS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """How a signal is called and drawn: `scale` is what one of its counts is in `unit`."""
+    """Title and scale of a signal: `scale` converts its counts to `unit`."""
 
     title: str
     unit: str
@@ -56,13 +56,13 @@ _DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 
 FIGURES: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
     {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
 )
-"""What is drawn: the title, and the signals above one another."""
+"""The figures: title, and the signals one below another."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SignalResult:
-    """One signal: the largest difference between recording and replica in `difference_unit`, what is allowed, and how
-    many samples differ by more, the first of them when."""
+    """Result of one signal: the largest difference between recording and replica in `difference_unit`, the tolerance,
+    the number of samples that differ by more, and the time of the first of these, s."""
 
     name: str
     title: str
@@ -77,7 +77,8 @@ class SignalResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Everything that a page shows of one check. `better_gains` are others that more of the commands follow from."""
+    """Everything that a page shows of one check. `better_gains` are other gains from which more of the commands
+    follow."""
 
     kind: Kind
     passed: bool
@@ -95,7 +96,7 @@ class Result:
 
 
 def examine_content(content: bytes, *, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
-    """What comes of a recording that is in memory, for a process of its own. Raises InputError as `check_recording`."""
+    """Check a recording that is in memory, for a process of its own. Raises InputError as `check_recording` does."""
     beside = None if companion is None else BytesIO(companion)
     return result_of(check_recording(BytesIO(content), name=name, companion=beside, given=given))
 
@@ -237,7 +238,7 @@ def _curves(overlays: Iterable[Overlay]) -> dict[str, Overlaid]:
 
 
 def _curve(name: str, overlay: Overlay) -> Overlaid:
-    """Thinned so that both curves keep their look and their extremes, at the same times."""
+    """Curves of a signal, thinned to common times such that both keep their shape and extremes."""
     shown = _SHOWN[name]
     known = np.flatnonzero(np.isfinite(overlay.replica[name]))
     recorded, replica = (_scaled(values[known], shown) for values in (overlay.recorded[name], overlay.replica[name]))

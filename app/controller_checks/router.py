@@ -15,14 +15,14 @@ PREFIX = "/api/controller-checks"
 
 router = APIRouter(prefix=PREFIX, tags=["controller checks"], dependencies=[Depends(json_only)])
 recordings = APIRouter(prefix=PREFIX, tags=["controller checks"])
-"""Apart from the rest, because what comes in here is no JSON."""
+"""A router of its own, because the request bodies are not JSON."""
 
 
 @router.get("")
 def list_controller_checks(
     session: Reader, limit: Limit = 50, cursor: CursorText = None
 ) -> Page[ControllerCheckSummary]:
-    """Recordings that were held against the replica, the newest first."""
+    """Checks of recordings against the replica, newest first."""
     return service.list_checks(session, limit=limit, cursor=cursor)
 
 
@@ -33,7 +33,7 @@ def check_controller(
         str | None, Query(max_length=40, description="KP,KI,KD that were flown, where the log does not say so")
     ] = None,
 ) -> ControllerCheck:
-    """Hold a recording of the vertical loop against the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
+    """Compare a recording of the vertical loop with the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
     form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept."""
     result = service.check_upload(record.content(), name=record.name, companion=record.read_companion(), gains=gains)
     return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
@@ -41,7 +41,7 @@ def check_controller(
 
 @router.post("/example", status_code=status.HTTP_201_CREATED)
 def check_example_controller(act: IdempotentPost) -> ControllerCheck:
-    """The same with a takeoff that comes with the program, recorded from the autopilot's own code."""
+    """Check the example recording: a takeoff that comes with the program, recorded from the autopilot's own code."""
     result = service.examine_example()
     return act(ControllerCheck, lambda session: service.store_example(session, result))
 
@@ -55,11 +55,11 @@ def get_controller_check(session: Reader, check_id: Id) -> ControllerCheck:
 def get_controller_check_figure(
     session: Reader, check_id: Id, name: Literal["reference", "commands"], theme: Theme = "light"
 ) -> FigureCard:
-    """The signals of the reference model and the integrator, or the commands, recorded and replica overlaid."""
+    """The signals of the reference model and the integrator, or the commands; recording and replica overlaid."""
     return figure_card(service.figure(session, check_id, name, theme))
 
 
 @router.delete("/{check_id}", status_code=status.HTTP_204_NO_CONTENT)
 def delete_controller_check(session: Writer, check_id: Id) -> None:
-    """Remove a check; it can be made again from its recording."""
+    """Delete a check; it can be made again from its recording."""
     service.delete_check(session, check_id)

@@ -1,4 +1,4 @@
-"""What a controller check looks like from outside."""
+"""API schemas of controller checks."""
 
 from datetime import datetime
 from typing import Annotated, Literal
@@ -9,7 +9,8 @@ from app.schemas import Gains
 
 
 class ControllerCheckSummary(BaseModel):
-    """A recording that was held against the replica: `log`, Paparazzi's of a flight, or `trace`, with every step."""
+    """A recording that was compared with the replica: `log`, of a flight with Paparazzi, or `trace`, with every
+    step."""
 
     id: int
     file_name: str
@@ -19,7 +20,7 @@ class ControllerCheckSummary(BaseModel):
 
 
 class CheckedSignal(BaseModel):
-    """One signal of the loop. `exact`: no difference at all; `agrees`: none that is not allowed; `differs`."""
+    """One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`."""
 
     name: str
     title: str
@@ -33,14 +34,14 @@ class CheckedSignal(BaseModel):
 
 
 class CheckFigure(BaseModel):
-    """A drawing of the check that there is."""
+    """An available figure of the check."""
 
     name: Literal["reference", "commands"]
     title: str
 
 
 class ControllerCheck(ControllerCheckSummary):
-    """The result in a sentence, what it rests on, and one line for each signal."""
+    """The result as a sentence, the gains and notes behind it, and one line for each signal."""
 
     sentence: str
     rows: Annotated[int, Field(description="how many samples or steps were compared")]

@@ -1,4 +1,4 @@
-"""What people do with controller checks: have a recording checked, read what came of it, remove it."""
+"""Operations on controller checks: check a recording, read the result, delete it."""
 
 from pathlib import PurePath
 from typing import Final
@@ -27,14 +27,16 @@ _RESULT: Final = TypeAdapter(Result)
 
 
 def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: str | None) -> Result:
-    """Hold a recording that somebody has sent against the replica, in a process with limits; nothing is stored yet.
-    Raises InputError naming what is wrong with it."""
+    """Compare an uploaded recording with the replica, in a process with limits; stores nothing.
+
+    Raises InputError that names what is wrong with it.
+    """
     given = None if gains is None else parse_gains(gains)
     return run_limited(FILE, examine_content, content, name=named(name), companion=companion, given=given)
 
 
 def examine_example() -> Result:
-    """The takeoff that comes with the program, recorded from the autopilot's own code."""
+    """Check the takeoff that comes with the program, recorded from the autopilot's own code."""
     return result_of(check_trace(read_loop_trace(RECORDED_TAKEOFF)))
 
 
@@ -43,7 +45,7 @@ def store_example(session: Session, result: Result) -> schemas.ControllerCheck:
 
 
 def store_check(session: Session, name: str, result: Result) -> schemas.ControllerCheck:
-    """Keep what came of it; the recording itself is not kept."""
+    """Store the result of a check; the recording itself is not kept."""
     row = ControllerCheckRow(file_name=named(name), kind=result.kind, passed=result.passed, result=result.as_json())
     session.add(row)
     session.flush()
@@ -51,7 +53,7 @@ def store_check(session: Session, name: str, result: Result) -> schemas.Controll
 
 
 def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[schemas.ControllerCheckSummary]:
-    """The newest first."""
+    """Page of checks, newest first."""
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.page(session, before_id=before, limit=limit)
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
@@ -60,13 +62,13 @@ def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[sch
 
 
 def get_check(session: Session, check_id: int) -> schemas.ControllerCheck:
-    """Raises NotFoundError."""
+    """The check with that id. Raises NotFoundError."""
     row = repository.get_one(session, check_id)
     return _view(row, _result(row))
 
 
 def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card:
-    """The signals of one group, recorded and replica over each other. Raises NotFoundError."""
+    """Figure of one group of signals, recording and replica overlaid. Raises NotFoundError."""
     result = _result(repository.get_one(session, check_id))
     if name not in FIGURES:
         raise NotFoundError("figure", name, hint=f"There are: {', '.join(FIGURES)}.")
@@ -81,12 +83,12 @@ def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card
 
 
 def delete_check(session: Session, check_id: int) -> None:
-    """Raises NotFoundError."""
+    """Delete a check. Raises NotFoundError."""
     session.delete(repository.get_one(session, check_id))
 
 
 def named(name: str) -> str:
-    """The name of an uploaded file, short, without folders and without what moves a terminal's cursor."""
+    """Name of an uploaded file: shortened, without folders and control characters."""
     return without_control_characters(PurePath(name.replace("\\", "/")).name).strip()[:_NAME_LENGTH] or _UNNAMED
 
 
