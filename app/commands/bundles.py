@@ -1,4 +1,4 @@
-"""`gainline bundle` and `gainline unbundle`: a campaign as one file, out and in again."""
+"""`gainline bundle` and `gainline unbundle`: export and import of a campaign as one file."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from app.settings import Settings
 
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
-    """Write the campaign's file; a server may run beside. Raises InputError when it cannot be written."""
+    """Write the campaign's bundle; a server may run meanwhile. Raises InputError when the file cannot be written."""
     require_current(settings.database_file)
     database = Database(settings.database_file)
     try:
@@ -42,7 +42,7 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
 
 
 def unbundle(file: Path, settings: Settings) -> None:
-    """Bring the campaign in and say what it became. Raises InputError naming what is wrong with the file."""
+    """Import the campaign and print a summary. Raises InputError that names what is wrong with the file."""
     require_current(settings.database_file)
     database = Database(settings.database_file)
     try:

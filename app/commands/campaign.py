@@ -1,4 +1,4 @@
-"""`gainline run`: a whole campaign, headless."""
+"""`gainline run`: a whole campaign without the dashboard."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -39,9 +39,12 @@ def run_campaign(
     data_dir: Path,
     overrule: str = "",
 ) -> None:
-    """Fly the campaign of a preset or file and print its table; of one that an error ends, what was flown until then,
-    and which gains the vehicle holds. In `data_dir` it keeps what a trial changes on a vehicle with a link. Raises
-    InputError for what cannot be flown, StorageError for a folder that cannot be used."""
+    """Fly the campaign of a preset or file and print its table.
+
+    When an error ends the campaign, print the flights until then and the gains on the vehicle. What a trial changes on
+    a vehicle with a link is kept in `data_dir`. Raises InputError for what cannot be flown, StorageError when the
+    folder cannot be used.
+    """
     file = override(
         _read(source),
         vehicle=vehicle,
@@ -107,10 +110,9 @@ def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue])
 
 
 class _Display:
-    """One line of progress for the flight in the air, on standard error; flown ones stay in its text.
+    """Progress line of the running flight, on standard error; finished flights are printed above it.
 
-    `touched`: whether the vehicle was given any gains; `held` are those that it was read to hold then, None while
-    nobody knows.
+    `touched`: whether any gains were written to the vehicle. `held`: the gains last read back, None while unknown.
     """
 
     def __init__(self, definition: Definition, experiment: Experiment) -> None:
@@ -134,7 +136,7 @@ class _Display:
         )
 
     def broken_off(self, error: BaseException) -> HeadlessCampaign:
-        """What was flown until the error."""
+        """The campaign with the flights until the error."""
         said = str(error) or type(error).__name__
         return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"An error ended it: {said}")
 
@@ -201,7 +203,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: H
 
 
 def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
-    """Of a vehicle at the other end of a link; any other is a new one with every flight."""
+    """Print the gains on a vehicle with a link; any other vehicle is a new one for each flight."""
     if not get_kind(file.vehicle.kind).is_real:
         return
     if display.held is not None:

@@ -1,4 +1,4 @@
-"""What the command line shows: tables like the paper's, and errors in plain words."""
+"""Output of the command line: tables like the paper's, and errors."""
 
 import json
 import sys
@@ -18,7 +18,7 @@ WIDTH_OF_A_FILE: Final = 200
 
 
 def console(json_out: Path | None = None) -> Console:
-    """Where tables go: standard output, unless that carries the JSON. Into a file or pipe nothing is cut off."""
+    """Console for tables: standard output, unless that carries the JSON. In a file or pipe nothing is truncated."""
     out = Console(stderr=json_out == TO_STDOUT, highlight=False, soft_wrap=True)
     if not out.is_terminal:
         out.width = max(out.width, WIDTH_OF_A_FILE)
@@ -26,7 +26,7 @@ def console(json_out: Path | None = None) -> Console:
 
 
 def show_error(error: GainlineError) -> None:
-    """What happened, what is to blame, what to do; on standard error."""
+    """Print an error to standard error: what happened, the fields concerned, what to do."""
     err = Console(stderr=True, highlight=False, soft_wrap=True)
     err.print(f"[bold red]Error:[/] {escape(error.message)}")
     for problem in error.problems:
@@ -35,7 +35,7 @@ def show_error(error: GainlineError) -> None:
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title: str) -> Table:
-    """Numbers to the right, the first column named left; cells come formatted."""
+    """Table of formatted cells: the first column aligned left, the others right."""
     drawn = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
     for index, column in enumerate(columns):
         drawn.add_column(column, justify="left" if index == 0 else "right", no_wrap=True)
@@ -45,7 +45,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, title: str) 
 
 
 def write_json(target: Path | None, document: Mapping[str, object]) -> None:
-    """Write to a file, or to standard output for `-`. Raises InputError when the file cannot be written."""
+    """Write JSON to a file, or to standard output for `-`. Raises InputError when the file cannot be written."""
     if target is None:
         return
     text = json.dumps(document, indent=2, allow_nan=False) + "\n"

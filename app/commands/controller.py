@@ -1,4 +1,4 @@
-"""`gainline controller`: what the autopilot's vertical loop did against what the replica does."""
+"""`gainline controller`: comparison of the autopilot's vertical loop with the replica."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -19,7 +19,8 @@ _UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err":
 
 
 def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
-    """Replay every file and print rows and largest difference of each column; whether all are readable and exact."""
+    """Replay every file and print rows and the largest difference of each column; returns whether all are readable and
+    exact."""
     replays: dict[Path, Replay] = {}
     for file in files:
         try:
@@ -54,7 +55,7 @@ def _document(file: Path, replay: Replay) -> dict[str, object]:
 
 
 def check_files(files: Sequence[Path], given: str | None, json_out: Path | None) -> bool:
-    """Hold Paparazzi logs with VERT_LOOP against the replica; whether all are readable and agree."""
+    """Compare Paparazzi logs that have VERT_LOOP with the replica; returns whether all are readable and agree."""
     gains = None if given is None else parse_gains(given, field="--gains")
     out = console(json_out)
     checked: dict[Path, LogCheck] = {}

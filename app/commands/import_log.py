@@ -1,4 +1,4 @@
-"""`gainline import`: the log of a flight made elsewhere, into the trial that waits for it."""
+"""`gainline import`: import of a flight's log into the trial that waits for it."""
 
 import sys
 from contextlib import ExitStack
@@ -28,9 +28,10 @@ def import_log(
     yes: bool,
     json_out: Path | None,
 ) -> None:
-    """Store the flight and print what became of it; asks before taking gains that were not planned.
+    """Import the flight and print the trial's result; asks before it accepts gains that were not planned.
 
-    Raises InputError for a log that cannot be used, UnconfirmedError where nobody can be asked.
+    Raises InputError for a log that cannot be used, UnconfirmedError when the command is not interactive and cannot
+    ask.
     """
     flown = _read(file, takeoff)
     out = console(json_out)
@@ -48,7 +49,7 @@ def import_log(
 
 
 def can_ask() -> bool:
-    """Whether a person sits at the other end."""
+    """Whether standard input is a terminal, so that a person can be asked."""
     return sys.stdin.isatty()
 
 

@@ -19,9 +19,10 @@ Format = Literal["html", "pdf"]
 
 
 def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format | None) -> None:
-    """Write the report; a server may run beside. Without `kind` it is what the file's name ends in, else HTML.
+    """Write the report; a server may run meanwhile. Without `kind` the format follows from the file's extension, else
+    HTML.
 
-    Raises InputError when the file cannot be written, UnavailableError when nothing prints a PDF here.
+    Raises InputError when the file cannot be written, UnavailableError when no program to print a PDF is installed.
     """
     chosen: Format = kind or ("pdf" if out is not None and out.suffix.lower() == ".pdf" else "html")
     require_current(settings.database_file)

@@ -1,4 +1,5 @@
-"""`gainline reproduce`: the paper's experiments, tables and figures, run here and set beside what was published."""
+"""`gainline reproduce`: runs the paper's experiments, tables and figures, and compares the results with the published
+ones."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -19,7 +20,7 @@ ALL: Final = "all"
 
 
 def reproduce(name: str, *, full: bool, trace: Path | None, json_out: Path | None) -> None:
-    """Run one, or all in their order, and print measured, published and their ratio. Raises InputError."""
+    """Run one reproduction, or all in their order, and print measured, published and their ratio. Raises InputError."""
     chosen = tuple(REPRODUCTIONS.values()) if name == ALL else (get_reproduction(name),)
     documents = []
     for each in chosen:
@@ -68,7 +69,7 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def _document(result: Result) -> dict[str, object]:
-    """The result as JSON; each row with its own figures beside the common ones."""
+    """The result as JSON; each row includes its own figures beside the common ones."""
     rows = [{**_plain(row), **row.numbers} for row in result.rows]
     return {**result.as_json(), "rows": rows}
 

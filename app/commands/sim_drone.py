@@ -1,4 +1,4 @@
-"""`gainline sim-drone`: a drone of the program's own simulation that speaks MAVLink like a real autopilot."""
+"""`gainline sim-drone`: a simulated drone that speaks MAVLink like a real autopilot."""
 
 import signal
 from collections.abc import Iterator, Sequence
@@ -34,8 +34,10 @@ def run_sim_drone(
     mocap: str | None,
     any_network: bool,
 ) -> None:
-    """Serve the drone until SIGINT or SIGTERM; the main thread only. Raises InputError for what cannot be had, and
-    LinkError when the link cannot be opened."""
+    """Serve the drone until SIGINT or SIGTERM; for the main thread only.
+
+    Raises InputError for settings that cannot be used, and LinkError when the link cannot be opened.
+    """
     kind = get_autopilot(autopilot)
     address = parse(link or kind.link)
     seen_at = None if mocap is None else parse_source(mocap)
@@ -64,7 +66,7 @@ def run_sim_drone(
 
 
 def _mocap_address(source: SourceAddress | None) -> Address | None:
-    """Where what motion capture says is to be heard, None where that is the drone's own link."""
+    """Address at which the motion capture data is received; None if it goes over the drone's own link."""
     match source:
         case StreamAddress(link):
             return link
@@ -84,7 +86,7 @@ def _require_loopback(option: str, address: Address | None) -> None:
 
 
 def _options(settings: Sequence[str]) -> dict[str, float]:
-    """`NAME=NUMBER`, each an option of the body's vehicle kind."""
+    """Parse `NAME=NUMBER` settings, each an option of the body's vehicle kind."""
     options: dict[str, float] = {}
     for setting in settings:
         name, _, number = setting.partition("=")

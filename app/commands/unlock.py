@@ -21,14 +21,17 @@ class _Address(BaseModel):
 
 
 class _System(BaseModel):
-    """What matters here of GET /api/system."""
+    """The fields of GET /api/system that are used here."""
 
     is_exposed: bool
     addresses: list[_Address]
 
 
 def unlock(settings: Settings, *, script: bool) -> None:
-    """Raises UnavailableError when no server runs on the data folder, StorageError when its secret cannot be read."""
+    """Print a link or a token.
+
+    Raises UnavailableError when no server runs on the data folder, StorageError when its secret cannot be read.
+    """
     address, system = _running(settings)
     keyring = Keyring.open(settings.data_dir)
     if script:
@@ -44,7 +47,7 @@ def unlock(settings: Settings, *, script: bool) -> None:
 
 
 def _running(settings: Settings) -> tuple[str, _System]:
-    """Where the server is, and what it says of itself."""
+    """Address of the running server, and its system information."""
     found = signature(settings.data_dir / "server.lock")
     if found is None or not found.address:
         raise _not_running(settings)
