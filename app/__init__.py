@@ -6,9 +6,9 @@ import os
 __version__ = "0.1.0"
 
 # Before numpy is loaded. Its matrices are small here: with threads they take several times as long, and their last bits
-# depend on how many processors there are.
+# depend on the number of processors.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # noqa: TID251 - no setting of ours
 
-# New objects between two searches for garbage in cycles: modules that are being imported are never garbage, and a large
-# answer is made of several such portions.
+# Fewer garbage collections: modules being imported are never garbage, and a large response allocates several such
+# portions.
 gc.set_threshold(50_000)

@@ -1,4 +1,5 @@
-"""Where the `gainline` command begins. It imports nothing: every process that is spawned later imports it again."""
+"""Entry point of the `gainline` command. It imports nothing at module level, because every spawned process imports it
+again."""
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
-"""Who may do what: the one table that routes and services ask. Pure decisions; `app.api.access` reads the caller from a
-request, `app.keyring` keeps the secret behind the keys.
+"""Permissions: the one table that routes and services consult. Pure decisions; `app.api.access` reads the caller from a
+request, `app.keyring` holds the secret behind the keys.
 
-A caller is on this computer or elsewhere, and holds a key or none. What is forwarded comes from elsewhere: a proxy or a
-tunnel on this computer connects from loopback for whoever stands behind it.
+A caller is on this computer or elsewhere, and holds a key or none. A forwarded request counts as from elsewhere: a
+proxy or tunnel on this computer connects from loopback on behalf of remote clients.
 """
 
 from collections.abc import Mapping
@@ -21,38 +21,40 @@ class RequestOrigin(Enum):
 
 
 class Key(IntEnum):
-    """What a caller has shown, each worth more than those before it."""
+    """The key that a caller has presented; each permits more than those before it."""
 
     NONE = 0
     REMOTE = 1
-    """Of a browser or script on another device."""
+    """Key of a browser or script on another device."""
     SCRIPT = 2
-    """Of a script on this computer."""
+    """Key of a script on this computer."""
     BROWSER = 3
-    """Of a browser on this computer, which a person has unlocked."""
+    """Key of a browser on this computer that a person has unlocked."""
 
 
 class Permission(Enum):
-    """What can be asked, as far as it matters who asks."""
+    """Kinds of operations that depend on the caller."""
 
     CHANGE = auto()
-    """Whatever changes or computes something, an abort and an order to land included."""
+    """Whatever changes or computes something, including an abort and a land command."""
     LINK = auto()
-    """A vehicle with a link: registering and editing it, connecting it, asking it something, flying it."""
+    """Operations on a vehicle with a link: register, edit, connect, request acts, fly."""
     REAL = auto()
-    """The same of a real vehicle."""
+    """The same operations on a real vehicle."""
     TAKE_OFF = auto()
     """The take-off of a real vehicle."""
     STOP = auto()
-    """Stopping a real vehicle's motors, or closing the link to it: also where none may be opened."""
+    """Stopping a real vehicle's motors, or closing its link; also permitted where no link may be opened."""
     REVIEW = auto()
-    """Planning and judging flights of a real vehicle, which moves nothing."""
+    """Planning and reviewing flights of a real vehicle, which moves nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """The least key that an act needs, by place; None: it is never done from there. `exposed`: whether it is done on a
-    server that other devices can reach."""
+    """The lowest key that an operation needs, by the caller's place; None: never permitted from there.
+
+    `exposed`: whether it is permitted on a server that other devices can reach.
+    """
 
     here: Key
     elsewhere: Key | None
@@ -67,12 +69,13 @@ PERMISSION_RULES: Final[Mapping[Permission, Rule]] = {
     Permission.STOP: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
     Permission.REVIEW: Rule(here=Key.SCRIPT, elsewhere=None, exposed=True),
 }
-"""Reading needs no rule: everybody who reaches the server may look."""
+"""Reading needs no rule: every client that reaches the server may read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who asks. `exposed`: the server listens beyond loopback; `because`: how it is known that they are elsewhere."""
+    """The sender of a request. `exposed`: the server listens beyond loopback. `because`: why the caller counts as
+    elsewhere."""
 
     place: RequestOrigin = RequestOrigin.HERE
     key: Key = Key.NONE
@@ -81,7 +84,7 @@ class Caller:
 
 
 COMMAND_LINE: Final = Caller(key=Key.BROWSER)
-"""Whoever runs a command on the data folder itself."""
+"""A command that runs on the data folder itself."""
 
 UNLOCK_HINT: Final = (
     "Open the link that the terminal printed at the start, or run `gainline unlock` on the computer that Gainline runs "
@@ -98,7 +101,8 @@ def is_allowed(act: Permission, caller: Caller) -> bool:
 
 
 def require(act: Permission, caller: Caller, vehicle: str = "") -> None:
-    """Raises NotAllowedError saying what is missing. `vehicle` is the name of the one that it is about."""
+    """Raise NotAllowedError, which says what is missing, unless permitted. `vehicle` is the name of the vehicle
+    concerned."""
     if is_allowed(act, caller):
         return
     rule = PERMISSION_RULES[act]

@@ -1,20 +1,20 @@
-"""A small typed client of the REST API: for scripts, notebooks, and programs that fly with something of their own.
+"""A small typed client of the REST API, for scripts, notebooks, and programs that fly vehicles of their own.
 
     with Client("http://127.0.0.1:8000") as gainline:
         campaign = gainline.create_campaign("My drone", vehicle="import")
         proposal = gainline.ask(campaign.id)
         trial = gainline.tell(campaign.id, proposal, {"time_s": [...], "altitude_m": [...]})
 
-Every act carries an idempotency key and is sent again when the connection breaks, which is harmless. What the server
-refuses is raised with the server's own words:
+Every POST carries an idempotency key and is safely repeated when the connection breaks. A refusal by the server is
+raised with the server's own message:
 
     GainlineError
-    └── RefusedError              status, title, problems; str() of it says what happened and what to do
-        ├── NotAllowedError       403: a token is missing, or it is not done from here
+    └── RefusedError              status, title, problems; str() says what happened and what to do
+        ├── NotAllowedError       403: a token is missing, or not permitted from here
         ├── NotFoundError         404
-        ├── ConflictError         409: not possible now, or somebody else was faster
+        ├── ConflictError         409: not possible now, or another client changed it first
         ├── InvalidError          413, 415, 422: `problems` names the fields
-        └── UnavailableError      503 and no connection at all: try again later
+        └── UnavailableError      503, or no connection: try again later
 """
 
 import csv
@@ -38,7 +38,7 @@ from app.trials.schemas import AbortAnswer, AbortJudgement, Classification, Flig
 from app.trials.states import FlightState, TrialState
 
 Record = Path | bytes | Mapping[str, Iterable[float]]
-"""A flight's record: a log or CSV file, its content, or columns by name, `time_s` and `altitude_m` among them."""
+"""A flight's record: a log or CSV file, its content, or columns by name, including `time_s` and `altitude_m`."""
 
 _ATTEMPTS: Final = 3
 _PAUSE_S: Final = 0.2
@@ -59,7 +59,7 @@ T = TypeVar("T")
 
 
 class RefusedError(GainlineError):
-    """The server has refused; `status` and `title` are those of its answer."""
+    """The server has refused the request; `status` and `title` are those of its response."""
 
     def __init__(
         self, message: str, *, hint: str, problems: tuple[Problem, ...] = (), status: int = 0, title: str = ""
@@ -70,19 +70,19 @@ class RefusedError(GainlineError):
 
 
 class NotAllowedError(RefusedError):
-    """Not from there, or not by who has shown no token for it."""
+    """Not permitted from there, or without a token for it."""
 
 
 class NotFoundError(RefusedError):
-    """There is no such thing."""
+    """There is no such object."""
 
 
 class ConflictError(RefusedError):
-    """Not possible in the present state, or decided on an outdated version."""
+    """Not possible in the present state, or based on an outdated version."""
 
 
 class InvalidError(RefusedError):
-    """Something that was sent cannot be used; `problems` names the fields."""
+    """The request has invalid content; `problems` names the fields."""
 
 
 class UnavailableError(RefusedError):
@@ -101,10 +101,9 @@ _REFUSALS: Final[Mapping[int, type[RefusedError]]] = {
 
 
 class Client:
-    """A connection to one server; give your own `http` client for special needs (proxies, tests).
+    """A connection to one server. Pass an `http` client of your own for special needs (proxies, tests).
 
-    `token` is what `gainline unlock --script` prints: needed for real vehicles, and on another device for all that
-    changes something.
+    `token` is what `gainline unlock --script` prints: needed for real vehicles, and on another device for every change.
     """
 
     def __init__(
@@ -131,7 +130,7 @@ class Client:
         self._http.close()
 
     def campaigns(self, *, search: str = "") -> Iterator[CampaignSummary]:
-        """All campaigns whose names contain `search`, the newest first, page by page as they are needed."""
+        """All campaigns whose names contain `search`, newest first, loaded page by page."""
         return self._pages("/api/campaigns", Page[CampaignSummary], {"search": search})
 
     def campaign(self, campaign_id: int) -> Campaign:
@@ -145,7 +144,7 @@ class Client:
         options: Mapping[str, OptionValue] | None = None,
         definition: Definition | None = None,
     ) -> Campaign:
-        """A campaign with working defaults for whatever is left out."""
+        """Create a campaign, with working defaults for omitted arguments."""
         new = NewCampaign(
             name=name,
             vehicle=VehicleChoice(kind=vehicle, options=dict(options or {})),
@@ -154,14 +153,15 @@ class Client:
         return self._post("/api/campaigns", Campaign, new)
 
     def finish(self, campaign_id: int) -> Campaign:
-        """End a campaign between flights."""
+        """Finish a campaign between flights."""
         return self._post(f"/api/campaigns/{campaign_id}/finish", Campaign)
 
     def ask(self, campaign_id: int, *, timeout_s: float = 60.0) -> Proposal:
         """The next gain set for the flights so far; waits while it is computed.
 
         `recommended` is `stop` once the campaign's own rule has ended it. Raises ConflictError when there can be none
-        (an unclassed flight blocks it), RefusedError when computing it failed, UnavailableError after `timeout_s`.
+        (an unclassified flight blocks it), RefusedError when its computation failed, UnavailableError after
+        `timeout_s`.
         """
 
         def ready() -> Proposal | None:
@@ -179,15 +179,15 @@ class Client:
         )
 
     def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *, note: str = "") -> Trial:
-        """Hand in a flight made elsewhere, with the gains it was flown with; it comes back scored and classed."""
+        """Upload a flight made elsewhere, with the gains it was flown with; returns it scored and classified."""
         trial = self._plan(campaign_id, flown, note=note, fly=None)
         return self.upload(trial.id, record)
 
     def upload(self, trial_id: int, record: Record, *, takeoff: int | None = None, confirm: bool = False) -> Trial:
-        """Hand in the record of a planned trial, or the recovered one of a lost flight.
+        """Upload the record of a planned trial, or the recovered record of a lost flight.
 
-        Of a log with several takeoffs, that of the number `takeoff`; `confirm` takes one that was flown with other
-        gains, which the trial then has. Raises InvalidError listing the takeoffs, ConflictError naming both gain sets.
+        `takeoff` chooses one of a log with several takeoffs. `confirm` accepts a log that was flown with other gains;
+        the trial then has those. Raises InvalidError that lists the takeoffs, ConflictError that names both gain sets.
         """
         query = ({} if takeoff is None else {"takeoff": str(takeoff)}) | ({"confirm": "true"} if confirm else {})
         return self._request(
@@ -202,12 +202,15 @@ class Client:
     def fly(
         self, campaign_id: int, gains: Proposal | Mapping[str, float], *, speed: float | None = None, note: str = ""
     ) -> Trial:
-        """Ask for a flight of a simulated vehicle (`speed` times as fast as life, None: as fast as possible)."""
+        """Request a flight of a simulated vehicle. `speed` is simulated time over wall time; None: as fast as
+        possible."""
         return self._plan(campaign_id, gains, note=note, fly=FlightOrder(speed=speed))
 
     def wait(self, trial_id: int, *, timeout_s: float = 120.0) -> Trial:
-        """The trial once its flight is over. Raises RefusedError when it was not flown, UnavailableError after
-        `timeout_s`."""
+        """Wait until a trial's flight is over, and return the trial.
+
+        Raises RefusedError when it was not flown, UnavailableError after `timeout_s`.
+        """
 
         def landed() -> Trial | None:
             trial = self.trial(trial_id)
@@ -231,27 +234,27 @@ class Client:
         return self._post(f"/api/trials/{trial_id}/abort", AbortAnswer)
 
     def trials(self, campaign_id: int) -> Iterator[Trial]:
-        """All trials in the order of their numbers, page by page as they are needed."""
+        """All trials by number, loaded page by page."""
         return self._pages(f"/api/campaigns/{campaign_id}/trials", Page[Trial], {})
 
     def trial(self, trial_id: int) -> Trial:
         return self._get(f"/api/trials/{trial_id}", Trial)
 
     def classify(self, trial: Trial, said: Classification) -> Trial:
-        """Say what a flight is worth; whatever was computed from it is computed again."""
+        """Classify a flight; whatever was computed from it is recomputed."""
         return self._post(f"/api/trials/{trial.id}/classify", Trial, said)
 
     def judge_abort(self, trial: Trial, cause: Literal["behaved badly", "something else"]) -> Trial:
-        """Say why a flight was broken off; it counts against its gains only if the vehicle behaved badly."""
+        """Record why a flight was aborted; it counts against its gains only if the vehicle behaved badly."""
         said = AbortJudgement(version=trial.version, cause=cause)
         return self._post(f"/api/trials/{trial.id}/judge-abort", Trial, said)
 
     def trajectory(self, trial_id: int, *, points: int = 1000) -> Trajectory:
-        """The record thinned to at most so many points."""
+        """The record, thinned to at most `points` samples."""
         return self._get(f"/api/trials/{trial_id}/trajectory", Trajectory, {"points": str(points)})
 
     def trajectory_csv(self, trial_id: int) -> bytes:
-        """The whole record."""
+        """The full record as CSV."""
         return self._request("GET", f"/api/trials/{trial_id}/trajectory.csv", bytes)
 
     def _plan(

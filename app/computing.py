@@ -1,4 +1,4 @@
-"""What runs in a process of the pool. It imports next to nothing, so that such a process is soon there."""
+"""Main function of the pool's processes. Imports very little, so that such a process starts quickly."""
 
 import os
 import signal
@@ -21,18 +21,19 @@ class TaskResult(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class TaskError:
-    """By the task; the error's note says where."""
+    """An exception that the task raised; its note has the traceback."""
 
     error: Exception
 
 
 def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
-    """In the new process: leave Ctrl-C to the parent, give way, get ready, and perform one task after the other."""
+    """Perform one task after another in the new process. Leaves Ctrl-C to the parent, and runs with the given
+    niceness."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(niceness)
     threading.Thread(target=_shut_down_with_parent, daemon=True).start()
     prepare()
-    with suppress(EOFError, OSError):  # the parent is gone
+    with suppress(EOFError, OSError):  # the parent has closed the pipe or died
         while True:
             pipe.send(_outcome(pipe.recv()))
 
@@ -40,7 +41,7 @@ def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) ->
 def _outcome(task: Callable[[], T]) -> TaskResult[T] | TaskError:
     try:
         return TaskResult(task())
-    except Exception as error:  # noqa: BLE001 - the edge of the process
+    except Exception as error:  # noqa: BLE001 - outermost frame of the process
         error.add_note(format_exc())
         return TaskError(error)
 

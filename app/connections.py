@@ -1,8 +1,9 @@
-"""The connections that the web server has open: how many there may be, how long they may take, and who goes first.
+"""Open connections of the web server: how many are allowed, how long they may take, and which is closed first.
 
-Descriptors are few, and a connection costs whoever opens it nothing. So a new one always gets in: where there is no
-room the one goes that has been waiting longest for its client, be it silent, half sent or an event stream, which comes
-back by itself. What is being answered stays; where nothing else is open, the last places are for what ends a flight.
+Descriptors are limited, while opening a connection costs a client nothing. So a new connection is always accepted: at
+the limit the one that has waited longest for its client is closed, be it idle, partly sent, or an event stream, which
+reconnects by itself. Requests being answered stay; where all others are being answered, the last places are reserved
+for requests that end a flight.
 """
 
 from collections.abc import Callable, Iterable
@@ -13,24 +14,24 @@ from typing import Final
 from app.core.clock import Clock
 
 HEAD_WITHIN_S: Final = 10.0
-"""From the connection, or the end of the last answer, to the end of a request's headers."""
+"""From the connection, or the end of the last response, to the end of a request's headers."""
 BODY_SILENCE_S: Final = 20.0
 BODY_WITHIN_S: Final = 1800.0
 STREAM_AFTER_S: Final = 10.0
-"""An answer that takes longer is an event stream, or is read slowly."""
+"""A response that takes longer is an event stream, or is read slowly."""
 RESERVED_DESCRIPTORS: Final = 256
-"""Descriptors that are left to the database, files and processes."""
+"""Descriptors reserved for the database, files and processes."""
 RESERVED_FOR_ABORTS: Final = 64
-"""Connections beyond the limit that serve nothing but what ends a flight."""
+"""Connections beyond the limit, only for requests that end a flight."""
 RESERVED_FOR_ARRIVING: Final = 32
-"""Connections beyond those that are on their way in, or were dropped and are on their way out."""
+"""Connections beyond those that are being accepted, or were dropped and are being closed."""
 MAX_CONNECTIONS: Final = 1024
 MAX_CONNECTIONS_PER_DEVICE: Final = 64
-"""This computer itself has no limit of its own: the operator is one of its users."""
+"""This computer has no limit of its own, because the operator may be one of its users."""
 
 
 class Phase(IntEnum):
-    """What a connection does; where room is needed, those of the first phase go first."""
+    """Phase of a connection; at the limit, those in the lowest phase are closed first."""
 
     IDLE = 0
     HEAD = 1
@@ -41,9 +42,12 @@ class Phase(IntEnum):
 
 @dataclass(slots=True, eq=False)
 class Connection:
-    """One connection. `client` is the device that it is from, empty for this computer; `drop` closes it at once;
-    `is_held` says whether we have stopped reading from it, so that its silence is ours. `for_stopping`: it came where
-    no room was left, and serves nothing but what ends a flight."""
+    """One connection.
+
+    `client` is the device that it is from, empty for this computer. `drop` closes it at once. `is_held` returns whether
+    the server has stopped reading from it, so that its silence is not the client's. `for_stopping`: it was accepted
+    beyond the limit, and serves only requests that end a flight.
+    """
 
     client: str
     drop: Callable[[], None]
@@ -56,8 +60,10 @@ class Connection:
 
 @dataclass(slots=True)
 class Connections:
-    """All of them. One event loop only. `held` counts descriptors: those of connections that were dropped go a moment
-    later."""
+    """All open connections. For one event loop only.
+
+    `held` counts descriptors; that of a dropped connection is released shortly after.
+    """
 
     most: int
     clock: Clock
@@ -65,11 +71,12 @@ class Connections:
     held: int = 0
 
     def has_room(self, arriving: int) -> bool:
-        """Whether another one can be taken while so many are on their way in; in a moment it can be."""
+        """Whether another connection can be accepted now, while `arriving` ones are being accepted."""
         return self.held + arriving < self.most + RESERVED_FOR_ABORTS + RESERVED_FOR_ARRIVING
 
     def add(self, connection: Connection) -> bool:
-        """Take it in, if need be in another's place. False when it must be closed: everybody is being answered."""
+        """Add a connection, closing another one if necessary. False when it must be closed, because all others are
+        being answered."""
         now_s = self.clock.now_s()
         connection.since_s = connection.heard_s = now_s
         own = [each for each in self.open if each.client == connection.client] if connection.client else []
@@ -90,16 +97,16 @@ class Connections:
         self.open.pop(connection, None)
 
     def enter(self, connection: Connection, phase: Phase) -> None:
-        """It goes on to another phase; entering the same one again is no progress."""
+        """Enter a phase; entering the present phase again is no progress."""
         if connection.phase != phase:
             connection.phase, connection.since_s = phase, self.clock.now_s()
 
     def hear(self, connection: Connection) -> None:
-        """Its client has sent something."""
+        """Note that the client has sent data."""
         connection.heard_s = self.clock.now_s()
 
     def drop_overdue(self) -> None:
-        """Close what takes longer than it may."""
+        """Close connections that take longer than permitted."""
         now_s = self.clock.now_s()
         for connection in [each for each in self.open if _is_overdue(each, now_s)]:
             self.remove(connection)
@@ -111,7 +118,7 @@ class Connections:
 
 
 def room_for_connections(descriptors: int) -> int:
-    """How many connections there may be beside `RESERVED_FOR_ABORTS`, where the process may have so many open files."""
+    """Maximum number of connections besides `RESERVED_FOR_ABORTS`, given the process's limit of open files."""
     return min(
         MAX_CONNECTIONS,
         max(descriptors - RESERVED_DESCRIPTORS, descriptors // 2) - RESERVED_FOR_ABORTS - RESERVED_FOR_ARRIVING,

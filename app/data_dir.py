@@ -1,4 +1,4 @@
-"""The data folder: made where it is missing, refused in words where it cannot be used."""
+"""The data folder: created if missing, with a clear error if it cannot be used."""
 
 import errno
 import os
@@ -14,9 +14,9 @@ OTHERS: Final = 0o077
 
 
 def prepare_data_dir(folder: Path) -> None:
-    """Make the data folder, or one inside it, and see that this user may write there.
+    """Create the data folder, or one inside it, and verify that this user may write there.
 
-    Raises StorageError naming the option when it cannot be used.
+    Raises StorageError that names the option when the folder cannot be used.
     """
     try:
         folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
@@ -31,15 +31,16 @@ def prepare_data_dir(folder: Path) -> None:
 
 
 def trial_parameters_folder(data_dir: Path) -> Path:
-    """Where it is kept what trials have set on vehicles beside their gains, until it is put back."""
+    """Folder for the parameters that trials have changed on vehicles besides their gains, until they are restored."""
     return data_dir / "trial-parameters"
 
 
 def make_private(folder: Path) -> str:
-    """Take the data folder from all other users of this computer: it holds the secret by which a browser commands real
-    vehicles, and the worker's socket. Gives a sentence where that changed something, else nothing.
+    """Remove all other users' access to the data folder, which holds the worker's socket and the secret by which a
+    browser commands real vehicles.
 
-    Raises StorageError when it belongs to somebody else, or stays open to others all the same.
+    Returns a sentence if that changed something, else an empty string. Raises StorageError when the folder stays open
+    to others.
     """
     before = stat.S_IMODE(folder.stat().st_mode)
     if not before & OTHERS:
@@ -58,7 +59,7 @@ def make_private(folder: Path) -> str:
 
 
 def folder_bytes(folder: Path) -> int:
-    """What the files below a folder hold; those that go meanwhile are not counted."""
+    """Total size of the files in a folder, bytes; files deleted meanwhile are not counted."""
     total = 0
     for path, _, names in os.walk(folder):
         for name in names:

@@ -1,22 +1,22 @@
-"""The application's errors, grown from the core's root. What one means over HTTP is said in `app.api.errors` alone.
+"""The application's errors, derived from the core's root. Only `app.api.errors` maps them to HTTP.
 
 GainlineError                 (app.core.errors)
-├── InputError                something that came in is not usable
+├── InputError                unusable input
 │   ├── GainsError            a gain vector that may not be flown
 │   ├── TrajectoryError       a recorded flight that cannot be scored
-│   ├── UnconfirmedError      what is asked needs a person's word first
-│   ├── KeyReusedError        an idempotency key that already stands for another request
-│   ├── TooLargeError         more bytes than the program takes
-│   └── MediaTypeError        a kind of content that is not read here
-├── NotAllowedError           not from there, or not by them: a real vehicle's safety forbids it
-├── NotFoundError             there is no such thing
-├── ConflictError             it is not possible now: the state or the version forbids it
-│   └── BusyError             the vehicle is flying for somebody else
+│   ├── UnconfirmedError      a person has to confirm the request first
+│   ├── KeyReusedError        an idempotency key that was used for another request
+│   ├── TooLargeError         more bytes than the program accepts
+│   └── MediaTypeError        a type of content that is not accepted
+├── NotAllowedError           not permitted from there, or not for this caller
+├── NotFoundError             there is no such object
+├── ConflictError             not possible now: the state or the version forbids it
+│   └── BusyError             the vehicle has a flight or an act under way
 ├── UnavailableError          this installation lacks what is needed, or it is in use; all else works
-├── StorageError              the database cannot take or give what it should; nothing was changed
-├── SchemaError               the database belongs to another version of the program
+├── StorageError              the database cannot read or write; nothing was changed
+│   └── SchemaError           the database belongs to another version of the program
 ├── AlreadyRunningError       another process of the program holds the database
-└── AddressError              the host and port asked for cannot be listened on
+└── AddressError              the server cannot listen on the requested host and port
 """
 
 from app.core.errors import GainlineError, GainsError, InputError, Problem, TrajectoryError
@@ -44,27 +44,27 @@ __all__ = [
 
 
 class UnconfirmedError(InputError):
-    """What came in differs from what was planned, and nobody has said that it shall be taken all the same."""
+    """The input differs from what was planned, and no person has confirmed it."""
 
 
 class KeyReusedError(InputError):
-    """An idempotency key came again with a different request."""
+    """An idempotency key was sent again with a different request."""
 
 
 class TooLargeError(InputError):
-    """More bytes than the program takes in one request."""
+    """More bytes than the program accepts in one request."""
 
 
 class MediaTypeError(InputError):
-    """The content is of a kind that is not read here."""
+    """The content has a type that is not accepted here."""
 
 
 class NotAllowedError(GainlineError):
-    """What was asked is possible, but not from where it was asked, or not by whom."""
+    """The request is possible, but not from where it was sent, or not for its caller."""
 
 
 class NotFoundError(GainlineError):
-    """There is no such thing."""
+    """There is no such object."""
 
     def __init__(self, what: str, identity: object, *, hint: str = "") -> None:
         super().__init__(
@@ -74,19 +74,19 @@ class NotFoundError(GainlineError):
 
 
 class ConflictError(GainlineError):
-    """What was asked is not possible in the present state, or was decided on an outdated version."""
+    """The request is not possible in the present state, or is based on an outdated version."""
 
 
 class BusyError(ConflictError):
-    """The vehicle has a flight already."""
+    """The vehicle has a flight or an act under way."""
 
 
 class UnavailableError(GainlineError):
-    """This installation lacks what is needed for it, or that is in use at present; everything else works."""
+    """This installation lacks what the request needs, or it is in use at present; everything else works."""
 
 
 class StorageError(GainlineError):
-    """The database could not do its work; whatever was under way was undone as a whole."""
+    """The database operation failed; the transaction was rolled back."""
 
 
 class SchemaError(StorageError):
@@ -94,8 +94,8 @@ class SchemaError(StorageError):
 
 
 class AlreadyRunningError(GainlineError):
-    """Another server or worker has this database; there may be one of each."""
+    """Another server or worker uses this database; there may be one of each."""
 
 
 class AddressError(GainlineError):
-    """The host and port asked for cannot be listened on; `problems` names the one to blame."""
+    """The server cannot listen on the requested host and port; `problems` names the one at fault."""

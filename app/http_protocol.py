@@ -1,5 +1,5 @@
-"""HTTP for `app.web_server`: Uvicorn's own protocol, which keeps `app.connections` told of what each connection does,
-and refuses headers without end."""
+"""HTTP protocol of `app.web_server`: Uvicorn's own, which also reports each connection's phase to `app.connections` and
+refuses headers that are too large."""
 
 import asyncio
 import json
@@ -14,7 +14,7 @@ from app.connections import Connection, Connections, Phase
 from app.settings import is_loopback
 
 MAX_HEAD_BYTES: Final = 64 * 1024
-"""Of the request line and the headers together."""
+"""Maximum size of the request line and the headers together."""
 _STOPPING: Final = (b"/abort", b"/land", b"/motors-off")
 _ANSWER: Final = (
     "HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: application/problem+json\r\nContent-Length: {size}\r\n"
@@ -62,7 +62,7 @@ class LimitedProtocol(HttpToolsProtocol):
         self._all.hear(self._own)
         super().data_received(data)
         if was_head and self._own.phase in {Phase.IDLE, Phase.HEAD} and not self._refused:
-            # Part of a head, which the parser tells of line by line.
+            # Part of a head; the parser reports it only line by line.
             self._head_bytes += len(data)
             self._all.enter(self._own, Phase.HEAD)
             self._refuse_long_head()
@@ -123,7 +123,7 @@ class LimitedProtocol(HttpToolsProtocol):
             )
 
     def _refuse(self, status: HTTPStatus, detail: str, hint: str) -> None:
-        """Answer without the application, and close."""
+        """Send an error without the application, and close the connection."""
         self._refused = True
         problem = {"type": "about:blank", "title": status.phrase, "status": status, "detail": detail, "hint": hint}
         body = json.dumps({**problem, "problems": []}).encode()

@@ -1,12 +1,12 @@
-"""The secret by which this server knows its people, and the links that unlock a browser.
+"""The server's secret, the keys derived from it, and the links that unlock a browser.
 
-Everything lies in `access/` of the data folder, which only the user that runs Gainline can read:
+Everything is in `access/` of the data folder, which only the user that runs Gainline can read:
 
-    secret          from which the keys of browsers and scripts are derived; made at the first start
-    links/DIGEST    one file for each link that was not opened yet, named by the SHA-256 of its token
+    secret          from which the keys of browsers and scripts are derived; created at the first start
+    links/DIGEST    one file for each unopened link, named by the SHA-256 of its token
 
-Whoever takes a link's file away has opened it: a link works once, across processes and restarts, and nothing but its
-digest is stored. Deleting `access/` while Gainline is stopped locks every browser and script out.
+A link is opened by deleting its file, so it works once, across processes and restarts, and only its digest is stored.
+Deleting `access/` while Gainline is stopped locks out every browser and script.
 """
 
 import errno
@@ -37,11 +37,12 @@ class Keyring:
         self._now_s = now_s
         self._values = {self.value(key): key for key in (Key.REMOTE, Key.SCRIPT, Key.BROWSER)}
         self.cookie = f"gainline-{self._derived('cookie')[:8]}"
-        """Name of the browser's cookie: browsers do not tell the ports of a host apart, and several servers may run."""
+        """Name of the browser's cookie, different for each data folder: browsers share cookies between the ports of a
+        host, and several servers may run."""
 
     @classmethod
     def open(cls, data_dir: Path, *, now_s: Callable[[], float] = time.time) -> Self:
-        """The data folder's keyring, made where there is none. Raises StorageError when it cannot be read or made."""
+        """Open the data folder's keyring; create it if there is none. Raises StorageError when that fails."""
         folder = data_dir / "access"
         try:
             folder.mkdir(mode=0o700, exist_ok=True)
@@ -55,20 +56,20 @@ class Keyring:
             ) from error
 
     def value(self, key: Key) -> str:
-        """What a browser's cookie or a script's header holds to show this key."""
+        """Value of a browser's cookie or a script's header that presents this key."""
         return self._derived(f"key {key.name}")
 
     def given_to(self, place: RequestOrigin) -> Key:
-        """The key that a browser there gets for a link."""
+        """The key that a browser at that place gets for a link."""
         return _GIVEN_BY_PLACE[place]
 
     def key_of(self, shown: str) -> Key:
-        """The key that this value shows; `Key.NONE` for any other."""
+        """The key that this value presents; `Key.NONE` for any other value."""
         same = [key for value, key in self._values.items() if hmac.compare_digest(value.encode(), shown.encode())]
         return max(same, default=Key.NONE)
 
     def new_link(self) -> str:
-        """The token of a new link, good once and for a quarter of an hour."""
+        """Create a link that works once within LINK_VALID_S (15 minutes), and return its token."""
         self._drop_old()
         token = secrets.token_urlsafe(_SECRET_BYTES)
         self._file(token).touch(mode=0o600)
@@ -76,7 +77,7 @@ class Keyring:
         return token
 
     def open_link(self, token: str) -> bool:
-        """Whether a link has this token and was not opened before; it is open from now on."""
+        """Open a link. Returns whether there was an unopened, valid link with this token."""
         try:
             age_s = self._now_s() - self._file(token).stat().st_mtime
             self._file(token).unlink()
@@ -98,7 +99,7 @@ class Keyring:
 
 
 def _secret(file: Path) -> bytes:
-    """What the file holds; made whole or not at all."""
+    """Content of the secret's file, which is created atomically if missing."""
     if not file.exists():
         draft = file.with_name(f"{file.name}.new")
         draft.unlink(missing_ok=True)

@@ -1,5 +1,4 @@
-"""Reading what a stranger sends: in a process of its own, with limits of memory and time, so that the worst that a file
-can do is not to be read."""
+"""Reads untrusted files in a process of its own with memory and time limits, so that the worst result is an error."""
 
 import os
 import resource
@@ -22,12 +21,12 @@ T = TypeVar("T")
 
 MAX_CONCURRENT: Final = 2
 WAITS_S: Final = 20.0
-"""For one of those that are being read."""
+"""Maximum waiting time for one of the running processes to end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of one process: seconds of a processor, seconds until its answer, and bytes beside those of the program."""
+    """Limits of one process: processor time, s; time until its result, s; memory besides that of the program, bytes."""
 
     processor_s: int = 60
     wall_s: float = 120.0
@@ -35,16 +34,16 @@ class Limits:
 
 
 FILE: Final = Limits()
-"""For a file of the size that is taken over HTTP."""
+"""Limits for a file of the size accepted over HTTP."""
 
 _places = threading.BoundedSemaphore(MAX_CONCURRENT)
 
 
 def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """Call a pure, picklable function in a new process, which imports its module, and wait.
+    """Call a pure, picklable function in a new process, which imports its module, and wait for the result.
 
-    Raises what it raises, InputError naming the file when it passes a limit, and UnavailableError while others are
-    read.
+    Raises what it raises, InputError that names the file when it exceeds a limit, and UnavailableError when
+    MAX_CONCURRENT others are running for too long.
     """
     if not _places.acquire(timeout=WAITS_S):
         raise UnavailableError(
@@ -68,7 +67,7 @@ def _run(limits: Limits, task: Callable[[], T]) -> T:
             if not ours.poll(limits.wall_s):
                 raise _too_much(limits)
             outcome: TaskResult[T] | TaskError = ours.recv()
-        except EOFError as error:  # the processor's time was up, or the system had no memory left
+        except EOFError as error:  # the processor time was used up, or the system ran out of memory
             raise _too_much(limits) from error
         finally:
             process.kill()
@@ -81,23 +80,23 @@ def _run(limits: Limits, task: Callable[[], T]) -> T:
 
 
 def _perform(pipe: Connection, limits: Limits, task: Callable[[], T]) -> None:
-    """In the new process."""
+    """Main function of the new process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_CPU, (limits.processor_s, limits.processor_s + 1))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    with suppress(OSError, ValueError):  # where the system has no such limit the one of time holds
+    with suppress(OSError, ValueError):  # where the system has no such limit, the time limit applies
         most = _address_space() + limits.memory_bytes
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     try:
         outcome: TaskResult[T] | TaskError = TaskResult(task())
-    except Exception as error:  # noqa: BLE001 - the edge of the process
+    except Exception as error:  # noqa: BLE001 - outermost frame of the process
         outcome = TaskError(error)
-    with suppress(OSError):  # nobody waits any more
+    with suppress(OSError):  # the parent no longer waits
         pipe.send(outcome)
 
 
 def _address_space() -> int:
-    """What the program takes already, bytes. Raises OSError where the system does not tell."""
+    """Address space that the program uses already, bytes. Raises OSError where the system does not report it."""
     return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
 

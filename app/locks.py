@@ -1,4 +1,4 @@
-"""One holder at a time: locks that the operating system frees when their process ends, however it ends."""
+"""Exclusive locks, which the operating system releases when their process ends, however it ends."""
 
 import fcntl
 import json
@@ -18,7 +18,7 @@ POLL_S: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Holder:
-    """Who holds a lock: process id, and where it can be found (a web address, or nothing)."""
+    """Holder of a lock: process id, and its web address, empty if it has none."""
 
     pid: int
     address: str = ""
@@ -28,7 +28,7 @@ class Holder:
 
 
 class LockedError(Exception):
-    """The lock is held; `holder` is None when it has not said who it is."""
+    """The lock is held; `holder` is None when it is unknown."""
 
     def __init__(self, holder: Holder | None) -> None:
         super().__init__(f"held by {holder or 'another process'}")
@@ -39,10 +39,10 @@ class LockedError(Exception):
 def exclusive(
     path: Path, *, keep_waiting: Callable[[], bool] = lambda: False, clock: Clock = REAL_TIME
 ) -> Iterator[Callable[[str], None]]:
-    """Hold the lock file at `path`; what it yields writes the holder's address into it.
+    """Hold the lock file at `path`. Yields a function that writes the holder's address into it.
 
-    Raises LockedError when another process holds it and `keep_waiting()` is false, StorageError when there can be no
-    such file.
+    Raises LockedError when another process holds it and `keep_waiting()` is false, StorageError when the file cannot be
+    opened.
     """
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
@@ -63,7 +63,7 @@ def exclusive(
 
 
 def signature(path: Path) -> Holder | None:
-    """Who holds the lock file at `path`, or held it last; None where nobody has signed it."""
+    """The present or last holder of the lock file at `path`; None if it is unknown."""
     try:
         descriptor = os.open(path, os.O_RDONLY)
     except OSError:
@@ -83,7 +83,7 @@ def _take(descriptor: int) -> bool:
 
 
 def _sign(descriptor: int, address: str) -> None:
-    with suppress(OSError):  # a full disk costs the signature, which is a courtesy, not the lock
+    with suppress(OSError):  # a full disk costs only the signature, not the lock
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, json.dumps(asdict(Holder(pid=os.getpid(), address=address))).encode(), 0)
 

@@ -1,4 +1,4 @@
-"""The web application, put together."""
+"""Assembly of the web application."""
 
 import gc
 from collections.abc import AsyncIterator
@@ -34,15 +34,15 @@ from app.studies.router import router as reproductions
 from app.trials.router import records
 from app.trials.router import router as trials
 
-# All that is loaded by now stays: no search for garbage goes through it, the one as the process ends included.
+# Modules loaded by now stay for good: the garbage collector skips them, also as the process ends.
 gc.freeze()
 
 COMPRESSION: Final = 5
-"""Of nine, for answers that are compressed anew for each request."""
+"""gzip level, of nine, for responses that are compressed for each request."""
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """The application on the settings' database, which must be at the program's revision when it starts.
+    """Create the application for the settings' database, which must be at the program's revision when it starts.
 
     Raises SchemaError at start-up when it is not.
     """

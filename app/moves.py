@@ -1,4 +1,4 @@
-"""State machines as data: one way to ask what is allowed, and one sentence when it is not."""
+"""State machines as data: checks of transitions, actions and versions."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -10,14 +10,14 @@ S = TypeVar("S", bound=StrEnum)
 
 
 def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:
-    """The new state. Raises ConflictError when the table does not lead there from `state`."""
+    """Return the new state. Raises ConflictError when the table has no transition to it from `state`."""
     if to not in moves[state]:
         raise ConflictError(f"{what} is {state} and cannot become {to}.", hint=_look_again(sorted(moves[state])))
     return to
 
 
 def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, what: str) -> None:
-    """Raises ConflictError when `action` is not possible in `state`."""
+    """Raise ConflictError when `action` is not possible in `state`."""
     if state not in actions[action]:
         raise ConflictError(
             f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
@@ -26,14 +26,14 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
 
 
 def allowed(actions: Mapping[str, frozenset[S]], state: S) -> list[str]:
-    """What may be done in `state`, in the table's order."""
+    """Actions possible in `state`, in the table's order."""
     return [action for action, states in actions.items() if state in states]
 
 
 def check_version(sent: int, held: int, what: str, differences: Mapping[str, tuple[object, object]]) -> None:
-    """Raises ConflictError when the edit was made on an outdated version.
+    """Raise ConflictError when the edit was made on an outdated version.
 
-    `differences`: for each edited field what is there now and what was sent; those that differ are named.
+    `differences`: for each edited field, the present and the sent value; those that differ are named.
     """
     if sent == held:
         return

@@ -1,4 +1,4 @@
-"""Where other devices reach this server, and what that opens to them."""
+"""Addresses under which other devices reach this server, and what that exposes."""
 
 import ipaddress
 from collections.abc import Iterator
@@ -13,41 +13,42 @@ EXPOSES: Final = (
     "`gainline unlock` can change and delete them and start simulated flights: Gainline has no accounts yet. Real "
     "vehicles fly only from a server on loopback (--host 127.0.0.1), and so do simulated ones with a link."
 )
-"""What listening beyond loopback means, as the rest of a sentence."""
+"""Consequence of listening beyond loopback, as the second half of a sentence."""
 
 _EVERYWHERE: Final = {"0.0.0.0": 4, "::": 6}  # noqa: S104 - compared, not bound
 _INTERNAL: Final = ("docker", "br-", "veth", "virbr")
-"""Interfaces that lead to containers and virtual machines on this machine, and to no tablet."""
+"""Interfaces that lead to containers and virtual machines on this machine only."""
 
 
 @dataclass(frozen=True)
 class Address:
-    """What to type into a browser on another device; `interface` is empty where a host was asked for by name."""
+    """Web address for other devices; `interface` is empty where the server listens on a host given by name."""
 
     url: str
     interface: str
 
 
 def web_address(host: str, port: int) -> str:
-    """What to type into a browser on this machine."""
+    """Web address for a browser on this machine."""
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - compared, not bound
     return f"http://[{shown}]:{port}" if ":" in shown else f"http://{shown}:{port}"
 
 
 def unlock_link(address: str, token: str) -> str:
-    """What unlocks a browser that opens it."""
+    """The link that unlocks the browser that opens it."""
     return f"{address}/unlock?token={token}"
 
 
 def exposure(host: str) -> str | None:
-    """What listening on this host opens to others; None on loopback."""
+    """Warning about what listening on this host exposes; None on loopback."""
     return None if is_loopback(host) else f"Warning: listening on {host}, so {EXPOSES}"
 
 
 def addresses_elsewhere(host: str, port: int) -> list[Address]:
-    """The addresses under which other devices reach a server that listens there, the likeliest first; none on loopback.
+    """Addresses under which other devices reach a server that listens there, the likeliest first; none on loopback.
 
-    In a container they are the container's own, which lead nowhere from outside unless it shares the host's network.
+    In a container they are the container's own, which cannot be reached from outside unless it shares the host's
+    network.
     """
     if is_loopback(host):
         return []
@@ -71,7 +72,7 @@ def _own_addresses(version: int) -> Iterator[tuple[ipaddress.IPv4Address | ipadd
             continue
         for each in adapter.ips:
             address = ipaddress.ip_address(each.ip if isinstance(each.ip, str) else each.ip[0])
-            # A link-local address of version 6 wants an interface named by the other device.
+            # A link-local IPv6 address needs an interface name of the other device.
             unusable = address.is_loopback or (address.version == 6 and address.is_link_local)
             if address.version == version and not unusable:
                 yield address, adapter.nice_name

@@ -1,4 +1,4 @@
-"""Logs: one JSON object a line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error."""
+"""Logs: one JSON object per line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error."""
 
 import faulthandler
 import logging
@@ -25,9 +25,9 @@ _SHARED: Final[tuple[Processor, ...]] = (
 
 
 def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -> None:
-    """Send this process's logs, the libraries' included, to its file and to standard error (readable on a terminal).
+    """Send this process's logs, including the libraries', to its file and to standard error (readable on a terminal).
 
-    SIGUSR1 has it write to standard error what each of its threads does, so that one that hangs can be understood.
+    On SIGUSR1 it writes the stack of every thread to standard error, to diagnose a hang.
     """
     faulthandler.register(signal.SIGUSR1)
     folder = data_dir / "log"
@@ -43,7 +43,7 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -
     if sys.stderr.isatty():
         to_stderr.setLevel(logging.WARNING)
     logging.basicConfig(level=level.upper(), handlers=[to_file, to_stderr], force=True)
-    logging.raiseExceptions = False  # a full disk must not turn every log line into a traceback
+    logging.raiseExceptions = False  # with a full disk, not every log line must become a traceback
     structlog.configure(
         processors=[
             structlog.stdlib.filter_by_level,

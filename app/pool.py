@@ -1,4 +1,4 @@
-"""The processes that compute: pure functions go in, results come out, and a process that dies is replaced."""
+"""Pool of computing processes for pure functions; a process that dies is replaced."""
 
 import queue
 import threading
@@ -25,20 +25,23 @@ _log = structlog.get_logger(__name__)
 
 
 class CrashedError(GainlineError):
-    """The computing process died each time it was tried."""
+    """The computing process died in every attempt."""
 
 
 class ComputePool:
-    """Spawned processes between enter and exit, each started when it is first needed. Thread-safe.
+    """Processes between enter and exit, each started at its first use. Thread-safe.
 
-    They end at once, in the middle of a task, when the pool is closed or this process dies. Tasks are pure, so nothing
-    is lost by that. Each has a pipe to itself: one that dies in the middle of a result is noticed by its end, which a
-    `concurrent.futures.ProcessPoolExecutor` waits for in vain (docs/decisions/0014).
+    They end at once, even in the middle of a task, when the pool is closed or this process dies; nothing is lost,
+    because tasks are pure. Each has its own pipe, so that the death of one in the middle of a result is noticed by the
+    end of its pipe; `concurrent.futures.ProcessPoolExecutor` would wait for ever (docs/decisions/0014).
     """
 
     def __init__(self, processes: int, *, prepare: Callable[[], object], niceness: int = 0) -> None:
-        """`prepare()` runs in every new process before its first task, to load and compile what tasks need; `niceness`,
-        from 0 to 19, is how far they give way to other processes of the machine."""
+        """Create the pool; no process is started yet.
+
+        `prepare()` runs in every new process before its first task, to import and compile what tasks need. `niceness`,
+        0 to 19, lowers the processes' priority.
+        """
         self._computers = [_ComputeProcess(prepare, niceness) for _ in range(processes)]
         self._free: queue.LifoQueue[_ComputeProcess] = queue.LifoQueue()
         for computer in self._computers:
@@ -54,7 +57,7 @@ class ComputePool:
             computer.close()
 
     def run(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a pure, picklable function in the pool and wait.
+        """Call a pure, picklable function in the pool and wait for the result.
 
         Raises what it raises, CrashedError when its process dies twice, CancelledError when the pool is closed
         meanwhile.
@@ -75,12 +78,12 @@ class ComputePool:
 
 
 class _ProcessDiedError(Exception):
-    """The process is gone without a result."""
+    """The process died without a result."""
 
 
 class _ComputeProcess:
-    """A process, started when it is needed, and the pipe to it. It performs for one thread at a time; any may close
-    it."""
+    """A process, started when it is needed, and the pipe to it. Performs tasks for one thread at a time; any thread may
+    close it."""
 
     def __init__(self, prepare: Callable[[], object], niceness: int) -> None:
         self._prepare = prepare
@@ -90,7 +93,7 @@ class _ComputeProcess:
         self._running: tuple[BaseProcess, Connection] | None = None
 
     def perform(self, task: Callable[[], T]) -> T:
-        """Raises what the task raises, _ProcessDiedError, and CancelledError once it is closed."""
+        """Perform a task. Raises what the task raises, _ProcessDiedError, and CancelledError once it is closed."""
         pipe = self._pipe()
         try:
             pipe.send(task)

@@ -1,4 +1,4 @@
-"""Imported by the server that processes are forked from (`app.processes`): what a flight and a proposal need."""
+"""Imports for the fork server (`app.processes`): what a flight and a proposal need."""
 
 import app.fleet.seat
 import app.trials.cockpit  # noqa: F401

@@ -1,8 +1,8 @@
-"""How the processes that fly and compute are started: forked from a server that has loaded the numerics once.
+"""Start of the processes that fly and compute: forked from a server that has imported the numerics once.
 
-A fresh interpreter takes seconds of a processor to load them, a fork of one that has them a few milliseconds. The
-server has one thread and does nothing but fork, so that a fork never copies a lock that somebody holds. Where forking a
-process that has loaded system libraries is not safe (macOS), each process is a fresh interpreter.
+A new interpreter needs seconds of processor time to import them, a fork a few milliseconds. The server has one thread
+and only forks, so that a fork never copies a held lock. Where forking a process that has loaded system libraries is not
+safe (macOS), each process is a new interpreter.
 """
 
 import sys
@@ -17,7 +17,7 @@ PRELOADED: Final = ("__main__", "app.preload")
 
 @cache
 def process_context() -> ForkServerContext | SpawnContext:
-    """The context that starts them."""
+    """The multiprocessing context that starts these processes."""
     if sys.platform != "linux":
         return get_context("spawn")
     context = get_context("forkserver")
@@ -26,6 +26,6 @@ def process_context() -> ForkServerContext | SpawnContext:
 
 
 def start_loading() -> None:
-    """Have the server load what it forks, beside whatever this process does meanwhile."""
+    """Start the fork server, so that it imports while this process continues."""
     if process_context().get_start_method() == "forkserver":
         ensure_running()

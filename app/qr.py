@@ -1,4 +1,4 @@
-"""QR codes of addresses: for a page as SVG, for a terminal as text."""
+"""QR codes of addresses: as SVG for a page, as text for a terminal."""
 
 import io
 from typing import Final
@@ -8,7 +8,7 @@ _RESET: Final = "\x1b[0m"
 
 
 def qr_svg(text: str) -> bytes:
-    """An SVG of dark modules on white with the quiet zone that readers want, also on a dark page."""
+    """SVG of dark modules on white with the quiet zone that readers need, so that it also works on a dark page."""
     import segno
 
     drawn = io.BytesIO()
@@ -17,7 +17,7 @@ def qr_svg(text: str) -> bytes:
 
 
 def qr_text(text: str) -> str:
-    """The code in half blocks, white on black whatever the terminal's own colours are."""
+    """The code in half blocks, white on black whatever the terminal's colours."""
     import segno
 
     drawn = io.StringIO()

@@ -1,4 +1,4 @@
-"""What the slices' request and response models have in common."""
+"""Common parts of the slices' request and response schemas."""
 
 from typing import Annotated, Generic, TypeVar
 
@@ -10,10 +10,10 @@ from app.core.control_characters import find_control_characters
 T = TypeVar("T")
 
 OptionValue = bool | int | float | str
-"""A setting of a strategy or vehicle; which kind it has to be is the setting's own matter."""
+"""A setting of a strategy or vehicle; its type is checked by the setting."""
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-"""A finite JSON number: no text that looks like one, no NaN, no infinity."""
+"""A finite JSON number: no numeric text, no NaN, no infinity."""
 
 Gains = dict[str, int | float]
 """Gains by name; whole numbers where the controller takes counts."""
@@ -22,7 +22,7 @@ Text = Annotated[str, Field(max_length=2000)]
 
 
 def _shown_as_it_is(name: str) -> str:
-    """The name, unless it holds what moves a terminal's cursor or turns text around."""
+    """Return the name unless it holds control characters, which move a terminal's cursor or reverse text."""
     if found := find_control_characters(name):
         raise PydanticCustomError(
             "control_character", "must not hold control characters ({found})", {"found": ", ".join(found)}
@@ -37,14 +37,14 @@ Version = Annotated[int, Field(ge=1, strict=True, description="the version that 
 
 
 class Request(BaseModel):
-    """A body sent to us: a field that we do not know is a mistake, and said so."""
+    """A request body; unknown fields are errors."""
 
     model_config = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)
 
 
 class ProblemField(BaseModel):
-    """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds values of gains that
-    would pass, by name, where any are known."""
+    """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
+    pass, by name, where any are known."""
 
     field: str
     reason: str
@@ -52,7 +52,7 @@ class ProblemField(BaseModel):
 
 
 class Problem(BaseModel):
-    """An error (RFC 9457): what happened, what to do about it, and which fields are to blame."""
+    """An error (RFC 9457): what happened, what to do about it, and the fields concerned."""
 
     type: str
     title: str
@@ -63,7 +63,7 @@ class Problem(BaseModel):
 
 
 class Trouble(BaseModel):
-    """Why something is not to be had at present, and what to do about it."""
+    """Why something is not available at present, and what to do about it."""
 
     title: str
     detail: str
@@ -71,7 +71,7 @@ class Trouble(BaseModel):
 
 
 class Page(BaseModel, Generic[T]):
-    """A part of a list. `next_cursor` asks for the part after it; null at the end. `total` counts the whole list."""
+    """A part of a list. `next_cursor` requests the part after it; null at the end. `total` counts the whole list."""
 
     items: list[T]
     total: int
@@ -79,7 +79,7 @@ class Page(BaseModel, Generic[T]):
 
 
 class Interval(BaseModel):
-    """Where an error is expected, with probability `confidence`."""
+    """Interval that contains an error with probability `confidence`."""
 
     lower: float
     upper: float
@@ -101,7 +101,7 @@ class Check(BaseModel):
 
 
 class Gate(BaseModel):
-    """What the gate said about a gain set before its flight."""
+    """The gate's result for a gain set before its flight."""
 
     passed: bool
     checks: list[Check]

@@ -1,6 +1,6 @@
 """`gainline serve`: the web process, with a worker beside it.
 
-The worker is started before the web application is imported, so that both are there at the same time.
+The worker is started before the web application is imported, so that both start in parallel.
 """
 
 import errno
@@ -23,20 +23,20 @@ from app.supervisor import Supervisor
 from app.worker_process import run_worker_process
 
 THREAD_SWITCH_INTERVAL_S: Final = 0.001
-"""How long a thread that draws may keep the one that answers waiting for the interpreter."""
+"""Maximum time for which a thread that draws figures keeps the event loop waiting for the interpreter lock."""
 
 
 def say(line: str) -> None:
-    """Print one line at once."""
+    """Print one line and flush."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 
 
 def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[str], None] = say) -> None:
-    """Run the dashboard until SIGINT or SIGTERM; the main thread only.
+    """Run the dashboard until SIGINT or SIGTERM; for the main thread only.
 
-    Raises AlreadyRunningError when another server has this database, AddressError when the host or port cannot be had,
-    and StorageError when the data folder cannot be used or the database cannot be opened or brought up to date.
+    Raises AlreadyRunningError when another server uses this database, AddressError when the server cannot listen on
+    host and port, and StorageError when the data folder cannot be used or the database cannot be opened or migrated.
     """
     prepare_data_dir(settings.data_dir)
     if narrowed := make_private(settings.data_dir):
@@ -60,13 +60,13 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
             stack.enter_context(Supervisor(run_worker_process, settings, name="worker"))
         if (exposed := exposure(settings.host)) is not None:
             announce(exposed)
-        from app.web_server import run  # noqa: PLC0415 - while the worker imports its own half
+        from app.web_server import run  # noqa: PLC0415 - imported while the worker does its own imports
 
         run(settings, listener, announce)
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A listening socket; who connects early waits until the application is ready. Raises AddressError."""
+    """A listening socket; early clients wait until the application is ready. Raises AddressError."""
     try:
         family, _, _, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         return socket.create_server(where[:2], family=family, backlog=2048)
@@ -75,7 +75,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def _exit(_signal: int, _frame: FrameType | None) -> None:
-    """Unwind everything. Uvicorn takes signals over while it runs, and raises them again when it has shut down."""
+    """Unwind the stack. Uvicorn handles signals while it runs, and raises them again after its shutdown."""
     raise SystemExit(0)
 
 

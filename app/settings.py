@@ -1,4 +1,4 @@
-"""Settings, and the only reader of the environment: every field is also a variable, `GAINLINE_DATA_DIR` and so on."""
+"""Settings, and the only reader of the environment: every field is also a variable, such as `GAINLINE_DATA_DIR`."""
 
 import ipaddress
 import os
@@ -16,7 +16,7 @@ CHECKOUT: Final = APP.parent
 
 
 def default_data_dir() -> Path:
-    """`var` in a checkout; elsewhere the folder that the platform keeps for a program's data."""
+    """`var` in a checkout; otherwise the platform's folder for application data."""
     if (CHECKOUT / "dev").is_file() and (CHECKOUT / "pyproject.toml").is_file():
         return CHECKOUT / "var"
     home = os.environ.get("XDG_DATA_HOME", "")
@@ -24,14 +24,14 @@ def default_data_dir() -> Path:
 
 
 def default_ui_dir() -> Path:
-    """The built UI: inside an installed package, or what the last build left in a checkout."""
+    """The built UI: inside an installed package, or from the last build in a checkout."""
     packaged = APP / "ui"
     return packaged if packaged.is_dir() else CHECKOUT / "frontend" / "dist"
 
 
 def is_loopback(host: str) -> bool:
-    """Whether nobody but this computer reaches a server that listens there; a name other than localhost may be
-    anything."""
+    """Whether only this computer reaches a server that listens there; a name other than localhost may be any
+    address."""
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -43,11 +43,11 @@ def _listed(given: object) -> object:
 
 
 Hosts = Annotated[frozenset[str], NoDecode, BeforeValidator(_listed)]
-"""Given as one text with commas."""
+"""Given as comma-separated text."""
 
 
 class Settings(BaseSettings):
-    """What a person may set. Command-line options win over variables, variables over these defaults."""
+    """Settings of a server. Command-line options override variables, variables override these defaults."""
 
     model_config = SettingsConfigDict(env_prefix="GAINLINE_", frozen=True, extra="forbid")
 
@@ -70,7 +70,7 @@ class Settings(BaseSettings):
 
 
 def read_settings(given: Mapping[str, str | int | Path]) -> Settings:
-    """The environment's settings with `given` in place of them. Raises InputError naming what cannot be used."""
+    """Read the environment's settings, overridden by `given`. Raises InputError that names what cannot be used."""
     try:
         return Settings.model_validate(given)
     except ValidationError as error:

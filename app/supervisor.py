@@ -1,4 +1,4 @@
-"""Keeps one child process running: started again with back-off when it dies, stopped with patience."""
+"""Keeps one child process running: restarts it with back-off when it dies, and stops it with a long timeout."""
 
 import os
 import signal
@@ -17,9 +17,9 @@ from app.core.clock import REAL_TIME, Clock
 FIRST_PAUSE_S: Final = 0.2
 LONGEST_PAUSE_S: Final = 10.0
 HEALTHY_AFTER_S: Final = 20.0
-"""A child that lived this long starts again after the shortest pause."""
+"""A child that lived this long is restarted after the shortest pause."""
 STOP_TIMEOUT_S: Final = 60.0
-"""How long a child that was asked to stop may take to land what flies and to record it: landing alone may take 40 s."""
+"""How long a stopping child may take to land its vehicles and record the flights; landing alone may take 40 s."""
 STACK_DUMP_TIMEOUT_S: Final = 0.5
 
 _log = structlog.get_logger(__name__)
@@ -93,7 +93,7 @@ class Supervisor(Generic[T]):
 
 
 def _dump_stacks(process: BaseProcess) -> None:
-    """Where its threads hang, on standard error (`app.observability`)."""
+    """Have the process write its threads' stacks to standard error (`app.observability`)."""
     if process.pid is not None:
         os.kill(process.pid, signal.SIGUSR1)
         time.sleep(STACK_DUMP_TIMEOUT_S)

@@ -29,14 +29,14 @@ TICKS_A_SECOND: Final = 10
 WITHOUT_DESCRIPTORS_S: Final = 0.05
 NUMERICS: Final = ("plotly.graph_objects", "scipy.integrate", "scipy.special", "numba")
 NUMERICS_AFTER_S: Final = 5.0
-"""How long after it is ready the server loads what charts and judgements need, if nobody has asked for any by then."""
+"""How long after it is ready the server imports what charts and statistics need, if no request has done so by then."""
 
 _log = structlog.get_logger(__name__)
 
 
 class _Server(uvicorn.Server):
-    """Uvicorn, which takes connections as far as there is room for them, says when it is ready, and ends the open event
-    streams before it waits for them."""
+    """Uvicorn with a limit of connections, a callback when it is ready, and event streams that end before it waits for
+    them."""
 
     def __init__(
         self,
@@ -76,8 +76,10 @@ class _Server(uvicorn.Server):
         asyncio.get_running_loop().add_reader(self._listener, self._accept)
 
     def _accept(self) -> None:
-        """Take those who wait, as far as there is room. An event loop by itself would take all of them before it closed
-        the first, and be without descriptors meanwhile."""
+        """Accept waiting connections while there is room.
+
+        The event loop's own server would accept all of them before it closed the first, and run out of descriptors.
+        """
         loop = asyncio.get_running_loop()
         while self._connections.has_room(len(self._arriving)):
             try:
@@ -95,7 +97,7 @@ class _Server(uvicorn.Server):
             task.add_done_callback(self._arriving.discard)
 
     async def _serve_one(self, arrived: socket.socket) -> None:
-        with suppress(OSError):  # it is gone already
+        with suppress(OSError):  # the client has closed it already
             await asyncio.get_running_loop().connect_accepted_socket(self._protocol, arrived)
 
     def _protocol(self) -> asyncio.Protocol:
@@ -109,7 +111,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
     """
     application = create_app(settings)
     with application.state.database.read() as session:
-        latest_event_id(session)  # what the start needs, refused here in a sentence and not by the event loop
+        latest_event_id(session)  # a start-up error is raised here, and not in the event loop
     Keyring.open(settings.data_dir)
     address = web_address(settings.host, listener.getsockname()[1])
 
@@ -140,20 +142,23 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
 
 
 def _load_numerics() -> None:
-    """So that the first page with charts does not wait for it."""
+    """Import the numerics, so that the first page with charts does not wait for them."""
     for module in NUMERICS:
         importlib.import_module(module)
 
 
 def _spare_what_stays() -> None:
-    """The loaded program is never garbage: the collector need not go through all of it while an answer is made."""
+    """Exclude the loaded program from garbage collection, which would otherwise delay responses."""
     gc.collect()
     gc.freeze()
 
 
 def _announce_links(settings: Settings, port: int, keyring: Keyring, announce: Callable[[str], None]) -> None:
-    """The link that lets a browser command real vehicles; of a server that others reach, where a tablet finds it and
-    the link that lets it fly simulations, to a person with a code to point its camera at."""
+    """Print the links that unlock browsers.
+
+    On loopback, the link that lets a browser command real vehicles. On a server that other devices reach, its addresses
+    and the link that lets a tablet fly simulations; on a terminal also as a QR code.
+    """
     addresses = addresses_elsewhere(settings.host, port)
     for address in addresses:
         announce(f"On a tablet: {address.url}" + (f" ({address.interface})" if address.interface else ""))

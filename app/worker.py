@@ -1,9 +1,9 @@
-"""The worker process: it flies, and it computes. One for each database; the web process needs it for both.
+"""The worker process: flies vehicles and computes for the web process. One for each database.
 
 Flights, connected vehicles and computations have processes of their own, each watched by a thread of this one, which
-keeps the books. The live socket has a thread of its own too, so that an abort is heard whatever the others do.
-Proposals have a pool to themselves. What nobody waits for with a drone in hand gives way to all else, in processes
-apart: error landscapes, and reproductions, which take minutes.
+writes to the database. The live socket has its own thread, so that an abort is received whatever the other threads do.
+Proposals have their own pool. Work that no operator waits for during flights runs in separate processes with lower
+priority: error landscapes, and reproductions, which take minutes.
 """
 
 import os
@@ -54,15 +54,15 @@ LANDSCAPES_AT_ONCE: Final = 1
 LANDSCAPE_NICENESS: Final = 5
 LOOK_ANYWAY_S: Final = 1.0
 SWITCH_EVERY_S: Final = 0.001
-"""How long a thread that keeps books may make the one that passes aborts on wait for the interpreter; Python's own 5 ms
-add up over several."""
+"""Maximum time for which a thread that writes to the database keeps the one that forwards aborts waiting for the
+interpreter lock; Python's default of 5 ms adds up over several threads."""
 RETRY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
 
 
 class ShutdownRequest:
-    """Whether the worker is to end; once it is, no new work is claimed, and what flies is finished."""
+    """Request that the worker ends: it then claims no new work, and finishes its flights."""
 
     def __init__(self) -> None:
         self.event = threading.Event()
@@ -74,9 +74,9 @@ class ShutdownRequest:
 
 
 def run_worker(settings: Settings) -> None:
-    """Work until SIGINT or SIGTERM, which also end the flights under way; the main thread only.
+    """Run until SIGINT or SIGTERM, which also end running flights; for the main thread only.
 
-    Raises AlreadyRunningError when another worker has this database, SchemaError when it is not up to date, and
+    Raises AlreadyRunningError when another worker uses this database, SchemaError when it is not up to date, and
     StorageError when it cannot be opened or the data folder cannot be used.
     """
     abort_registry, ending = AbortRegistry(), ShutdownRequest()
@@ -93,12 +93,14 @@ def run_worker(settings: Settings) -> None:
 
 
 def run_supervised_worker(settings: Settings) -> None:
-    """The worker beside a web process: it stands by while an older worker ends, and does not outlive its parent by
-    more than the flights under way."""
+    """Run the worker as a child of the web process.
+
+    It waits while an older worker ends, and ends with its parent once its flights are over.
+    """
     abort_registry, ending = AbortRegistry(), ShutdownRequest()
     _install_signal_handlers(signal.SIGTERM, ending=ending, abort_registry=abort_registry)
     threading.Thread(target=_shut_down_with_parent, args=(ending,), daemon=True).start()
-    with suppress(LockedError):  # asked to end while it stood by
+    with suppress(LockedError):  # stopped while it waited for the lock
         _run(settings, ending, abort_registry, keep_waiting=lambda: not ending.event.is_set())
 
 
@@ -117,7 +119,8 @@ def _run(
 
 
 def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, abort_registry: AbortRegistry) -> None:
-    """The handler takes no lock: the thread that it interrupts may hold any. Whoever does is a thread of its own."""
+    """Install signal handlers that only queue the request, because the interrupted thread may hold any lock; a separate
+    thread handles it."""
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -153,7 +156,8 @@ class Worker:
         self._name = f"{platform.node()}:{os.getpid()}"
 
     def work(self) -> None:
-        """Recover what the last worker left, then work until asked to end; then let flights end, and drop the rest."""
+        """Recover what the last worker left, then work until requested to end; then finish the flights and drop
+        everything else."""
         with ExitStack() as stack:
             database = Database(self._settings.database_file)
             stack.callback(database.close)
@@ -161,7 +165,7 @@ class Worker:
             stack.callback(flight_runner.close)
             self._until_stored(flight_runner.recover)
             self._until_stored(sessions.recover)
-            stack.enter_context(live)  # from here on flights can be asked for, which recovery would withdraw
+            stack.enter_context(live)  # only now may flights be requested: recovery would withdraw them
             acting = stack.enter_context(ThreadPoolExecutor(ACTS_AT_ONCE, thread_name_prefix="act"))
             stack.callback(sessions.close)
             threads = SPARE_PROCESSORS + REPRODUCTIONS_AT_ONCE + LANDSCAPES_AT_ONCE

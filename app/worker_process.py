@@ -1,4 +1,4 @@
-"""The worker as a process beside the web process, which names it without importing what it is made of."""
+"""Entry point of the worker as a child of the web process, which so need not import the worker."""
 
 import signal
 
@@ -7,7 +7,7 @@ from app.settings import Settings
 
 
 def run_worker_process(settings: Settings) -> None:
-    """Import the worker, and work until the parent asks it to end or is gone. Ctrl-C is left to the parent."""
+    """Import the worker, and run it until the parent stops it or ends. Ctrl-C is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     start_loading()
     from app.worker import run_supervised_worker  # noqa: PLC0415
