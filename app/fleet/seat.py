@@ -124,8 +124,8 @@ class VehicleProcess:
                 pass  # belongs to a flight that is over
 
     def _finish_order(self) -> None:
-        """Nobody listens any more: a vehicle that was told to land, or to stop its motors, is told so while it has not
-        obeyed and was armed when it was last heard."""
+        """Repeat a land or motors off command after the worker's end, for at most STANDING_ORDER_TIMEOUT_S, while the
+        vehicle was armed when it was last received."""
         until_s = self._call.clock.now_s() + STANDING_ORDER_TIMEOUT_S
         while self._is_disobeyed() and self._call.clock.now_s() < until_s:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)

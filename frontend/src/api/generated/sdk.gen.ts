@@ -21,7 +21,7 @@ export type Options<TData extends TDataShape = TDataShape, ThrowOnError extends 
 /**
  * Get Health
  *
- * Whether the program answers, whether a worker is there to fly and compute, and whether orders reach every
+ * Whether the server answers, whether a worker is there to fly and compute, and whether commands reach every
  * connected vehicle.
  */
 export const getHealth = <ThrowOnError extends boolean = false>(options?: Options<GetHealthData, ThrowOnError>): RequestResult<GetHealthResponses, GetHealthErrors, ThrowOnError> => (options?.client ?? client).get<GetHealthResponses, GetHealthErrors, ThrowOnError>({ url: '/api/health', ...options });
@@ -36,7 +36,7 @@ export const getCatalogue = <ThrowOnError extends boolean = false>(options?: Opt
 /**
  * Get System
  *
- * Version, address, room on the disk: what one is asked for when something is wrong.
+ * Version, addresses, disk space: the facts to report with a problem.
  */
 export const getSystem = <ThrowOnError extends boolean = false>(options?: Options<GetSystemData, ThrowOnError>): RequestResult<GetSystemResponses, GetSystemErrors, ThrowOnError> => (options?.client ?? client).get<GetSystemResponses, GetSystemErrors, ThrowOnError>({ url: '/api/system', ...options });
 
@@ -50,24 +50,24 @@ export const getAddressCode = <ThrowOnError extends boolean = false>(options: Op
 /**
  * Get Backup
  *
- * The whole database as it is at this moment, as one SQLite file; flights and computations go on meanwhile.
+ * The whole database at this moment, as one SQLite file; flights and computations continue meanwhile.
  *
- * It is verified first; 503 names the trials whose record is damaged.
- * Only for programs and the dashboard itself: a page of another site cannot ask for it.
+ * It is verified first; 503 names the trials whose record is damaged. Only for programs and the dashboard itself: a
+ * page of another site cannot request it.
  */
 export const getBackup = <ThrowOnError extends boolean = false>(options?: Options<GetBackupData, ThrowOnError>): RequestResult<GetBackupResponses, GetBackupErrors, ThrowOnError> => (options?.client ?? client).get<GetBackupResponses, GetBackupErrors, ThrowOnError>({ url: '/api/system/backup', ...options });
 
 /**
  * Get Access
  *
- * What whoever asks may do here.
+ * What this client may do.
  */
 export const getAccess = <ThrowOnError extends boolean = false>(options?: Options<GetAccessData, ThrowOnError>): RequestResult<GetAccessResponses, GetAccessErrors, ThrowOnError> => (options?.client ?? client).get<GetAccessResponses, GetAccessErrors, ThrowOnError>({ url: '/api/access', ...options });
 
 /**
  * List Campaigns
  *
- * Campaigns with what a card shows of them.
+ * Campaigns as summaries for the list.
  */
 export const listCampaigns = <ThrowOnError extends boolean = false>(options?: Options<ListCampaignsData, ThrowOnError>): RequestResult<ListCampaignsResponses, ListCampaignsErrors, ThrowOnError> => (options?.client ?? client).get<ListCampaignsResponses, ListCampaignsErrors, ThrowOnError>({ url: '/api/campaigns', ...options });
 
@@ -114,7 +114,7 @@ export const editCampaign = <ThrowOnError extends boolean = false>(options: Opti
 /**
  * Finish Campaign
  *
- * End a campaign between flights, on the operator's word.
+ * Finish a campaign between flights, on the operator's decision.
  */
 export const finishCampaign = <ThrowOnError extends boolean = false>(options: Options<FinishCampaignData, ThrowOnError>): RequestResult<FinishCampaignResponses, FinishCampaignErrors, ThrowOnError> => (options.client ?? client).post<FinishCampaignResponses, FinishCampaignErrors, ThrowOnError>({
     url: '/api/campaigns/{campaign_id}/finish',
@@ -128,14 +128,14 @@ export const finishCampaign = <ThrowOnError extends boolean = false>(options: Op
 /**
  * Archive Campaign
  *
- * Put a finished campaign away.
+ * Archive a finished campaign.
  */
 export const archiveCampaign = <ThrowOnError extends boolean = false>(options: Options<ArchiveCampaignData, ThrowOnError>): RequestResult<ArchiveCampaignResponses, ArchiveCampaignErrors, ThrowOnError> => (options.client ?? client).post<ArchiveCampaignResponses, ArchiveCampaignErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/archive', ...options });
 
 /**
  * Clone Campaign
  *
- * A new campaign with the same definition, linked to this one.
+ * Create a campaign with the same definition, linked to this one.
  */
 export const cloneCampaign = <ThrowOnError extends boolean = false>(options: Options<CloneCampaignData, ThrowOnError>): RequestResult<CloneCampaignResponses, CloneCampaignErrors, ThrowOnError> => (options.client ?? client).post<CloneCampaignResponses, CloneCampaignErrors, ThrowOnError>({
     url: '/api/campaigns/{campaign_id}/clone',
@@ -149,16 +149,16 @@ export const cloneCampaign = <ThrowOnError extends boolean = false>(options: Opt
 /**
  * Rehearse Campaign
  *
- * The rehearsal of a campaign on a real vehicle: the same campaign on a simulation, made unless there is one that
- * is under way or passed.
+ * The rehearsal of a campaign on a real vehicle: the same campaign on a simulation. Created unless there is one
+ * that is under way or passed.
  */
 export const rehearseCampaign = <ThrowOnError extends boolean = false>(options: Options<RehearseCampaignData, ThrowOnError>): RequestResult<RehearseCampaignResponses, RehearseCampaignErrors, ThrowOnError> => (options.client ?? client).post<RehearseCampaignResponses, RehearseCampaignErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/rehearsal', ...options });
 
 /**
  * Promote Best
  *
- * Make the best gains the safe ones of the campaign's registered vehicle, once its flights have shown that they are
- * better than the first ones.
+ * Make the best gains the safe gains of the campaign's registered vehicle, once its flights have shown that they
+ * are better than the first ones.
  */
 export const promoteBest = <ThrowOnError extends boolean = false>(options: Options<PromoteBestData, ThrowOnError>): RequestResult<PromoteBestResponses, PromoteBestErrors, ThrowOnError> => (options.client ?? client).post<PromoteBestResponses, PromoteBestErrors, ThrowOnError>({
     url: '/api/campaigns/{campaign_id}/promote',
@@ -172,21 +172,21 @@ export const promoteBest = <ThrowOnError extends boolean = false>(options: Optio
 /**
  * Get Statistics
  *
- * What the flights say about the gains: repeats, scatter, better or worse, drift, and how well predictions held.
+ * Statistics of the flights: repeats, scatter, better or worse, drift, and how well predictions held.
  */
 export const getStatistics = <ThrowOnError extends boolean = false>(options: Options<GetStatisticsData, ThrowOnError>): RequestResult<GetStatisticsResponses, GetStatisticsErrors, ThrowOnError> => (options.client ?? client).get<GetStatisticsResponses, GetStatisticsErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/statistics', ...options });
 
 /**
  * Get Proposal
  *
- * Where the next gain set stands, and the gain set once it is there.
+ * State of the next proposal, and the proposal once it is there.
  */
 export const getProposal = <ThrowOnError extends boolean = false>(options: Options<GetProposalData, ThrowOnError>): RequestResult<GetProposalResponses, GetProposalErrors, ThrowOnError> => (options.client ?? client).get<GetProposalResponses, GetProposalErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/proposal', ...options });
 
 /**
  * Compute Proposal
  *
- * Compute the next gain set anew.
+ * Compute the proposal again.
  */
 export const computeProposal = <ThrowOnError extends boolean = false>(options: Options<ComputeProposalData, ThrowOnError>): RequestResult<ComputeProposalResponses, ComputeProposalErrors, ThrowOnError> => (options.client ?? client).post<ComputeProposalResponses, ComputeProposalErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/proposal', ...options });
 
@@ -200,7 +200,7 @@ export const listTrials = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Create Trial
  *
- * Plan a trial of the proposal or of gains of one's own, and fly it at once if asked to.
+ * Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once.
  */
 export const createTrial = <ThrowOnError extends boolean = false>(options: Options<CreateTrialData, ThrowOnError>): RequestResult<CreateTrialResponses, CreateTrialErrors, ThrowOnError> => (options.client ?? client).post<CreateTrialResponses, CreateTrialErrors, ThrowOnError>({
     url: '/api/campaigns/{campaign_id}/trials',
@@ -233,8 +233,8 @@ export const editTrial = <ThrowOnError extends boolean = false>(options: Options
 /**
  * Fly Trial
  *
- * Ask for the flight of a planned trial in one go. A vehicle that has a flight already refuses a second one, and a
- * real one refuses every one: it is staged.
+ * Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
+ * for a real vehicle, which has to be staged.
  */
 export const flyTrial = <ThrowOnError extends boolean = false>(options: Options<FlyTrialData, ThrowOnError>): RequestResult<FlyTrialResponses, FlyTrialErrors, ThrowOnError> => (options.client ?? client).post<FlyTrialResponses, FlyTrialErrors, ThrowOnError>({
     url: '/api/trials/{trial_id}/fly',
@@ -248,7 +248,7 @@ export const flyTrial = <ThrowOnError extends boolean = false>(options: Options<
 /**
  * Stage Trial
  *
- * Have a registered vehicle take the gains of a planned trial, read them back, and wait for its operator.
+ * Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator.
  */
 export const stageTrial = <ThrowOnError extends boolean = false>(options: Options<StageTrialData, ThrowOnError>): RequestResult<StageTrialResponses, StageTrialErrors, ThrowOnError> => (options.client ?? client).post<StageTrialResponses, StageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/stage', ...options });
 
@@ -262,15 +262,15 @@ export const unstageTrial = <ThrowOnError extends boolean = false>(options: Opti
 /**
  * Take Off Trial
  *
- * The operator's own act: a staged vehicle takes off. For a real one it is taken only from the dashboard's own
- * page, on this computer, with the token of who is in control.
+ * Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
+ * own page on this computer, with the token of the operator in control.
  */
 export const takeOffTrial = <ThrowOnError extends boolean = false>(options: Options<TakeOffTrialData, ThrowOnError>): RequestResult<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError> => (options.client ?? client).post<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/take-off', ...options });
 
 /**
  * Abort Trial
  *
- * End a flight now. Goes straight to the worker and waits for no storage; asking again is harmless.
+ * End a flight now. Goes straight to the worker without waiting for storage; may be repeated.
  */
 export const abortTrial = <ThrowOnError extends boolean = false>(options: Options<AbortTrialData, ThrowOnError>): RequestResult<AbortTrialResponses, AbortTrialErrors, ThrowOnError> => (options.client ?? client).post<AbortTrialResponses, AbortTrialErrors, ThrowOnError>({
     url: '/api/trials/{trial_id}/abort',
@@ -284,14 +284,14 @@ export const abortTrial = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Cancel Trial
  *
- * Give up a trial that has not flown.
+ * Cancel a trial that has not flown.
  */
 export const cancelTrial = <ThrowOnError extends boolean = false>(options: Options<CancelTrialData, ThrowOnError>): RequestResult<CancelTrialResponses, CancelTrialErrors, ThrowOnError> => (options.client ?? client).post<CancelTrialResponses, CancelTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/cancel', ...options });
 
 /**
  * Classify Trial
  *
- * Say what a finished flight is worth; whatever was computed from it is computed again.
+ * Classify a finished flight as valid, aborted or invalid; whatever was computed from it is recomputed.
  */
 export const classifyTrial = <ThrowOnError extends boolean = false>(options: Options<ClassifyTrialData, ThrowOnError>): RequestResult<ClassifyTrialResponses, ClassifyTrialErrors, ThrowOnError> => (options.client ?? client).post<ClassifyTrialResponses, ClassifyTrialErrors, ThrowOnError>({
     url: '/api/trials/{trial_id}/classify',
@@ -305,8 +305,8 @@ export const classifyTrial = <ThrowOnError extends boolean = false>(options: Opt
 /**
  * Judge Abort
  *
- * Say why the operator broke a flight off. It counts against its gains only if the vehicle behaved badly; whatever
- * was computed from it is computed again.
+ * Record why the operator aborted a flight. It counts against its gains only if the vehicle behaved badly; whatever
+ * was computed from it is recomputed.
  */
 export const judgeAbort = <ThrowOnError extends boolean = false>(options: Options<JudgeAbortData, ThrowOnError>): RequestResult<JudgeAbortResponses, JudgeAbortErrors, ThrowOnError> => (options.client ?? client).post<JudgeAbortResponses, JudgeAbortErrors, ThrowOnError>({
     url: '/api/trials/{trial_id}/judge-abort',
@@ -320,18 +320,18 @@ export const judgeAbort = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Get Trajectory
  *
- * The record thinned to at most so many points, peaks kept.
+ * The record, thinned to at most `points` samples with peaks kept.
  */
 export const getTrajectory = <ThrowOnError extends boolean = false>(options: Options<GetTrajectoryData, ThrowOnError>): RequestResult<GetTrajectoryResponses, GetTrajectoryErrors, ThrowOnError> => (options.client ?? client).get<GetTrajectoryResponses, GetTrajectoryErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/trajectory', ...options });
 
 /**
  * Upload Trajectory
  *
- * Hand in the record of a flight made elsewhere, or the recovered one of a lost flight.
+ * Upload the record of a flight made elsewhere, or the recovered record of a lost flight.
  *
  * A log (MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data, with its .log as the form field `companion`), in
  * which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
- * and optionally the other channels, at most 200 000 rows. It is scored and classed at once.
+ * and optionally the other channels, at most 200 000 rows. It is scored and classified at once.
  */
 export const uploadTrajectory = <ThrowOnError extends boolean = false>(options: Options<UploadTrajectoryData, ThrowOnError>): RequestResult<UploadTrajectoryResponses, UploadTrajectoryErrors, ThrowOnError> => (options.client ?? client).post<UploadTrajectoryResponses, UploadTrajectoryErrors, ThrowOnError>({
     ...formDataBodySerializer,
@@ -346,14 +346,15 @@ export const uploadTrajectory = <ThrowOnError extends boolean = false>(options: 
 /**
  * Get Trajectory Csv
  *
- * The whole record, every number exactly as it is stored (single precision, nine digits).
+ * The full record as CSV, every number exactly as stored (single precision, nine digits).
  */
 export const getTrajectoryCsv = <ThrowOnError extends boolean = false>(options: Options<GetTrajectoryCsvData, ThrowOnError>): RequestResult<GetTrajectoryCsvResponses, GetTrajectoryCsvErrors, ThrowOnError> => (options.client ?? client).get<GetTrajectoryCsvResponses, GetTrajectoryCsvErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/trajectory.csv', ...options });
 
 /**
  * Get Telemetry Log
  *
- * Everything that went over the link in the trial's last flight, both ways, as ground stations write it (.tlog).
+ * The .tlog of the trial's last flight: all messages over the link in both directions, in the format of ground
+ * stations.
  */
 export const getTelemetryLog = <ThrowOnError extends boolean = false>(options: Options<GetTelemetryLogData, ThrowOnError>): RequestResult<GetTelemetryLogResponses, GetTelemetryLogErrors, ThrowOnError> => (options.client ?? client).get<GetTelemetryLogResponses, GetTelemetryLogErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/tlog', ...options });
 
@@ -367,7 +368,8 @@ export const listPhotos = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Add Photo
  *
- * Add a photo (JPEG, PNG or WebP, told by its content; at most 10 MiB) to a flight, as the form field `file`.
+ * Add a photo (JPEG, PNG or WebP, detected by its content; at most 10 MiB) to a flight, as the form field
+ * `file`.
  */
 export const addPhoto = <ThrowOnError extends boolean = false>(options: Options<AddPhotoData, ThrowOnError>): RequestResult<AddPhotoResponses, AddPhotoErrors, ThrowOnError> => (options.client ?? client).post<AddPhotoResponses, AddPhotoErrors, ThrowOnError>({
     ...formDataBodySerializer,
@@ -387,7 +389,7 @@ export const deletePhoto = <ThrowOnError extends boolean = false>(options: Optio
 /**
  * Get Photo
  *
- * A picture as it was handed in; opened by itself it may run nothing and load nothing.
+ * A picture as uploaded. Its headers keep it from running or loading anything when it is opened by itself.
  */
 export const getPhoto = <ThrowOnError extends boolean = false>(options: Options<GetPhotoData, ThrowOnError>): RequestResult<GetPhotoResponses, GetPhotoErrors, ThrowOnError> => (options.client ?? client).get<GetPhotoResponses, GetPhotoErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/photos/{photo_id}', ...options });
 
@@ -434,7 +436,7 @@ export const editVehicle = <ThrowOnError extends boolean = false>(options: Optio
 /**
  * Connect Vehicle
  *
- * Open the link, and keep it open; the vehicle's safe gains are written and read back, unless it is armed.
+ * Open the link and keep it open; the vehicle's safe gains are written and read back, unless it is armed.
  */
 export const connectVehicle = <ThrowOnError extends boolean = false>(options: Options<ConnectVehicleData, ThrowOnError>): RequestResult<ConnectVehicleResponses, ConnectVehicleErrors, ThrowOnError> => (options.client ?? client).post<ConnectVehicleResponses, ConnectVehicleErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/connect', ...options });
 
@@ -448,7 +450,7 @@ export const disconnectVehicle = <ThrowOnError extends boolean = false>(options:
 /**
  * Check Vehicle
  *
- * Look at everything that has to be so before a flight.
+ * Run the preflight check.
  */
 export const checkVehicle = <ThrowOnError extends boolean = false>(options: Options<CheckVehicleData, ThrowOnError>): RequestResult<CheckVehicleResponses, CheckVehicleErrors, ThrowOnError> => (options.client ?? client).post<CheckVehicleResponses, CheckVehicleErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/check', ...options });
 
@@ -469,21 +471,21 @@ export const readParameters = <ThrowOnError extends boolean = false>(options: Op
 /**
  * List Acts
  *
- * What the vehicle was asked beside its flights, the newest first.
+ * Acts of the vehicle, newest first: requests beside its flights.
  */
 export const listActs = <ThrowOnError extends boolean = false>(options: Options<ListActsData, ThrowOnError>): RequestResult<ListActsResponses, ListActsErrors, ThrowOnError> => (options.client ?? client).get<ListActsResponses, ListActsErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/acts', ...options });
 
 /**
  * List Given Gains
  *
- * Every gain set that the vehicle was given, the newest first: in flights, restored after them, and beside them.
+ * Every gain set that the vehicle was given, newest first: in flights, restored after them, and by acts.
  */
 export const listGivenGains = <ThrowOnError extends boolean = false>(options: Options<ListGivenGainsData, ThrowOnError>): RequestResult<ListGivenGainsResponses, ListGivenGainsErrors, ThrowOnError> => (options.client ?? client).get<ListGivenGainsResponses, ListGivenGainsErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/ledger', ...options });
 
 /**
  * Land Vehicle
  *
- * Have the vehicle land now, whatever it does. Goes straight to the worker and waits for no storage.
+ * Land the vehicle now, whatever it is doing. Goes straight to the worker without waiting for storage.
  */
 export const landVehicle = <ThrowOnError extends boolean = false>(options: Options<LandVehicleData, ThrowOnError>): RequestResult<LandVehicleResponses, LandVehicleErrors, ThrowOnError> => (options.client ?? client).post<LandVehicleResponses, LandVehicleErrors, ThrowOnError>({
     url: '/api/vehicles/{vehicle_id}/land',
@@ -497,8 +499,8 @@ export const landVehicle = <ThrowOnError extends boolean = false>(options: Optio
 /**
  * Stop Motors
  *
- * Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker and waits for no storage,
- * unless whoever asks may not command real vehicles: then the database says whether it is one.
+ * Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
+ * Only for a client that may not command real vehicles is the database read first, to see whether this is one.
  */
 export const stopMotors = <ThrowOnError extends boolean = false>(options: Options<StopMotorsData, ThrowOnError>): RequestResult<StopMotorsResponses, StopMotorsErrors, ThrowOnError> => (options.client ?? client).post<StopMotorsResponses, StopMotorsErrors, ThrowOnError>({
     url: '/api/vehicles/{vehicle_id}/motors-off',
@@ -512,8 +514,8 @@ export const stopMotors = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Release Vehicle
  *
- * Take a vehicle out of quarantine, on the word of a person who has looked at it. One with a link is released once
- * it is seen to be disarmed and to hold its safe gains; the act says what came of that.
+ * Release a vehicle from quarantine, on the statement of a person who has looked at it. A vehicle with a link is
+ * released once the worker has verified that it is disarmed and holds its safe gains; the act reports the outcome.
  */
 export const releaseVehicle = <ThrowOnError extends boolean = false>(options: Options<ReleaseVehicleData, ThrowOnError>): RequestResult<ReleaseVehicleResponses, ReleaseVehicleErrors, ThrowOnError> => (options.client ?? client).post<ReleaseVehicleResponses, ReleaseVehicleErrors, ThrowOnError>({
     url: '/api/vehicles/{vehicle_id}/release',
@@ -527,14 +529,15 @@ export const releaseVehicle = <ThrowOnError extends boolean = false>(options: Op
 /**
  * Give Up Control
  *
- * Hand over: nobody is in control afterwards.
+ * Give up control: no operator is in control afterwards.
  */
 export const giveUpControl = <ThrowOnError extends boolean = false>(options: Options<GiveUpControlData, ThrowOnError>): RequestResult<GiveUpControlResponses, GiveUpControlErrors, ThrowOnError> => (options.client ?? client).delete<GiveUpControlResponses, GiveUpControlErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/control', ...options });
 
 /**
  * Take Control
  *
- * Take control for 15 s, or renew it with one's token; a take-over from somebody else is recorded as an act.
+ * Take control for 15 s, or renew the lease with its token; taking over from another operator is recorded as an
+ * act.
  */
 export const takeControl = <ThrowOnError extends boolean = false>(options: Options<TakeControlData, ThrowOnError>): RequestResult<TakeControlResponses, TakeControlErrors, ThrowOnError> => (options.client ?? client).put<TakeControlResponses, TakeControlErrors, ThrowOnError>({
     url: '/api/vehicles/{vehicle_id}/control',
@@ -548,7 +551,7 @@ export const takeControl = <ThrowOnError extends boolean = false>(options: Optio
 /**
  * List Jobs
  *
- * Jobs, the newest first.
+ * Jobs, newest first.
  */
 export const listJobs = <ThrowOnError extends boolean = false>(options?: Options<ListJobsData, ThrowOnError>): RequestResult<ListJobsResponses, ListJobsErrors, ThrowOnError> => (options?.client ?? client).get<ListJobsResponses, ListJobsErrors, ThrowOnError>({ url: '/api/jobs', ...options });
 
@@ -560,21 +563,21 @@ export const getJob = <ThrowOnError extends boolean = false>(options: Options<Ge
 /**
  * Get Job Log
  *
- * What the worker wrote down about a job, its last lines.
+ * The last lines of the worker's log about a job.
  */
 export const getJobLog = <ThrowOnError extends boolean = false>(options: Options<GetJobLogData, ThrowOnError>): RequestResult<GetJobLogResponses, GetJobLogErrors, ThrowOnError> => (options.client ?? client).get<GetJobLogResponses, GetJobLogErrors, ThrowOnError>({ url: '/api/jobs/{job_id}/log', ...options });
 
 /**
  * Cancel Job
  *
- * End a job that waits or runs; what it has computed is dropped.
+ * Cancel a job that is queued or running; what it has computed is discarded.
  */
 export const cancelJob = <ThrowOnError extends boolean = false>(options: Options<CancelJobData, ThrowOnError>): RequestResult<CancelJobResponses, CancelJobErrors, ThrowOnError> => (options.client ?? client).post<CancelJobResponses, CancelJobErrors, ThrowOnError>({ url: '/api/jobs/{job_id}/cancel', ...options });
 
 /**
  * Retry Job
  *
- * Let a failed or cancelled job run again.
+ * Queue a failed or cancelled job again.
  */
 export const retryJob = <ThrowOnError extends boolean = false>(options: Options<RetryJobData, ThrowOnError>): RequestResult<RetryJobResponses, RetryJobErrors, ThrowOnError> => (options.client ?? client).post<RetryJobResponses, RetryJobErrors, ThrowOnError>({ url: '/api/jobs/{job_id}/retry', ...options });
 
@@ -616,14 +619,14 @@ export const getReproductionFigure = <ThrowOnError extends boolean = false>(opti
 /**
  * List Controller Checks
  *
- * Recordings that were held against the replica, the newest first.
+ * Checks of recordings against the replica, newest first.
  */
 export const listControllerChecks = <ThrowOnError extends boolean = false>(options?: Options<ListControllerChecksData, ThrowOnError>): RequestResult<ListControllerChecksResponses, ListControllerChecksErrors, ThrowOnError> => (options?.client ?? client).get<ListControllerChecksResponses, ListControllerChecksErrors, ThrowOnError>({ url: '/api/controller-checks', ...options });
 
 /**
  * Check Controller
  *
- * Hold a recording of the vertical loop against the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
+ * Compare a recording of the vertical loop with the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
  * form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept.
  */
 export const checkController = <ThrowOnError extends boolean = false>(options: Options<CheckControllerData, ThrowOnError>): RequestResult<CheckControllerResponses, CheckControllerErrors, ThrowOnError> => (options.client ?? client).post<CheckControllerResponses, CheckControllerErrors, ThrowOnError>({
@@ -639,14 +642,14 @@ export const checkController = <ThrowOnError extends boolean = false>(options: O
 /**
  * Check Example Controller
  *
- * The same with a takeoff that comes with the program, recorded from the autopilot's own code.
+ * Check the example recording: a takeoff that comes with the program, recorded from the autopilot's own code.
  */
 export const checkExampleController = <ThrowOnError extends boolean = false>(options?: Options<CheckExampleControllerData, ThrowOnError>): RequestResult<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError> => (options?.client ?? client).post<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError>({ url: '/api/controller-checks/example', ...options });
 
 /**
  * Delete Controller Check
  *
- * Remove a check; it can be made again from its recording.
+ * Delete a check; it can be made again from its recording.
  */
 export const deleteControllerCheck = <ThrowOnError extends boolean = false>(options: Options<DeleteControllerCheckData, ThrowOnError>): RequestResult<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError> => (options.client ?? client).delete<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}', ...options });
 
@@ -658,7 +661,7 @@ export const getControllerCheck = <ThrowOnError extends boolean = false>(options
 /**
  * Get Controller Check Figure
  *
- * The signals of the reference model and the integrator, or the commands, recorded and replica overlaid.
+ * The signals of the reference model and the integrator, or the commands; recording and replica overlaid.
  */
 export const getControllerCheckFigure = <ThrowOnError extends boolean = false>(options: Options<GetControllerCheckFigureData, ThrowOnError>): RequestResult<GetControllerCheckFigureResponses, GetControllerCheckFigureErrors, ThrowOnError> => (options.client ?? client).get<GetControllerCheckFigureResponses, GetControllerCheckFigureErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}/figures/{name}', ...options });
 
@@ -702,15 +705,15 @@ export const getReportAsPdf = <ThrowOnError extends boolean = false>(options: Op
 /**
  * Get Bundle
  *
- * The whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log.
+ * Export the whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log.
  */
 export const getBundle = <ThrowOnError extends boolean = false>(options: Options<GetBundleData, ThrowOnError>): RequestResult<GetBundleResponses, GetBundleErrors, ThrowOnError> => (options.client ?? client).get<GetBundleResponses, GetBundleErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/bundle', ...options });
 
 /**
  * Bring In Bundle
  *
- * A new campaign from a bundle, every number as it was. What was flown on a registered vehicle becomes history: it
- * can be read, compared and cloned, and nothing flies from it.
+ * Import a bundle as a new campaign, with every number unchanged. What was flown on a registered vehicle becomes
+ * history: it can be read, compared and cloned, but not flown.
  */
 export const bringInBundle = <ThrowOnError extends boolean = false>(options: Options<BringInBundleData, ThrowOnError>): RequestResult<BringInBundleResponses, BringInBundleErrors, ThrowOnError> => (options.client ?? client).post<BringInBundleResponses, BringInBundleErrors, ThrowOnError>({
     ...formDataBodySerializer,
@@ -727,7 +730,7 @@ export const bringInBundle = <ThrowOnError extends boolean = false>(options: Opt
  *
  * The gains as a path over the error that the strategy's model predicts, two gains at a time.
  *
- * A job computes it for each proposal, started when somebody who may change things first asks for it; until that is
+ * A job computes it for each proposal, started at the first request by a client that may make changes; until it is
  * done the card is `waiting`.
  */
 export const getLandscape = <ThrowOnError extends boolean = false>(options: Options<GetLandscapeData, ThrowOnError>): RequestResult<GetLandscapeResponses, GetLandscapeErrors, ThrowOnError> => (options.client ?? client).get<GetLandscapeResponses, GetLandscapeErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/figures/landscape', ...options });
@@ -735,14 +738,15 @@ export const getLandscape = <ThrowOnError extends boolean = false>(options: Opti
 /**
  * Get Calibration
  *
- * The model as it was fitted after each flight, over all campaigns of the vehicle, and whether a re-tune is due.
+ * The model as fitted after each flight, over all campaigns of the vehicle, and whether it should be tuned
+ * again.
  */
 export const getCalibration = <ThrowOnError extends boolean = false>(options: Options<GetCalibrationData, ThrowOnError>): RequestResult<GetCalibrationResponses, GetCalibrationErrors, ThrowOnError> => (options.client ?? client).get<GetCalibrationResponses, GetCalibrationErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/calibration', ...options });
 
 /**
  * Get Vehicle Figure
  *
- * The fitted parameters over the vehicle's flights, or the voltages before and after each flight.
+ * The fitted parameters over the vehicle's flights, or the battery voltages before and after each flight.
  */
 export const getVehicleFigure = <ThrowOnError extends boolean = false>(options: Options<GetVehicleFigureData, ThrowOnError>): RequestResult<GetVehicleFigureResponses, GetVehicleFigureErrors, ThrowOnError> => (options.client ?? client).get<GetVehicleFigureResponses, GetVehicleFigureErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/figures/{name}', ...options });
 
@@ -751,28 +755,29 @@ export const getVehicleFigure = <ThrowOnError extends boolean = false>(options: 
  *
  * All takeoffs over the set point, the error of each flight, or the gains of each flight.
  *
- * Of more than 30 flights the takeoffs are drawn as an envelope, with the first, the best, the latest and that
- * `flight` by themselves. Between `from_s` and `to_s` curves have as many points again.
+ * With more than 30 flights the takeoffs are drawn as an envelope; the first, the best, the latest and that `flight`
+ * are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
  */
 export const getCampaignFigure = <ThrowOnError extends boolean = false>(options: Options<GetCampaignFigureData, ThrowOnError>): RequestResult<GetCampaignFigureResponses, GetCampaignFigureErrors, ThrowOnError> => (options.client ?? client).get<GetCampaignFigureResponses, GetCampaignFigureErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/figures/{name}', ...options });
 
 /**
  * Get Flight Figure
  *
- * One flight by itself, with its prediction and its commands.
+ * One flight, with its prediction and its commands.
  */
 export const getFlightFigure = <ThrowOnError extends boolean = false>(options: Options<GetFlightFigureData, ThrowOnError>): RequestResult<GetFlightFigureResponses, GetFlightFigureErrors, ThrowOnError> => (options.client ?? client).get<GetFlightFigureResponses, GetFlightFigureErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/figure', ...options });
 
 /**
  * Events
  *
- * Follow everything that happens.
+ * Stream all events.
  *
  * `hello` opens the stream: version, and whether a worker is there. `change` names a thing that changed (topic,
- * entity_id, campaign_id), those of the last `since_s` seconds first, for whoever read something just before; its id
- * lets a client that comes back with `Last-Event-ID` miss nothing, a restart of the server included. `reset`: that id
- * is unknown here, load everything anew. `telemetry` and `phase` come from a running flight, `vehicle` five times a
- * second from a connected vehicle, and `worker` tells whether the worker is there: when it comes or goes, and every
- * three seconds, so that silence means a dead line. These carry no id and may be dropped for a slow client.
+ * entity_id, campaign_id); those of the last `since_s` seconds come first, for a client that has just read something.
+ * Its id lets a client that reconnects with `Last-Event-ID` miss nothing, even after a restart of the server. `reset`:
+ * that id is unknown here, load everything again. `telemetry` and `phase` come from a running flight, `vehicle` five
+ * times a second from a connected vehicle. `worker` tells whether the worker is there: when that changes, and every
+ * three seconds, so that a client detects a dead connection by silence. These carry no id and may be dropped for a
+ * slow client.
  */
 export const events = <ThrowOnError extends boolean = false>(options?: Options<EventsData, ThrowOnError, unknown>): Promise<ServerSentEventsResult<EventsResponses>> => (options?.client ?? client).sse.get<EventsResponses, EventsErrors, ThrowOnError>({ url: '/api/events', ...options });

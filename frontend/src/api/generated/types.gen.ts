@@ -7,7 +7,7 @@ export type ClientOptions = {
 /**
  * Abort
  *
- * Why the flight is to end now.
+ * Why the flight is to be aborted.
  */
 export type Abort = {
     /**
@@ -19,8 +19,8 @@ export type Abort = {
 /**
  * AbortAnswer
  *
- * `accepted` is true when the worker has taken the abort, or the flight is over without it; the flight's end is
- * reported by its events.
+ * Answer to an abort. `accepted` is true when the worker has accepted the abort, or the flight is over already; the
+ * flight's end is reported by its events.
  */
 export type AbortAnswer = {
     /**
@@ -40,7 +40,7 @@ export type AbortAnswer = {
 /**
  * AbortJudgement
  *
- * The operator's word on a flight that they broke off: whether it counts against its gains.
+ * The operator's reason for aborting a flight, which decides whether it counts against its gains.
  */
 export type AbortJudgement = {
     /**
@@ -58,9 +58,9 @@ export type AbortJudgement = {
 /**
  * Access
  *
- * What whoever asks may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
- * link, `may_command` real ones. `elsewhere`: they are not on this computer. `hint` says how a browser is unlocked;
- * empty where no link would change anything.
+ * What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
+ * link, `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` says how to unlock a browser;
+ * empty where a link would change nothing.
  */
 export type Access = {
     /**
@@ -88,12 +88,14 @@ export type Access = {
 /**
  * ActKind
  *
- * What a registered vehicle was asked, or what was decided about it, beside its flights.
+ * Kinds of acts: requests to a registered vehicle and decisions about it, beside its flights.
  */
 export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control';
 
 /**
  * ActState
+ *
+ * States of an act.
  *
  * requested ──→ running ──→ done | failed
  * └──→ failed
@@ -103,7 +105,7 @@ export type ActState = 'requested' | 'running' | 'done' | 'failed';
 /**
  * AddressInfo
  *
- * `interface` is empty where the server was told to listen on a name or on one address.
+ * An address of this server. `interface` is empty where the server listens on a name or on one address.
  */
 export type AddressInfo = {
     /**
@@ -120,7 +122,7 @@ export type AddressInfo = {
  * Advice
  *
  * The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
- * first flight, or its gains once more.
+ * first flight, or its gains again.
  */
 export type Advice = {
     /**
@@ -142,8 +144,8 @@ export type Advice = {
 /**
  * BestTrial
  *
- * The valid trial with the lowest error, and what all flights of its gains say: their mean with its standard error,
- * from the scatter pooled over the campaign, null while that is not known.
+ * The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
+ * while the scatter is not known.
  */
 export type BestTrial = {
     /**
@@ -181,7 +183,7 @@ export type BestTrial = {
 /**
  * Campaign
  *
- * One vehicle, one experiment, one strategy, and what came of it.
+ * One vehicle, one experiment, one strategy, and the results.
  */
 export type Campaign = {
     /**
@@ -253,7 +255,8 @@ export type Campaign = {
 /**
  * CampaignEdit
  *
- * Changes of a campaign; what is left out stays. Definition and vehicle change only before the first flight.
+ * Changes of a campaign; omitted fields stay as they are. Definition and vehicle can change only before the first
+ * flight.
  */
 export type CampaignEdit = {
     /**
@@ -273,23 +276,23 @@ export type CampaignEdit = {
 /**
  * CampaignState
  *
- * From the first idea to the archive.
+ * States of a campaign.
  *
  * draft ──→ ready ──→ flying ←──→ deciding ──→ finished ──→ archived
  *
- * draft: its first gains are not known yet. ready: they are, and nothing has flown; the definition may still change.
- * flying: a trial is in the air. deciding: the next gains are being found, or a person has to say something.
- * finished: converged, out of flights, or stopped by the operator; see `Outcome`.
+ * draft: its first gains are not computed yet. ready: they are, and nothing has flown; the definition may still
+ * change. flying: a trial is in the air. deciding: the next gains are being computed, or a review is due. finished:
+ * converged, out of flights, or stopped by the operator; see `Outcome`.
  */
 export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finished' | 'archived';
 
 /**
  * CampaignStatistics
  *
- * What the flights say about the gains, and how sure. `sigma` is the flight-to-flight scatter, pooled over all
- * repeats and the experiment's prior, null while nobody knows it: before the first repeat under an autopilot whose
- * scatter was never measured; `optimism` by how much the best is expected to look better than it is, for
- * having been chosen, and `shrunk_error` its error without that.
+ * What the flights say about the gains, with confidence. `sigma` is the flight-to-flight scatter, pooled over all
+ * repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
+ * scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
+ * chosen, and `shrunk_error` its error corrected for that.
  */
 export type CampaignStatistics = {
     /**
@@ -394,7 +397,7 @@ export type CampaignSummary = {
 /**
  * CampaignVehicle
  *
- * A campaign's vehicle with its settings: the campaign's own, or those it is registered with.
+ * A campaign's vehicle with its settings: the campaign's own, or those that it is registered with.
  */
 export type CampaignVehicle = {
     /**
@@ -510,7 +513,7 @@ export type Check = {
 /**
  * CheckFigure
  *
- * A drawing of the check that there is.
+ * An available figure of the check.
  */
 export type CheckFigure = {
     /**
@@ -526,7 +529,7 @@ export type CheckFigure = {
 /**
  * CheckedSignal
  *
- * One signal of the loop. `exact`: no difference at all; `agrees`: none that is not allowed; `differs`.
+ * One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`.
  */
 export type CheckedSignal = {
     /**
@@ -576,7 +579,7 @@ export type CheckedSignal = {
 /**
  * Classification
  *
- * A person's word on a finished flight.
+ * A person's review of a finished flight.
  */
 export type Classification = {
     /**
@@ -598,7 +601,7 @@ export type Classification = {
 /**
  * Clone
  *
- * A new campaign with the same definition, perhaps on another vehicle, linked to this one. With `warm_start` it
+ * A new campaign with the same definition, optionally on another vehicle, linked to this one. With `warm_start` it
  * starts from this one's best flight.
  */
 export type Clone = {
@@ -687,9 +690,9 @@ export type ComparedFlight = {
 /**
  * Comparison
  *
- * The best gains against the first flight's. `difference` is best − baseline; `confidence` that of the likelier
- * direction, with the allowance for having chosen the best among several. The verdict is `not known yet`, without
- * confidence and standard error, while nobody knows how much flights scatter.
+ * The best gains compared with the first flight's. `difference` is best − baseline; `confidence` that of the
+ * likelier direction, with the allowance for having chosen the best among several. While the scatter of flights is
+ * unknown, the verdict is `not known yet`, without confidence and standard error.
  */
 export type Comparison = {
     /**
@@ -718,7 +721,8 @@ export type Comparison = {
 /**
  * Control
  *
- * Who is in control. Renewals are not announced: load it again after `until` to see whether it is over.
+ * The operator in control. Renewals are not published as events: load it again after `until` to see whether it has
+ * ended.
  */
 export type Control = {
     /**
@@ -734,7 +738,7 @@ export type Control = {
 /**
  * ControllerCheck
  *
- * The result in a sentence, what it rests on, and one line for each signal.
+ * The result as a sentence, the gains and notes behind it, and one line for each signal.
  */
 export type ControllerCheck = {
     /**
@@ -804,7 +808,8 @@ export type ControllerCheck = {
 /**
  * ControllerCheckSummary
  *
- * A recording that was held against the replica: `log`, Paparazzi's of a flight, or `trace`, with every step.
+ * A recording that was compared with the replica: `log`, of a flight with Paparazzi, or `trace`, with every
+ * step.
  */
 export type ControllerCheckSummary = {
     /**
@@ -832,7 +837,7 @@ export type ControllerCheckSummary = {
 /**
  * Definition
  *
- * Everything that a proposal depends on, beside the flights. Frozen at the first flight.
+ * Everything besides the flights that a proposal depends on. Frozen at the first flight.
  *
  * `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change as shares of
  * its range, before and after the first valid flight; `ceiling_m` is the highest altitude that the gate lets a model
@@ -891,7 +896,7 @@ export type DefinitionInput = {
 /**
  * Definition
  *
- * Everything that a proposal depends on, beside the flights. Frozen at the first flight.
+ * Everything besides the flights that a proposal depends on. Frozen at the first flight.
  *
  * `bounds` narrow the experiment's own. `first_step_fraction` and `step_fraction` limit a gain's change as shares of
  * its range, before and after the first valid flight; `ceiling_m` is the highest altitude that the gate lets a model
@@ -950,7 +955,7 @@ export type DefinitionOutput = {
 /**
  * Donor
  *
- * The flight of another campaign that a warm start comes from, with the checksum of its record. Without a trial
+ * The flight of another campaign that a warm start begins from, with the checksum of its record. Without a trial
  * number it is the best valid one; the checksum is filled in.
  */
 export type DonorInput = {
@@ -971,7 +976,7 @@ export type DonorInput = {
 /**
  * Donor
  *
- * The flight of another campaign that a warm start comes from, with the checksum of its record. Without a trial
+ * The flight of another campaign that a warm start begins from, with the checksum of its record. Without a trial
  * number it is the best valid one; the checksum is filled in.
  */
 export type DonorOutput = {
@@ -992,7 +997,7 @@ export type DonorOutput = {
 /**
  * Drift
  *
- * The first gains' last flight against their first: `confidence` that anything has changed.
+ * The first gains' last flight compared with their first: `confidence` that anything has changed.
  */
 export type Drift = {
     /**
@@ -1024,7 +1029,7 @@ export type Drift = {
 /**
  * Estimate
  *
- * One calibration: after which of the vehicle's flights, counted over all its campaigns.
+ * One calibration. `flight` counts the vehicle's flights over all its campaigns.
  */
 export type Estimate = {
     /**
@@ -1056,7 +1061,8 @@ export type Estimate = {
 /**
  * ExperimentInfo
  *
- * `output` is the channel that is scored. Without a model nothing is foretold, and gains are chosen by hand.
+ * An experiment. `output` is the channel that is scored. Without a model there are no predictions, and gains are
+ * chosen by hand.
  */
 export type ExperimentInfo = {
     /**
@@ -1192,7 +1198,7 @@ export type FigureCard = {
 /**
  * FigureColumn
  *
- * One column of a figure's table; `digits` after the point, null for text.
+ * One column of a figure's table; `digits` after the decimal point, null for text.
  */
 export type FigureColumn = {
     /**
@@ -1216,7 +1222,7 @@ export type FigureColumn = {
 /**
  * FigureTable
  *
- * The figure's data in numbers.
+ * The figure's data as a table.
  */
 export type FigureTable = {
     /**
@@ -1232,7 +1238,7 @@ export type FigureTable = {
 /**
  * Finish
  *
- * Why the operator ends the campaign.
+ * Why the operator finishes the campaign.
  */
 export type Finish = {
     /**
@@ -1244,7 +1250,7 @@ export type Finish = {
 /**
  * FittedNumber
  *
- * A parameter of the model with its standard error.
+ * A fitted parameter of the model with its standard error.
  */
 export type FittedNumber = {
     /**
@@ -1308,8 +1314,8 @@ export type FittedParameter = {
 /**
  * FlightBrief
  *
- * The last order to the vehicle for this trial. `problem` says why it failed. One of mode `stage` waits with its
- * gains on the vehicle until its operator asks for the take-off.
+ * The last flight requested for this trial. `problem` says why it failed. A flight of mode `stage` waits with its
+ * gains on the vehicle until its operator requests the take-off.
  */
 export type FlightBrief = {
     /**
@@ -1432,7 +1438,7 @@ export type FlightDifference = {
 /**
  * FlightOrder
  *
- * How a simulated flight is to run: simulated time over wall time, null as fast as possible.
+ * Speed of a simulated flight: simulated time over wall time; null: as fast as possible.
  */
 export type FlightOrder = {
     /**
@@ -1510,7 +1516,7 @@ export type FlightSetting = {
 /**
  * FlightState
  *
- * One order to a vehicle: the worker's queue, and the ledger of what the vehicle was given.
+ * States of one request to a vehicle: the worker's queue, and the ledger of the gains that the vehicle was given.
  *
  * requested ──→ running ──→ landed | aborted | failed | lost | cancelled
  * └──→ cancelled
@@ -1520,7 +1526,7 @@ export type FlightState = 'requested' | 'running' | 'landed' | 'aborted' | 'fail
 /**
  * FlightsToDecide
  *
- * Further flights after which a difference that stays as it is would be decided.
+ * Further flights of each gain set after which an unchanged difference would be decided.
  */
 export type FlightsToDecide = {
     /**
@@ -1536,7 +1542,7 @@ export type FlightsToDecide = {
 /**
  * FlyingTrial
  *
- * The trial whose flight is asked for or under way.
+ * The trial whose flight is requested or under way.
  */
 export type FlyingTrial = {
     /**
@@ -1626,7 +1632,7 @@ export type GainInfo = {
 /**
  * Gate
  *
- * What the gate said about a gain set before its flight.
+ * The gate's result for a gain set before its flight.
  */
 export type Gate = {
     /**
@@ -1642,7 +1648,7 @@ export type Gate = {
 /**
  * GivenGains
  *
- * One line of a vehicle's ledger: the gains it was asked to take, for what, and those it said it had.
+ * One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back.
  */
 export type GivenGains = {
     /**
@@ -1690,7 +1696,7 @@ export type GivenGains = {
 /**
  * Glitch
  *
- * What the record cannot have seen: between the last good sample before it and the first good one after.
+ * A part of the record that cannot be real, between the last good sample before it and the first good one after.
  */
 export type Glitch = {
     /**
@@ -1714,8 +1720,8 @@ export type Glitch = {
 /**
  * GroupBrief
  *
- * The valid flights of one gain set: their mean with its standard error, from the scatter pooled over the
- * campaign, null while that is not known.
+ * The valid flights of one gain set: their mean and its standard error, from the scatter pooled over the campaign;
+ * null while that is not known.
  */
 export type GroupBrief = {
     /**
@@ -1735,7 +1741,8 @@ export type GroupBrief = {
 /**
  * Health
  *
- * `vehicles_not_answering`: those that no order reaches, because the process that has their link stands still.
+ * Health of the server. `vehicles_not_answering`: vehicles that commands do not reach, because the process that has
+ * their link does not answer.
  */
 export type Health = {
     /**
@@ -1759,7 +1766,7 @@ export type Health = {
 /**
  * Identity
  *
- * Who answers at the other end of the link; pinned at the first connection that leaves nothing to decide.
+ * Identity that the vehicle reports over its link; pinned at the first connection without a concern.
  */
 export type Identity = {
     /**
@@ -1787,7 +1794,7 @@ export type Identity = {
 /**
  * Interval
  *
- * Where an error is expected, with probability `confidence`.
+ * Interval that contains an error with probability `confidence`.
  */
 export type Interval = {
     /**
@@ -1807,7 +1814,7 @@ export type Interval = {
 /**
  * Job
  *
- * Numeric work: a proposal, a reproduction.
+ * Numeric work, such as a proposal or a reproduction.
  */
 export type Job = {
     /**
@@ -1875,7 +1882,7 @@ export type Job = {
 /**
  * JobLog
  *
- * The last lines about a job, the oldest first; `total` counts all that are kept.
+ * The last lines about a job, oldest first; `total` counts all that are kept.
  */
 export type JobLog = {
     /**
@@ -1921,13 +1928,13 @@ export type JobLogLine = {
 /**
  * JobState
  *
- * Numeric work. It is pure, so a job whose worker died simply waits again.
+ * States of numeric work. It is pure, so a job whose worker died is queued again.
  *
  * queued ──→ running ──→ done
  * ↑  │        ├──────→ failed ───→ queued (retried)
  * │  │        ├──────→ cancelled ─→ queued (retried)
  * │  └─→ cancelled
- * └───────────┘ the worker went away
+ * └───────────┘ the worker died or shut down
  */
 export type JobState = 'queued' | 'running' | 'done' | 'failed' | 'cancelled';
 
@@ -1987,7 +1994,7 @@ export type LatestRun = {
 /**
  * Lease
  *
- * Control of a vehicle until then. The token goes into the header X-Gainline-Control of what needs it.
+ * Control of a vehicle until then. Requests that need it send the token in the header X-Gainline-Control.
  */
 export type Lease = {
     /**
@@ -2007,7 +2014,7 @@ export type Lease = {
 /**
  * LeaseRequest
  *
- * Take control, renew it with the token of the lease that one has, or take over from somebody else.
+ * Take control, renew it with the token of your lease, or take over from another operator.
  */
 export type LeaseRequest = {
     /**
@@ -2027,7 +2034,7 @@ export type LeaseRequest = {
 /**
  * NewCampaign
  *
- * A campaign to be created; what is left out has a working default.
+ * A campaign to be created; omitted fields have working defaults.
  */
 export type NewCampaignInput = {
     /**
@@ -2041,7 +2048,7 @@ export type NewCampaignInput = {
 /**
  * NewCampaign
  *
- * A campaign to be created; what is left out has a working default.
+ * A campaign to be created; omitted fields have working defaults.
  */
 export type NewCampaignOutput = {
     /**
@@ -2055,8 +2062,8 @@ export type NewCampaignOutput = {
 /**
  * NewTrial
  *
- * A trial of a proposal, of gains of one's own, or of a variant: exactly one of the three. With `fly` it is flown
- * at once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
+ * A trial of a proposal, of your own gains, or of a variant: exactly one of the three. With `fly` it is flown at
+ * once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
  * `baseline`, the first flight's gains again.
  */
 export type NewTrial = {
@@ -2090,8 +2097,8 @@ export type NewTrial = {
 /**
  * NewVehicle
  *
- * A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real one a person
- * has looked at them (`safe_gains_confirmed`), and says so in `statement`.
+ * A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real vehicle a
+ * person has to confirm them (`safe_gains_confirmed`) and say so in `statement`.
  */
 export type NewVehicle = {
     /**
@@ -2127,7 +2134,7 @@ export type NewVehicle = {
 /**
  * NextFlight
  *
- * Where the next proposal stands. While a new one is computed, `proposal` may be the stale one before it.
+ * State of the next proposal. While a new one is computed, `proposal` may be the stale one before it.
  */
 export type NextFlight = {
     /**
@@ -2178,8 +2185,8 @@ export type OptionInfo = {
 /**
  * OrderAnswer
  *
- * `accepted` once the process that has the vehicle's link has passed the order on; what comes of it is seen in the
- * vehicle's status. When it is false, `sentence` says why, and the order is not carried out later.
+ * `accepted` is true once the process that has the vehicle's link has forwarded the command; the effect is seen in
+ * the vehicle's status. When it is false, `sentence` says why, and the command is not carried out later.
  */
 export type OrderAnswer = {
     /**
@@ -2367,7 +2374,7 @@ export type PresetInfo = {
 /**
  * Promotion
  *
- * Who makes the best gains the vehicle's safe ones, and why; `version` is the vehicle's.
+ * Who makes the best gains the vehicle's safe gains, and why; `version` is the vehicle's.
  */
 export type Promotion = {
     /**
@@ -2385,8 +2392,8 @@ export type Promotion = {
 /**
  * Proposal
  *
- * The next gain set, from one history. Stale as soon as that history has changed. `recommended` is the advice's
- * kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so.
+ * The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
+ * advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so.
  */
 export type Proposal = {
     /**
@@ -2443,8 +2450,8 @@ export type Proposal = {
 /**
  * RecordBrief
  *
- * The stored record of a flight, without its samples. `ending`: whether the flight was broken off, or its
- * measurement is no good.
+ * The stored record of a flight, without its samples. `ending`: whether the flight was completed, was aborted, or
+ * has an invalid measurement.
  */
 export type RecordBrief = {
     /**
@@ -2488,8 +2495,8 @@ export type RecordBrief = {
 /**
  * Rehearsal
  *
- * Whether a campaign on a real vehicle was flown on a simulation first, which has to be `passed` before anything is
- * staged. `campaign_id` is the rehearsal's own campaign; `reason` says why it stands so.
+ * Whether a campaign on a real vehicle was first flown on a simulation, which has to be `passed` before a trial can
+ * be staged. `campaign_id` is the rehearsal's own campaign; `reason` explains the state.
  */
 export type Rehearsal = {
     /**
@@ -2509,7 +2516,7 @@ export type Rehearsal = {
 /**
  * Release
  *
- * Who has looked at the vehicle, and found what.
+ * Statement of who has looked at the vehicle and what they found.
  */
 export type Release = {
     /**
@@ -2724,7 +2731,7 @@ export type ReproductionSummary = {
 /**
  * Retune
  *
- * Whether the vehicle is to be tuned again: `since` is the flight after which it was tuned last.
+ * Whether the vehicle should be tuned again; `since` is the flight after which it was last tuned.
  */
 export type Retune = {
     /**
@@ -2793,8 +2800,8 @@ export type SparkCurve = {
 /**
  * Start
  *
- * Where the first flight's gains come from; `gains` with kind `given`, `donor` with `campaign`, whose gains are
- * filled in.
+ * Where the first flight's gains come from. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
+ * gains are filled in.
  */
 export type StartInput = {
     /**
@@ -2813,8 +2820,8 @@ export type StartInput = {
 /**
  * Start
  *
- * Where the first flight's gains come from; `gains` with kind `given`, `donor` with `campaign`, whose gains are
- * filled in.
+ * Where the first flight's gains come from. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
+ * gains are filled in.
  */
 export type StartOutput = {
     /**
@@ -2833,10 +2840,10 @@ export type StartOutput = {
 /**
  * StopRule
  *
- * `paper`: two flights in a row without `improvement` (a share of the best) on the best so far, or the budget;
- * `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
- * the baseline; `budget`: only the number of flights ends the campaign. With every kind a flight that ends below
- * `min_battery_v` ends it.
+ * `paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
+ * the budget. `noise`: ends when no remaining difference can be told from noise with `confidence`, after the winner
+ * was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
+ * kind a flight that ends below `min_battery_v` ends it.
  */
 export type StopRuleInput = {
     /**
@@ -2864,10 +2871,10 @@ export type StopRuleInput = {
 /**
  * StopRule
  *
- * `paper`: two flights in a row without `improvement` (a share of the best) on the best so far, or the budget;
- * `noise`: nothing left that flights could tell from noise with `confidence`, the winner flown again and compared with
- * the baseline; `budget`: only the number of flights ends the campaign. With every kind a flight that ends below
- * `min_battery_v` ends it.
+ * `paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
+ * the budget. `noise`: ends when no remaining difference can be told from noise with `confidence`, after the winner
+ * was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
+ * kind a flight that ends below `min_battery_v` ends it.
  */
 export type StopRuleOutput = {
     /**
@@ -2895,7 +2902,7 @@ export type StopRuleOutput = {
 /**
  * StopVerdict
  *
- * Whether the campaign's own rule says that it is over, and why.
+ * Whether the campaign's stop rule ends it, and why.
  */
 export type StopVerdict = {
     /**
@@ -2921,7 +2928,7 @@ export type StopVerdict = {
 /**
  * StrategyInfo
  *
- * `experiments` names those that it works with.
+ * A strategy. `experiments` names those that it works with.
  */
 export type StrategyInfo = {
     /**
@@ -2949,8 +2956,9 @@ export type StrategyInfo = {
 /**
  * System
  *
- * `addresses` are those under which other devices reach this server, the likeliest first: none on loopback, and
- * `in_container` its own, which need not be the host's. `exposes` ends the sentence "It listens on …, so".
+ * This server. `addresses` are those under which other devices reach it, the likeliest first: none on loopback, and
+ * with `in_container` the container's own, which need not be the host's. `exposes` ends the sentence "It listens on …,
+ * so".
  */
 export type System = {
     /**
@@ -3042,7 +3050,7 @@ export type TrackRecord = {
 /**
  * Trajectory
  *
- * A flight's record, thinned to the asked number of points; every channel has as many values as `time_s`.
+ * A flight's record, thinned to the requested number of points; every channel has as many values as `time_s`.
  */
 export type Trajectory = {
     /**
@@ -3088,7 +3096,7 @@ export type Trajectory = {
 /**
  * Trend
  *
- * Slope of the error of the gains flown most, with its interval, 90 %.
+ * Slope of the error of the gains flown most often, with its 90 % interval.
  */
 export type Trend = {
     /**
@@ -3120,7 +3128,7 @@ export type Trend = {
 /**
  * Trial
  *
- * One flight of one policy. `error` is the performance measure, lower is better.
+ * One flight of one policy. `error` is the performance measure; lower is better.
  */
 export type Trial = {
     /**
@@ -3265,9 +3273,9 @@ export type Trial = {
 /**
  * TrialComparison
  *
- * The flight's gains against those of another one, each with all their flights. `difference` is this − other;
- * `confidence` is that of the likelier direction, and decides from 90 % on; null, as the standard error is, while
- * nobody knows how much flights scatter.
+ * The flight's gains compared with those of another one, each with all their flights. `difference` is this − other.
+ * `confidence` is that of the likelier direction; 90 % or more decides. `confidence` and `standard_error` are null
+ * while the scatter of flights is not known.
  */
 export type TrialComparison = {
     /**
@@ -3299,7 +3307,7 @@ export type TrialComparison = {
 /**
  * TrialCounts
  *
- * Trials by what became of them; `flown` are those with a record or a known end.
+ * Number of trials by their state; `flown` are those that left the ground.
  */
 export type TrialCounts = {
     /**
@@ -3331,7 +3339,7 @@ export type TrialCounts = {
 /**
  * TrialEdit
  *
- * A person's note.
+ * A change of a trial's note.
  */
 export type TrialEdit = {
     /**
@@ -3373,25 +3381,25 @@ export type TrialPhoto = {
 /**
  * TrialState
  *
- * One policy, flown once.
+ * States of one policy that is flown once.
  *
  * planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
  * │  ↑───────┘ │        ├──→ aborted
  * │            │        ├──→ lost ──→ captured (record recovered) | invalid
- * │            │        └──→ planned (the vehicle was never told to take off)
+ * │            │        └──→ planned (no take-off command was sent)
  * ├────────────┴──→ cancelled
  * └──→ captured (flown elsewhere, imported)
  *
- * valid ↔ invalid and aborted ↔ invalid, with a reason; whatever was computed from the flight is computed again.
- * staged: every gain was written and read back. lost: nobody knows how the flight ended; it is never flown again by
- * itself.
+ * valid ↔ invalid and aborted ↔ invalid, with a reason; whatever was computed from the flight is recomputed. staged:
+ * every gain was written and read back. lost: it is unknown how the flight ended; it is never flown again
+ * automatically.
  */
 export type TrialState = 'planned' | 'staged' | 'flying' | 'captured' | 'valid' | 'aborted' | 'invalid' | 'cancelled' | 'lost';
 
 /**
  * Trouble
  *
- * Why something is not to be had at present, and what to do about it.
+ * Why something is not available at present, and what to do about it.
  */
 export type Trouble = {
     /**
@@ -3411,8 +3419,8 @@ export type Trouble = {
 /**
  * Vehicle
  *
- * Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it said it has,
- * at `held_at`. A simulation that is shared by campaigns is not `registered`, and keeps no link.
+ * Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it reported at
+ * `held_at`. A simulation that is shared by campaigns is not `registered` and has no link.
  */
 export type Vehicle = {
     /**
@@ -3510,8 +3518,8 @@ export type Vehicle = {
 /**
  * VehicleAct
  *
- * What a vehicle was asked beside its flights, by whom and why, and what came of it. `result` of a check holds its
- * items, of `parameters` every parameter of the vehicle.
+ * A request to a vehicle beside its flights: by whom and why, and its outcome. `result` holds the items of a check,
+ * or all parameters of the vehicle for `parameters`.
  */
 export type VehicleAct = {
     /**
@@ -3571,7 +3579,7 @@ export type VehicleAct = {
 /**
  * VehicleCalibration
  *
- * What the flights say about the vehicle, the oldest calibration first, and whether it still is as it was tuned.
+ * The vehicle's calibrations, oldest first, and whether the vehicle has changed since it was tuned.
  */
 export type VehicleCalibration = {
     /**
@@ -3616,7 +3624,7 @@ export type VehicleCheck = {
 /**
  * VehicleChoice
  *
- * Which vehicle flies: a simulation by its kind with its settings, where one left out has its default, or a
+ * The vehicle of a campaign: a simulation by its kind with its settings, where an omitted one has its default, or a
  * registered vehicle by its id, which has settings of its own.
  */
 export type VehicleChoiceInput = {
@@ -3639,7 +3647,7 @@ export type VehicleChoiceInput = {
 /**
  * VehicleChoice
  *
- * Which vehicle flies: a simulation by its kind with its settings, where one left out has its default, or a
+ * The vehicle of a campaign: a simulation by its kind with its settings, where an omitted one has its default, or a
  * registered vehicle by its id, which has settings of its own.
  */
 export type VehicleChoiceOutput = {
@@ -3662,8 +3670,9 @@ export type VehicleChoiceOutput = {
 /**
  * VehicleEdit
  *
- * Changes of a registered vehicle; what is left out stays. Options change only while it is disconnected, and let
- * the next connection pin the identity anew; safe gains need a statement by whom and why.
+ * Changes of a registered vehicle; omitted fields stay as they are. Options can change only while it is
+ * disconnected, and the next connection then pins the identity anew; safe gains need a statement of who decided and
+ * why.
  */
 export type VehicleEdit = {
     /**
@@ -3701,8 +3710,8 @@ export type VehicleEdit = {
 /**
  * VehicleKindInfo
  *
- * `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those that it can fly.
- * Vehicles of a kind that is `registered` are made one by one, and chosen by their id.
+ * A kind of vehicle. `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those
+ * that it can fly. Vehicles of a kind that is `registered` are registered one by one and chosen by their id.
  */
 export type VehicleKindInfo = {
     /**
@@ -3754,14 +3763,14 @@ export type VehicleOrder = {
 /**
  * VehicleState
  *
- * What may be asked of a vehicle.
+ * States of a vehicle.
  *
  * disconnected ←→ ready ←→ staged ──→ flying ──→ ready
  * ↑           ↑         └──────────┴──→ quarantined
  * └───────────┴── released by a person ──────┘
  *
- * Quarantined: something could not be verified, for instance that the safe gains are back. It flies nothing until a
- * person has looked at it and releases it.
+ * Quarantined: something could not be verified, for instance that the safe gains are restored. The vehicle is grounded
+ * until a person has looked at it and releases it.
  */
 export type VehicleState = 'disconnected' | 'ready' | 'staged' | 'flying' | 'quarantined';
 
@@ -3782,8 +3791,8 @@ export type VehicleTrouble = {
 /**
  * ProblemField
  *
- * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds values of gains that
- * would pass, by name, where any are known.
+ * One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
+ * pass, by name, where any are known.
  */
 export type ProblemField = {
     /**
@@ -3805,7 +3814,7 @@ export type ProblemField = {
 /**
  * Problem
  *
- * An error (RFC 9457): what happened, what to do about it, and which fields are to blame.
+ * An error (RFC 9457): what happened, what to do about it, and the fields concerned.
  */
 export type Problem = {
     /**
