@@ -30,7 +30,7 @@ _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
 _DISARMED: Final = "disarmed"
-VERSION_ATTEMPTS: Final = 2
+_VERSION_ATTEMPTS: Final = 2
 _NAME_ATTEMPTS: Final = 2
 _CHECKS_ATTEMPTS: Final = 2
 _NO_POSITION: Final = "Wait until it knows where it is (GPS, cameras or its own sensors), then check again."
@@ -121,12 +121,12 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     return problem
 
 
-def identify(radio: AutopilotLink, *, attempts: int = VERSION_ATTEMPTS) -> None:
+def identify(radio: AutopilotLink) -> None:
     """Ask a vehicle that has not told its version and its hardware's id, or not since it was last away. Some never
     answer, and Paparazzi tells unasked."""
     asking = radio.profile.ask_version(radio.aim)
     if asking is not None and not radio.seen.version and not radio.seen.uid:
-        radio.request(asking, lambda heard: isinstance(heard, Version), attempts=attempts)
+        radio.request(asking, lambda heard: isinstance(heard, Version), attempts=_VERSION_ATTEMPTS)
 
 
 def _has(radio: AutopilotLink, parameter: str) -> bool:
@@ -163,7 +163,7 @@ def identity_change(radio: AutopilotLink, pinned: Identity | None) -> str:
 def is_another(radio: AutopilotLink, pinned: Identity | None) -> bool:
     """By its hardware's id, where it and the pinned one have told theirs."""
     uid = radio.seen.uid
-    return pinned is not None and len(uid) == len(pinned.uid) > 0 and uid != pinned.uid
+    return pinned is not None and bool(uid and pinned.uid) and uid != pinned.uid
 
 
 def is_armed(radio: AutopilotLink) -> bool:

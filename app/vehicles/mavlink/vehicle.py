@@ -20,7 +20,6 @@ from app.vehicles.mavlink.machine import Plan, Trial
 from app.vehicles.mavlink.opening import limits_of, open_radio
 from app.vehicles.mavlink.orders import RepeatedCommand
 from app.vehicles.mavlink.preflight import Ground
-from app.vehicles.mavlink.radio import ATTEMPTS
 from app.vehicles.mavlink.signals import Action, PacketReceived, RecordSample
 from app.vehicles.mavlink.sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.states import QUARANTINE_STATES, TRANSITIONS, State
@@ -171,12 +170,9 @@ class MavlinkVehicle:
     @property
     def identity(self) -> Identity:
         """As it tells it, with some only after a while; what it has not told is as it was pinned."""
-        return self._told_identity.completed_by(self._pinned)
-
-    @property
-    def _told_identity(self) -> Identity:
         radio, seen = self._radio, self._radio.seen
-        return Identity(system_id=radio.aim.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid)
+        told = Identity(system_id=radio.aim.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid)
+        return told.completed_by(self._pinned)
 
     @property
     def concern(self) -> str:
@@ -263,13 +259,12 @@ class MavlinkVehicle:
         pinned one in what that person has not seen; it stays as it was then."""
         seen = self._why
         self._await_heartbeat()
-        preflight.identify(self._radio)
-        self._listen(0.0)
+        self._identify()
         if (change := preflight.identity_change(self._radio, self._pinned)) not in seen:
             raise SafeGainsError(change, hint=_ANOTHER)
         if preflight.is_another(self._radio, self._pinned):
             self._parameters = self._trial_parameters()
-        pinned, self._pinned, self._decided = self._pinned, self._told_identity, True
+        pinned, self._pinned, self._decided = self._pinned, self.identity, True
         try:
             self._set_up()
         except BaseException:
@@ -340,16 +335,9 @@ class MavlinkVehicle:
             self._listen(_LISTEN_S)
 
     def _identify(self) -> None:
-        """Before anything is written: one that has been away may be another by now. Raises VehicleError when the pinned
-        one's hardware id is known, and this one does not tell its own."""
-        is_known = self._pinned is not None and bool(self._pinned.uid)
-        preflight.identify(self._radio, attempts=ATTEMPTS if is_known else preflight.VERSION_ATTEMPTS)
+        """Before anything is written: one that has been away may be another by now."""
+        preflight.identify(self._radio)
         self._listen(0.0)
-        if is_known and not self._radio.seen.uid:
-            raise VehicleError(
-                "The vehicle did not tell its hardware id, so it may be another one; nothing was written.",
-                hint="Try again. If it never tells it any more, release it.",
-            )
 
     def _listen(self, timeout_s: float) -> None:
         """Between flights: a vehicle that somebody else arms, or that tells another version or hardware id than the
