@@ -11,7 +11,7 @@ import typer
 from app.core.errors import GainlineError
 
 if TYPE_CHECKING:
-    from app.settings import Settings
+    from app.common.settings import Settings
 
 P = ParamSpec("P")
 
@@ -377,7 +377,7 @@ def check(
 
 def _settings(**given: str | int | Path | None) -> "Settings":
     """The environment's settings with what was given on the command line in place of them."""
-    from app.settings import read_settings
+    from app.common.settings import read_settings
 
     return read_settings({name: value for name, value in given.items() if value is not None})
 

@@ -30,10 +30,10 @@ import httpx2
 from pydantic import BaseModel, ValidationError
 
 from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal
+from app.common.schemas import OptionValue, Page
+from app.common.schemas import Problem as ProblemDetails
 from app.core.errors import GainlineError, Problem
 from app.fleet.schemas import VehicleChoice
-from app.schemas import OptionValue, Page
-from app.schemas import Problem as ProblemDetails
 from app.trials.schemas import AbortAnswer, AbortJudgement, Classification, FlightOrder, NewTrial, Trajectory, Trial
 from app.trials.states import FlightState, TrialState
 

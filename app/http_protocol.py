@@ -10,8 +10,8 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.server import ServerState
 
+from app.common.settings import is_loopback
 from app.connections import Connection, Connections, Phase
-from app.settings import is_loopback
 
 MAX_HEAD_BYTES: Final = 64 * 1024
 """Maximum size of the request line and the headers together."""

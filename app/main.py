@@ -10,6 +10,7 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
+from app.accounts.keyring import Keyring
 from app.api import catalogue, errors, events, figures, landscapes, system, unlock, vehicle_figures
 from app.api.access import AccessMiddleware
 from app.api.assets import Assets
@@ -18,18 +19,17 @@ from app.api.limits import BodyLimitMiddleware
 from app.api.openapi import describe
 from app.bundles.router import router as bundles
 from app.campaigns.router import router as campaigns
+from app.common.errors import NotFoundError
+from app.common.settings import Settings
 from app.compare.router import router as compare
 from app.controller_checks.router import recordings
 from app.controller_checks.router import router as controller_checks
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.errors import NotFoundError
 from app.fleet.router import router as fleet
 from app.jobs.router import router as jobs
-from app.keyring import Keyring
 from app.live.link import live_link
 from app.reports.router import router as reports
-from app.settings import Settings
 from app.studies.router import router as reproductions
 from app.trials.router import records
 from app.trials.router import router as trials

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from app.settings import is_loopback
+from app.common.settings import is_loopback
 
 EXPOSES: Final = (
     "anybody who can reach this machine over the network can see every campaign, and who has opened a link of "

@@ -12,14 +12,14 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Final
 
-from app.data_dir import make_private, prepare_data_dir
+from app.common.data_folder import make_private, prepare_data_dir
+from app.common.errors import AddressError, AlreadyRunningError, Problem
+from app.common.logging import configure_logs
+from app.common.settings import Settings
 from app.db.revision import is_current
-from app.errors import AddressError, AlreadyRunningError, Problem
-from app.locks import LockedError, exclusive
 from app.network import exposure, web_address
-from app.observability import configure_logs
-from app.settings import Settings
-from app.supervisor import Supervisor
+from app.processes.locks import LockedError, exclusive
+from app.processes.supervisor import Supervisor
 from app.worker_process import run_worker_process
 
 THREAD_SWITCH_INTERVAL_S: Final = 0.001

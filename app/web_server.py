@@ -14,15 +14,15 @@ from typing import Final
 import structlog
 import uvicorn
 
+from app.accounts.keyring import Keyring
+from app.common.settings import Settings, is_loopback
 from app.connections import Connections, room_for_connections
 from app.core.clock import REAL_TIME
 from app.db.outbox import latest_event_id
 from app.http_protocol import LimitedProtocol
-from app.keyring import Keyring
 from app.main import create_app
 from app.network import addresses_elsewhere, unlock_link, web_address
 from app.qr import qr_text
-from app.settings import Settings, is_loopback
 
 STREAMS_END_WITHIN_S: Final = 3
 TICKS_A_SECOND: Final = 10

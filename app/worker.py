@@ -26,21 +26,21 @@ from app.campaigns.computation import warm_up
 from app.campaigns.landscapes import LANDSCAPE_JOB
 from app.campaigns.proposing import PROPOSAL_JOB
 from app.campaigns.tasks import LandscapeJob, ProposalJob
+from app.common.data_folder import make_private, prepare_data_dir
+from app.common.errors import AlreadyRunningError, StorageError
+from app.common.logging import configure_logs
+from app.common.settings import Settings, is_loopback
 from app.core.clock import REAL_TIME, Clock
-from app.data_dir import make_private, prepare_data_dir
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.errors import AlreadyRunningError, StorageError
 from app.fleet.tasks import VehicleConnectionManager
 from app.jobs.tasks import JobRunner, recover
 from app.live.address import live_address
 from app.live.messages import PublishedMessage, WorkerHello
 from app.live.server import LiveServer
 from app.live.watch import DatabaseWatch
-from app.locks import LockedError, exclusive
-from app.observability import configure_logs
-from app.pool import ComputePool
-from app.settings import Settings, is_loopback
+from app.processes.locks import LockedError, exclusive
+from app.processes.pool import ComputePool
 from app.studies.service import REPRODUCTION_JOB
 from app.studies.tasks import ReproductionJob
 from app.trials.flying import AbortRegistry

@@ -2,8 +2,8 @@
 
 import signal
 
+from app.common.settings import Settings
 from app.processes import start_loading
-from app.settings import Settings
 
 
 def run_worker_process(settings: Settings) -> None:

@@ -24,7 +24,7 @@ from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
 from app.jobs.tasks import JobRunner
-from app.pool import ComputePool
+from app.processes.pool import ComputePool
 from app.trials import flights
 from app.trials import service as trials
 from app.trials.schemas import FlightOrder, NewTrial

@@ -14,6 +14,7 @@ from app.campaigns.definitions import definition_of, frozen_digest
 from app.campaigns.proposing import gate_json
 from app.campaigns.schemas import NewCampaign
 from app.campaigns.states import CampaignState
+from app.common.settings import Settings
 from app.core.definition import Definition
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.gate import check_policy
@@ -24,7 +25,6 @@ from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, Trajecto
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
 from app.jobs.states import JobState
-from app.settings import Settings
 from app.trials import history
 from app.trials.codec import pack
 from app.trials.scoring import score

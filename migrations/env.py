@@ -5,10 +5,10 @@ from typing import Literal
 from alembic import context
 from sqlalchemy import Connection, Enum
 
+from app.common.settings import Settings
 from app.db.models import Base
 from app.db.session import open_engine
 from app.db.types import UtcDateTime
-from app.settings import Settings
 
 
 def run_migrations(connection: Connection) -> None:

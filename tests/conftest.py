@@ -11,10 +11,10 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from sqlalchemy import event
 
+from app.common.settings import Settings
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.main import create_app
-from app.settings import Settings
 from tests.unlocking import client_here
 
 # Errors that a test provokes are logged with their places, not with every value there, which takes seconds to print.

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from app.access import Key
+from app.accounts.keyring import Keyring
+from app.accounts.permissions import Key
 from app.campaigns.schemas import Definition, StopRule
 from app.client import (
     Client,
@@ -17,9 +18,8 @@ from app.client import (
     RefusedError,
     UnavailableError,
 )
+from app.common.settings import Settings
 from app.db.session import Database
-from app.keyring import Keyring
-from app.settings import Settings
 from app.trials import flights
 from app.trials.schemas import Classification
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs

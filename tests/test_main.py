@@ -7,8 +7,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app import __version__
+from app.common.settings import Settings
 from app.main import create_app
-from app.settings import Settings
 from tests.builders import create_campaign
 from tests.unlocking import client_here
 

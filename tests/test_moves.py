@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from app.campaigns import states as campaigns
-from app.errors import ConflictError
+from app.common.errors import ConflictError
+from app.common.state_machine import allowed, check_action, check_transition, check_version
 from app.fleet import states as fleet
 from app.jobs import states as jobs
-from app.moves import allowed, check_action, check_transition, check_version
 from app.trials import states as trials
 
 # What the domain allows, written apart from the program's tables: "from: to, to". Back from flying to planned is

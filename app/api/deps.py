@@ -8,13 +8,13 @@ from fastapi import Depends, Header, Path, Query, Request
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
+from app.accounts.permissions import RequestContext
 from app.api.access import caller_of
+from app.common.errors import MediaTypeError
+from app.common.settings import Settings
 from app.db.idempotency import carry_out_once
 from app.db.session import Database
-from app.errors import MediaTypeError
-from app.fleet.control import RequestContext
 from app.live.link import Live as LiveLink
-from app.settings import Settings
 
 M = TypeVar("M", bound=BaseModel)
 

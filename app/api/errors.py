@@ -12,7 +12,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
-from app.errors import (
+from app.common.errors import (
     BusyError,
     ConflictError,
     GainlineError,
@@ -28,8 +28,8 @@ from app.errors import (
     UnavailableError,
     UnconfirmedError,
 )
+from app.common.schemas import Problem, ProblemField
 from app.live.client import LinkDownError
-from app.schemas import Problem, ProblemField
 
 MEDIA_TYPE: Final = "application/problem+json"
 

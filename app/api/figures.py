@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.api.deps import Id, Reader
 from app.campaigns import drawing
-from app.errors import InputError, Problem
+from app.common.errors import InputError, Problem
 from app.figures.base import Card
 from app.figures.history import Range
 from app.figures.theme import ThemeName

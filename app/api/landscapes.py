@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.access import Permission, is_allowed
+from app.accounts.permissions import Permission, is_allowed
 from app.api.deps import CurrentDatabase, Id, RequestContextDep
 from app.api.figures import FigureCard, Theme, figure_card
 from app.campaigns import landscapes

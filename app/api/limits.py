@@ -9,7 +9,7 @@ from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import GainlineError, Problem, TooLargeError
+from app.common.errors import GainlineError, Problem, TooLargeError
 
 JSON_BYTES: Final = 2**20
 """Largest JSON body."""

@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.constants import REF_TEMPLATE
 
-from app.schemas import Problem
+from app.common.schemas import Problem
 
 
 def describe(app: FastAPI) -> None:

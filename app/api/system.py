@@ -11,10 +11,10 @@ from pydantic import BaseModel
 
 from app import __version__
 from app.api.deps import CurrentDatabase, CurrentSettings, Live
-from app.data_dir import folder_bytes
+from app.common.data_folder import folder_bytes
+from app.common.errors import InputError, Problem
 from app.db.backup import database_bytes, take_backup
 from app.db.migrate import revision_of
-from app.errors import InputError, Problem
 from app.network import EXPOSES, addresses_elsewhere, exposure, is_in_container
 from app.qr import qr_svg
 from app.trials.integrity import require_intact

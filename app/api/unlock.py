@@ -6,9 +6,9 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 from pydantic import BaseModel
 
-from app.access import UNLOCK_HINT, Caller, Key, Permission, RequestOrigin, is_allowed
+from app.accounts.keyring import LINK_VALID_S, Keyring
+from app.accounts.permissions import UNLOCK_HINT, Caller, Key, Permission, RequestOrigin, is_allowed
 from app.api.access import caller_of
-from app.keyring import LINK_VALID_S, Keyring
 
 router = APIRouter(tags=["system"])
 

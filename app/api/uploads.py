@@ -12,7 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from app.api.deps import CurrentDatabase, IdempotencyKey, IdempotentRequest, fingerprint
-from app.errors import InputError, MediaTypeError, Problem
+from app.common.errors import InputError, MediaTypeError, Problem
 
 _IN_MEMORY_BYTES: Final = 2**20
 _CHUNK_BYTES: Final = 2**18

@@ -12,12 +12,12 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.campaigns.schemas import Definition
 from app.campaigns.states import CampaignState, Outcome
+from app.common.schemas import Gate, Interval, Name, OptionValue
 from app.core.advice import Advice
 from app.core.spread import ParameterDistribution
 from app.core.stopping import StopVerdict
 from app.core.strategies.base import Explanation
 from app.core.strategies.base import Kind as ProposalKind
-from app.schemas import Gate, Interval, Name, OptionValue
 from app.trials.schemas import Glitch
 from app.trials.states import AbortCause, Ending, TrialKind, TrialState
 

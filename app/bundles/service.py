@@ -11,8 +11,8 @@ from app.bundles.reading import Bundle
 from app.bundles.storing import keep_telemetry, store
 from app.campaigns import service as campaigns
 from app.campaigns.schemas import Campaign
+from app.common.errors import BusyError, ConflictError
 from app.db.models import CampaignRow
-from app.errors import BusyError, ConflictError
 from app.trials import history
 
 

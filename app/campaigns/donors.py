@@ -4,9 +4,9 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.schemas import Definition, Donor, Start
+from app.common.errors import NotFoundError
 from app.core.errors import InputError, Problem
 from app.db.models import TrialRow
-from app.errors import NotFoundError
 from app.trials import history
 from app.trials.states import TrialState
 

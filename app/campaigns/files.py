@@ -8,13 +8,13 @@ from pydantic import Field, ValidationError
 
 from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
+from app.common.errors import InputError, NotFoundError, Problem
+from app.common.schemas import Number, Text
 from app.core.checking import MAX_FLIGHTS
 from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.policy import shortened
 from app.core.strategies.manual import MANUAL
-from app.errors import InputError, NotFoundError, Problem
-from app.schemas import Number, Text
 
 if TYPE_CHECKING:
     from ruamel.yaml.comments import CommentedMap

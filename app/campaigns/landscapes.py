@@ -15,10 +15,10 @@ from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
 from app.campaigns.drawing import history_of
 from app.campaigns.proposing import is_stale, read_history
+from app.common.errors import GainlineError
 from app.core.experiments import experiment_of
 from app.core.landscape import Landscape, LandscapePlan, free_gains, space_of
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
-from app.errors import GainlineError
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
 from app.figures.theme import ThemeName

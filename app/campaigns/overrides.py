@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 from app.campaigns.files import CampaignFile, with_settings
+from app.common.errors import InputError, Problem
 from app.core.experiments import get_experiment
 from app.core.strategies import STRATEGIES
-from app.errors import InputError, Problem
 from app.vehicles.open import get_kind
 
 Path = tuple[str, ...]

@@ -2,16 +2,16 @@
 
 from sqlalchemy.orm import Session
 
+from app.accounts.permissions import RequestContext
 from app.campaigns import repository
 from app.campaigns.schemas import Promotion
 from app.campaigns.service import safe_gains_changed
 from app.campaigns.statistics import standing_within_bounds_of
+from app.common.errors import ConflictError
 from app.core.confirming import ComparisonState
 from app.core.strategies.history import format_gains
 from app.core.wording import percent
 from app.db.models import CampaignRow
-from app.errors import ConflictError
-from app.fleet.control import RequestContext
 from app.fleet.registering import promote_gains
 from app.fleet.schemas import Vehicle
 from app.fleet.service import get_vehicle

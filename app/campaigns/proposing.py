@@ -15,6 +15,8 @@ from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of
 from app.campaigns.rehearsals import notify_rehearsed_campaign
 from app.campaigns.states import TRANSITIONS, CampaignState, Outcome
+from app.common.errors import ConflictError, NotFoundError
+from app.common.state_machine import check_transition
 from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
@@ -24,9 +26,7 @@ from app.core.policy import Gains, PolicySpace
 from app.core.spread import ParameterDistribution, prior_distribution
 from app.core.stopping import Reason, StopVerdict
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
-from app.errors import ConflictError, NotFoundError
 from app.jobs import service as jobs
-from app.moves import check_transition
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
 from app.trials.states import UNFLOWN, TrialState

@@ -10,9 +10,9 @@ from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import Rehearsal, RehearsalState
 from app.campaigns.states import Outcome
+from app.common.errors import ConflictError
 from app.db.models import CampaignRow
 from app.db.types import utc_now
-from app.errors import ConflictError
 from app.fleet import service as fleet
 from app.trials import history
 from app.trials.states import TrialState

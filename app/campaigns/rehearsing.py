@@ -9,8 +9,8 @@ from app.campaigns.rehearsals import notify_rehearsed_campaign, rehearsal_of
 from app.campaigns.schemas import Campaign, Definition
 from app.campaigns.service import add_campaign
 from app.campaigns.views import campaign_view
+from app.common.errors import ConflictError
 from app.db.models import CampaignRow, RehearsalRow
-from app.errors import ConflictError
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
 

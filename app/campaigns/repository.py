@@ -10,10 +10,10 @@ from sqlalchemy.orm import Session
 
 from app.campaigns.schemas import Sort
 from app.campaigns.states import CampaignState
+from app.common.errors import NotFoundError
+from app.common.schemas import Position, instant
 from app.db.models import CampaignRow, ProposalRow, RehearsalRow, VehicleRow
-from app.db.paging import Position, instant
 from app.db.types import UtcDateTime
-from app.errors import NotFoundError
 from app.trials import history
 
 _NO_ERROR: Final = 1e300

@@ -20,8 +20,8 @@ from app.campaigns.schemas import (
 )
 from app.campaigns.states import CampaignState
 from app.campaigns.statistics import campaign_statistics
+from app.common.schemas import Page
 from app.fleet.schemas import Vehicle
-from app.schemas import Page
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
 

@@ -7,11 +7,11 @@ from typing import Annotated, Final, Literal
 from pydantic import BaseModel, Field
 
 from app.campaigns.states import CampaignState, Outcome
+from app.common.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
 from app.core.advice import AdviceKind
 from app.core.statistics import Verdict
 from app.core.strategies.base import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
-from app.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
 
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
 Key = Annotated[str, Field(max_length=40)]

@@ -24,16 +24,15 @@ from app.campaigns.schemas import (
 )
 from app.campaigns.states import ACTIONS, CampaignState, Outcome
 from app.campaigns.views import campaign_view, next_flight_view, summaries
+from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
+from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
+from app.common.state_machine import check_action, check_version
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
 from app.db.models import CampaignRow, VehicleRow
-from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
-from app.moves import check_action, check_version
-from app.schemas import OptionValue, Page
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
 

@@ -7,12 +7,12 @@ import numpy as np
 import structlog
 
 from app.campaigns import computation, landscapes, proposing
+from app.common.errors import GainlineError
 from app.core.landscape import plan_grid, predict_points
 from app.db.session import Database
-from app.errors import GainlineError
 from app.jobs import service as jobs
 from app.jobs.tasks import ClaimedJob
-from app.pool import ComputePool
+from app.processes.pool import ComputePool
 
 POINTS_PER_BATCH: Final = 48
 """Number of gain sets of a landscape per request to the pool, which limits how long a proposal has to wait."""

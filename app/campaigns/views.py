@@ -26,6 +26,8 @@ from app.campaigns.schemas import (
 )
 from app.campaigns.states import ACTIONS, CampaignState
 from app.campaigns.statistics import best_trial, standing_of
+from app.common.schemas import Gate, Interval, Trouble
+from app.common.state_machine import allowed
 from app.core.confirming import ComparisonState
 from app.core.statistics import Verdict
 from app.core.strategies.base import Explanation
@@ -33,8 +35,6 @@ from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs
 from app.jobs.states import JobState
-from app.moves import allowed
-from app.schemas import Gate, Interval, Trouble
 from app.trials import history
 from app.trials.states import TrialState
 

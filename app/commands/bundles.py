@@ -8,11 +8,11 @@ from app.bundles.reading import Bundle
 from app.bundles.service import store_bundle, write_bundle
 from app.campaigns import service as campaigns
 from app.commands.console import console
+from app.common.errors import InputError, Problem
+from app.common.settings import Settings
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.errors import InputError, Problem
 from app.reports.wording import count
-from app.settings import Settings
 
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:

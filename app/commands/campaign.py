@@ -13,13 +13,13 @@ from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_
 from app.campaigns.headless import CampaignListener, HeadlessCampaign, HeadlessTrial, fly_campaign
 from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
+from app.common.data_folder import prepare_data_dir, trial_parameters_folder
+from app.common.errors import InputError, Problem
 from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.strategies.base import Proposal
 from app.core.trajectory import CHANNEL_UNITS
-from app.data_dir import prepare_data_dir, trial_parameters_folder
-from app.errors import InputError, Problem
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue, Sample
 from app.vehicles.open import get_kind

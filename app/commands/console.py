@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from app.errors import GainlineError, InputError, Problem
+from app.common.errors import GainlineError, InputError, Problem
 
 TO_STDOUT: Final = Path("-")
 WIDTH_OF_A_FILE: Final = 200

@@ -9,10 +9,10 @@ from typing import Final
 from rich.console import Console
 
 from app.commands.console import console, show_error, table, write_json
+from app.common.errors import InputError
 from app.controller_checks.checking import LogCheck, check_log, check_trace, parse_gains
 from app.core.control.replay import OUTPUTS, Replay
 from app.core.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
-from app.errors import InputError
 from app.logs.loop_trace import read_loop_trace
 
 _UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}

@@ -9,11 +9,11 @@ from rich.console import Console
 from rich.markup import escape
 
 from app.commands.console import console, write_json
+from app.common.errors import InputError, Problem, UnconfirmedError
+from app.common.settings import Settings
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.errors import InputError, Problem, UnconfirmedError
 from app.logs.takeoffs import Takeoff
-from app.settings import Settings
 from app.trials import service
 from app.trials.schemas import Trial
 

@@ -7,13 +7,13 @@ from rich.markup import escape
 
 from app.campaigns import service as campaigns
 from app.commands.console import console
+from app.common.errors import InputError, Problem
+from app.common.settings import Settings
 from app.db.migrate import require_current
 from app.db.session import Database
-from app.errors import InputError, Problem
 from app.reports.printing import print_pdf
 from app.reports.rendering import chart_library, file_name, render
 from app.reports.service import report_of
-from app.settings import Settings
 
 Format = Literal["html", "pdf"]
 

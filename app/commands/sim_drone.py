@@ -6,8 +6,8 @@ from contextlib import ExitStack, closing, contextmanager
 from types import FrameType
 
 from app.commands.console import console
+from app.common.errors import InputError, Problem
 from app.core.clock import ScaledClock
-from app.errors import InputError, Problem
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress

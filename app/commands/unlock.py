@@ -6,12 +6,12 @@ from collections.abc import Sequence
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from app.access import Key
-from app.errors import UnavailableError
-from app.keyring import LINK_VALID_S, Keyring
-from app.locks import signature
+from app.accounts.keyring import LINK_VALID_S, Keyring
+from app.accounts.permissions import Key
+from app.common.errors import UnavailableError
+from app.common.settings import Settings
 from app.network import unlock_link
-from app.settings import Settings
+from app.processes.locks import signature
 
 _ANSWERS_WITHIN_S = 5.0
 

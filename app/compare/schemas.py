@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
+from app.common.schemas import Gains, OptionValue
 from app.core.statistics import Verdict
-from app.schemas import Gains, OptionValue
 from app.trials.schemas import GroupBrief
 from app.trials.states import TrialState
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from app.common.schemas import OptionValue
 from app.compare.schemas import FlightDifference, FlightSetting
 from app.compare.sides import ComparisonFlight
 from app.core.experiments import get_experiment
@@ -9,7 +10,6 @@ from app.core.options import Option
 from app.core.strategies import STRATEGIES
 from app.db.models import CampaignRow
 from app.fleet import service as fleet
-from app.schemas import OptionValue
 from app.vehicles.base import VehicleOption
 from app.vehicles.open import VEHICLE_KINDS
 

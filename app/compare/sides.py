@@ -9,13 +9,13 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import service as campaigns_service
 from app.campaigns.definitions import definition_of
+from app.common.errors import InputError, Problem
 from app.compare import repository
 from app.compare.words import names_of
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.statistics import Group, PooledScatter, groups_of, pool_scatter
 from app.db.models import CampaignRow, TrialRow
-from app.errors import InputError, Problem
 from app.fleet import service as fleet
 from app.trials import history
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, undefer
 
+from app.common.errors import NotFoundError
 from app.db.models import ControllerCheckRow
-from app.errors import NotFoundError
 
 
 def get_one(session: Session, check_id: int) -> ControllerCheckRow:

@@ -7,9 +7,9 @@ from fastapi import APIRouter, Depends, Query, status
 from app.api.deps import CursorText, Id, IdempotentPost, Limit, Reader, Writer, json_only
 from app.api.figures import FigureCard, Theme, figure_card
 from app.api.uploads import REQUEST_BODY, Record
+from app.common.schemas import Page
 from app.controller_checks import service
 from app.controller_checks.schemas import ControllerCheck, ControllerCheckSummary
-from app.schemas import Page
 
 PREFIX = "/api/controller-checks"
 

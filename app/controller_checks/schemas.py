@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.schemas import Gains
+from app.common.schemas import Gains
 
 
 class ControllerCheckSummary(BaseModel):

@@ -6,19 +6,17 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
+from app.common.errors import NotFoundError, StorageError
+from app.common.schemas import Page, decode_cursor, encode_cursor, without_control_characters
 from app.controller_checks import repository, schemas
 from app.controller_checks.checking import check_trace, parse_gains
 from app.controller_checks.results import FIGURES, Result, examine_content, result_of
-from app.core.control_characters import without_control_characters
 from app.db.models import ControllerCheckRow
-from app.db.paging import decode_cursor, encode_cursor
-from app.errors import NotFoundError, StorageError
 from app.figures.base import Card, card_of
 from app.figures.controller import ControllerFigure
 from app.figures.theme import ThemeName
-from app.limited import FILE, run_limited
 from app.logs.loop_trace import read_loop_trace
-from app.schemas import Page
+from app.processes.sandbox import FILE, run_limited
 from app.studies.controller import RECORDED_TAKEOFF
 
 _NAME_LENGTH: Final = 120

@@ -1,4 +1,4 @@
-"""Errors of the numerical core; the application's own tree in `app.errors` has the same root.
+"""Errors of the numerical core; the application's own tree in `app.common.errors` has the same root.
 
 GainlineError
 └── InputError            unusable input

@@ -8,8 +8,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from app.common.errors import StorageError
 from app.db.session import translated
-from app.errors import StorageError
 
 _SUFFIX: Final = "gainline.sqlite3"
 SPARE_BYTES: Final = 2**28

@@ -8,9 +8,9 @@ from pydantic import BaseModel
 from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
+from app.common.errors import KeyReusedError, Problem
 from app.db.models import IdempotencyRow
 from app.db.types import utc_now
-from app.errors import KeyReusedError, Problem
 
 KEPT: Final = timedelta(days=7)
 M = TypeVar("M", bound=BaseModel)

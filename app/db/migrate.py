@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final
 
 from sqlalchemy import text
 
-from app.data_dir import prepare_data_dir
+from app.common.data_folder import prepare_data_dir
+from app.common.errors import SchemaError
 from app.db.revision import REVISION, read_revision
 from app.db.session import open_engine, translated
-from app.errors import SchemaError
 
 if TYPE_CHECKING:
     from alembic.config import Config

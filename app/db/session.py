@@ -17,8 +17,8 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.pool import ConnectionPoolEntry
 
+from app.common.errors import StorageError
 from app.db import outbox
-from app.errors import StorageError
 
 _BUSY_TIMEOUT_MS: Final = 5000
 _BEGIN: Final = "gainline_begin"

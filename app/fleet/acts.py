@@ -16,25 +16,19 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.access import Permission
+from app.accounts.permissions import Permission, RequestContext
+from app.common.errors import ConflictError
+from app.common.state_machine import check_action, check_transition
 from app.core.policy import Gains
 from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now
-from app.errors import ConflictError
 from app.fleet import repository
-from app.fleet.control import (
-    RequestContext,
-    record_act,
-    require_may,
-    require_may_command,
-    require_not_controlled_by_other,
-)
+from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
 from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, require_idle, set_vehicle_state
 from app.fleet.states import ACT_TRANSITIONS, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
 from app.fleet.views import act_view, is_linked_or_wanted, vehicle_view
-from app.moves import check_action, check_transition
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)

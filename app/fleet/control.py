@@ -6,38 +6,22 @@ Only the operator's browser knows the lease's token; the row holds its digest.
 import hashlib
 import hmac
 import secrets
-from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
 
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
-from app.access import COMMAND_LINE, Caller, Permission, require
+from app.accounts.permissions import Permission, RequestContext, require
+from app.common.errors import ConflictError, NotAllowedError
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.types import utc_now
-from app.errors import ConflictError, NotAllowedError
 from app.fleet import repository
 from app.fleet.schemas import Control, Lease, LeaseRequest
 from app.fleet.states import ActKind, ActState
 
 LEASE: Final = timedelta(seconds=15)
 """A browser renews the lease every 5 s; without renewal it ends after this time."""
-
-
-@dataclass(frozen=True, slots=True)
-class RequestContext:
-    """Origin of a request: the lease token that it carries, its caller, whether Gainline's own page sent it, and the
-    hosts that the administrator has listed as simulating vehicles."""
-
-    token: str | None = None
-    caller: Caller = COMMAND_LINE
-    from_our_page: bool = False
-    simulation_hosts: frozenset[str] = frozenset()
-
-
-LOCAL_CLI: Final = RequestContext()
-"""A user of this computer's command line, who is in control of no vehicle."""
 
 
 def control_of(row: VehicleRow) -> Control | None:

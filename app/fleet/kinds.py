@@ -1,7 +1,7 @@
 """Capabilities of a vehicle by its kind."""
 
+from app.common.schemas import OptionValue
 from app.db.models import VehicleRow
-from app.schemas import OptionValue
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS
 

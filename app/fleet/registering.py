@@ -4,20 +4,20 @@ from collections.abc import Mapping
 
 from sqlalchemy.orm import Session
 
-from app.access import Permission, require
+from app.accounts.permissions import Permission, RequestContext, require
+from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
+from app.common.schemas import OptionValue
+from app.common.state_machine import check_action, check_version
 from app.core.experiments import get_experiment
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
-from app.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.fleet import repository
-from app.fleet.control import RequestContext, record_act, require_may_command, require_not_controlled_by_other
+from app.fleet.control import record_act, require_may_command, require_not_controlled_by_other
 from app.fleet.kinds import is_registered_one_by_one, settings_of
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
 from app.fleet.states import ACTIONS, ActKind, VehicleState
 from app.fleet.views import vehicle_view
-from app.moves import check_action, check_version
-from app.schemas import OptionValue
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 

@@ -6,10 +6,10 @@ from typing import Final
 from sqlalchemy import String, func, literal, null, select, tuple_, union_all
 from sqlalchemy.orm import Session
 
+from app.common.errors import NotFoundError
+from app.common.schemas import Position, instant
 from app.db.models import FlightRow, VehicleActRow, VehicleRow
-from app.db.paging import Position, instant
 from app.db.types import UtcDateTime
-from app.errors import NotFoundError
 from app.fleet.states import ACTIVE_ACT_STATES, GIVES_GAINS, ActKind, ActState, VehicleState
 from app.trials.states import ACTIVE_STATES
 

@@ -5,8 +5,8 @@ from typing import Literal
 from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
 
-from app import access
-from app.access import is_allowed
+from app.accounts import permissions
+from app.accounts.permissions import is_allowed
 from app.api.deps import (
     CurrentDatabase,
     CursorText,
@@ -20,6 +20,7 @@ from app.api.deps import (
     json_only,
 )
 from app.campaigns import service as campaigns
+from app.common.schemas import Page
 from app.fleet import acts, control, registering, service, views
 from app.fleet.schemas import (
     GivenGains,
@@ -35,7 +36,6 @@ from app.fleet.schemas import (
 )
 from app.fleet.states import ActKind
 from app.live.messages import NO_LINK
-from app.schemas import Page
 
 router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])
 
@@ -120,7 +120,7 @@ async def stop_motors(
 ) -> OrderAnswer:
     """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
     Only for a client that may not command real vehicles is the database read first, to see whether this is one."""
-    if not is_allowed(access.Permission.STOP, asking.caller):
+    if not is_allowed(permissions.Permission.STOP, asking.caller):
         await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The vehicle is told to stop its motors.")
 

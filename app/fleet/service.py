@@ -9,18 +9,17 @@ from typing import TypedDict
 
 from sqlalchemy.orm import Session
 
+from app.common.errors import BusyError, ConflictError, InputError, Problem
+from app.common.schemas import Page, decode_cursor, encode_cursor
+from app.common.state_machine import check_action, check_transition
 from app.core.policy import Gains
 from app.db.models import VehicleRow
-from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import BusyError, ConflictError, InputError, Problem
 from app.fleet import repository
 from app.fleet.kinds import can_fly, experiments_of, is_registered_one_by_one, needs_staging
 from app.fleet.schemas import Vehicle, VehicleChoice
 from app.fleet.states import ACTIONS, TRANSITIONS, VehicleState
 from app.fleet.views import campaign_vehicle, options_of, vehicle_view
-from app.moves import check_action, check_transition
-from app.schemas import Page
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 __all__ = [

@@ -16,11 +16,11 @@ from typing import Final, TypeVar
 import structlog
 from sqlalchemy.orm import Session as Transaction
 
+from app.common.data_folder import trial_parameters_folder
+from app.common.errors import ConflictError, StorageError
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
-from app.data_dir import trial_parameters_folder
 from app.db.session import Database
-from app.errors import ConflictError, StorageError
 from app.fleet import acts
 from app.fleet.acts import ActTask, LinkedVehicle
 from app.fleet.seat import run_vehicle_process

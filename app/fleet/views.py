@@ -4,15 +4,14 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
+from app.common.state_machine import allowed
 from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
-from app.db.paging import decode_cursor, encode_cursor
 from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.kinds import can_fly, experiments_of, needs_staging, settings_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
 from app.fleet.states import ACTIONS, VehicleState
-from app.moves import allowed
-from app.schemas import OptionValue, Page
 
 _OF_SHARED: Final = frozenset({"fly", "release"})
 _NEWEST_FIRST: Final = "-at"

@@ -6,8 +6,8 @@ from datetime import datetime
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
+from app.common.errors import NotFoundError
 from app.db.models import JobRow
-from app.errors import NotFoundError
 from app.jobs.states import JobState
 
 

@@ -5,10 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query
 
 from app.api.deps import CurrentSettings, CursorText, Id, IdempotentPost, Limit, Reader, json_only
+from app.common.schemas import Page
 from app.jobs import service
 from app.jobs.schemas import Job, JobLog
 from app.jobs.states import JobState
-from app.schemas import Page
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json_only)])
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
+from app.common.schemas import Trouble
 from app.jobs.states import JobState
-from app.schemas import Trouble
 
 
 class Job(BaseModel):

@@ -13,16 +13,15 @@ from typing import Final
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
+from app.common.logging import lines_of_job
+from app.common.schemas import Page, Trouble, decode_cursor, encode_cursor
+from app.common.state_machine import allowed, check_action, check_transition
 from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
-from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
 from app.jobs import repository
-from app.jobs.logs import lines_of_job
 from app.jobs.schemas import Job, JobLog
 from app.jobs.states import ACTIONS, TRANSITIONS, JobState
-from app.moves import allowed, check_action, check_transition
-from app.schemas import Page, Trouble
 
 LEAST_PACE_S: Final = 30.0
 LEAST_PACE_SHARE: Final = 0.1

@@ -8,9 +8,9 @@ from typing import Final
 import structlog
 from sqlalchemy.orm import Session
 
+from app.common.errors import GainlineError, StorageError
 from app.core.clock import REAL_TIME, Clock
 from app.db.session import Database
-from app.errors import GainlineError, StorageError
 from app.jobs import service as jobs
 
 HEARTBEATS_PER_LEASE: Final = 3

@@ -7,9 +7,9 @@ from typing import Final
 import structlog
 from sqlalchemy.exc import DBAPIError
 
+from app.common.errors import StorageError
 from app.db.outbox import events_after, latest_event_id
 from app.db.session import Database
-from app.errors import StorageError
 from app.live.hub import Change
 from app.live.watch import DatabaseWatch
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import structlog
 
-from app.errors import UnavailableError
+from app.common.errors import UnavailableError
 
 PRINTERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 TIMEOUT_S: Final = 60.0

@@ -4,11 +4,11 @@ from fastapi import APIRouter, Response
 
 from app.api.deps import CurrentDatabase, CurrentSettings, Id
 from app.campaigns.service import get_row
+from app.common.settings import Settings
 from app.db.session import Database
 from app.reports.printing import print_pdf
 from app.reports.rendering import Document, chart_library, file_name, render
 from app.reports.service import report_of
-from app.settings import Settings
 
 router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from datetime import UTC, datetime, tzinfo
 from typing import Final
 
+from app.common.schemas import Interval
 from app.core.definition import OptionValue
 from app.core.wording import decimals
-from app.schemas import Interval
 
 NOTHING: Final = "–"
 

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Depends, Path, status
 
 from app.api.deps import IdempotentPost, Reader, json_only
 from app.api.figures import FigureCard, Theme, figure_card
+from app.common.schemas import Page
 from app.jobs.schemas import Job
-from app.schemas import Page
 from app.studies import service
 from app.studies.schemas import Reproduction, ReproductionSummary, Run
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
+from app.common.schemas import Gains, Request
 from app.jobs.schemas import Job
-from app.schemas import Gains, Request
 
 
 class Run(Request):

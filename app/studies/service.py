@@ -6,8 +6,8 @@ from typing import Final
 from pydantic import TypeAdapter, ValidationError
 from sqlalchemy.orm import Session
 
+from app.common.errors import GainlineError, NotFoundError
 from app.db.models import JobRow
-from app.errors import GainlineError, NotFoundError
 from app.figures.base import Card, card_of
 from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName

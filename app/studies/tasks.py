@@ -7,8 +7,8 @@ from typing import Final, NoReturn
 
 import structlog
 
+from app.common.errors import GainlineError
 from app.db.session import Database
-from app.errors import GainlineError
 from app.jobs import service as jobs
 from app.jobs.tasks import ClaimedJob, internal_error
 from app.studies.process import InternalFailure, ProcessDiedError, Progress, StudyError, StudyMessage, StudyProcess

@@ -13,9 +13,9 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from app.common.errors import StorageError
 from app.core.errors import Problem, TrajectoryError
 from app.core.trajectory import Trajectory
-from app.errors import StorageError
 
 VERSION: Final = 1
 _LEVEL: Final = 3

@@ -15,7 +15,7 @@ from typing import Protocol
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.live.messages import FlightPhase, Telemetry
-from app.locks import LockedError, exclusive
+from app.processes.locks import LockedError, exclusive
 from app.vehicles.base import MOTORS_OFF_ASKED, FlightOptions, FlightRecord, OptionValue
 from app.vehicles.errors import SafeGainsError, VehicleError
 

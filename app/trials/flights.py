@@ -22,10 +22,10 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.campaigns import service as campaigns
+from app.common.errors import ConflictError
 from app.core.stopping import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
-from app.errors import ConflictError
 from app.fleet import service as fleet
 from app.fleet.states import VehicleState
 from app.trials import repository

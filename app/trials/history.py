@@ -9,11 +9,11 @@ from typing import Final, Literal
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.common.errors import NotFoundError, StorageError
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
 from app.db.models import FlightRow, TrajectoryRow, TrialRow
-from app.errors import NotFoundError, StorageError
 from app.trials import repository
 from app.trials.codec import Packed, pack, unpack
 from app.trials.states import HISTORY, NOT_AGAINST_GAINS, TrialState

@@ -7,10 +7,10 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.common.errors import StorageError
 from app.core.errors import Problem
 from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
-from app.errors import StorageError
 from app.trials import history, repository
 
 _NAMED: Final = 5

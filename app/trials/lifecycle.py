@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
+from app.common.state_machine import check_transition
 from app.db.models import FlightRow, TrialRow
 from app.db.types import utc_now
-from app.moves import check_transition
 from app.trials.states import ACTIVE_STATES, FLIGHT_TRANSITIONS, TRANSITIONS, UNFLOWN, FlightState, TrialState
 
 

@@ -5,17 +5,18 @@ from contextlib import suppress
 
 from sqlalchemy.orm import Session
 
+from app.accounts.permissions import RequestContext
 from app.campaigns import rehearsals
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
+from app.common.errors import ConflictError, NotAllowedError
+from app.common.state_machine import check_action
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
-from app.errors import ConflictError, NotAllowedError
 from app.fleet import service as fleet
-from app.fleet.control import RequestContext, require_control, require_may_command, require_not_controlled_by_other
-from app.moves import check_action
+from app.fleet.control import require_control, require_may_command, require_not_controlled_by_other
 from app.trials import history, repository
 from app.trials.judging import check_own_gains
 from app.trials.lifecycle import set_flight_state, set_trial_state

@@ -5,8 +5,8 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.common.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
 from app.db.models import TrialPhotoRow
-from app.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
 from app.trials import repository
 from app.trials.schemas import TrialPhoto
 

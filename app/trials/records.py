@@ -6,9 +6,9 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.common.errors import Problem, UnconfirmedError
 from app.core.policy import Gains
 from app.db.models import CampaignRow, TrialRow
-from app.errors import Problem, UnconfirmedError
 from app.logs.takeoffs import Takeoff
 from app.trials.judging import check_flown_gains
 

@@ -6,8 +6,8 @@ from typing import Final
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, defer, joinedload, undefer
 
+from app.common.errors import NotFoundError
 from app.db.models import CampaignRow, FlightRow, GainsJson, TrajectoryRow, TrialPhotoRow, TrialRow
-from app.errors import NotFoundError
 from app.trials.states import ACTIVE_STATES, FlightState, TrialState
 
 BEST_ERROR: Final = (

@@ -20,7 +20,7 @@ from app.api.deps import (
     json_only,
 )
 from app.api.uploads import FILE_BODY, REQUEST_BODY, Record
-from app.schemas import Page
+from app.common.schemas import Page
 from app.trials import orders, photos, service
 from app.trials.schemas import (
     Abort,

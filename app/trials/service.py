@@ -8,25 +8,25 @@ from typing import BinaryIO
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.access import Permission
+from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.campaigns import proposing
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
+from app.common.data_folder import log_of_trial, telemetry_log
+from app.common.errors import ConflictError, NotFoundError
+from app.common.schemas import Page, decode_cursor, encode_cursor
+from app.common.state_machine import check_action, check_transition, check_version
 from app.core.definition import flight_seed
 from app.core.errors import GainlineError, InputError, Problem
 from app.core.experiments import get_experiment
 from app.core.policy import Gains
 from app.db.models import CampaignRow, ProposalRow, TrialRow
-from app.db.paging import decode_cursor, encode_cursor
 from app.db.types import utc_now
-from app.errors import ConflictError, NotFoundError
 from app.fleet import service as fleet
-from app.fleet.control import LOCAL_CLI, RequestContext, require_may
-from app.limited import FILE, run_limited
+from app.fleet.control import require_may
 from app.logs.takeoffs import Takeoff
-from app.moves import check_action, check_transition, check_version
-from app.schemas import Page
+from app.processes.sandbox import FILE, run_limited
 from app.trials import history, repository
 from app.trials.capture import capture
 from app.trials.judging import GateDecision, check_own_gains, check_proposal
@@ -37,7 +37,6 @@ from app.trials.schemas import AbortJudgement, Classification, NewTrial, Trial, 
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
 from app.trials.states import ACTIONS, BUDGETED_STATES, HISTORY, TRANSITIONS, TrialKind, TrialState
-from app.trials.telemetry_logs import log_of_trial, telemetry_log
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
 

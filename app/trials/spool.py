@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
+from app.common.errors import StorageError
 from app.core.trajectory import Trajectory
-from app.errors import StorageError
 from app.vehicles.base import Ending, FlightRecord, OptionValue
 
 RESERVED_BYTES: Final = 4 * 2**20

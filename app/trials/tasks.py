@@ -14,9 +14,10 @@ from typing import Final
 import structlog
 from sqlalchemy.orm import Session
 
+from app.common.data_folder import telemetry_log
+from app.common.errors import GainlineError, StorageError
 from app.core.clock import REAL_TIME, Clock
 from app.db.session import Database
-from app.errors import GainlineError, StorageError
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.trials import flights
 from app.trials.cockpit import FlightProcess, FlightProcessPool
@@ -24,7 +25,6 @@ from app.trials.crew import FlightBackend, FlightFailure, FlightLanded, FlightRe
 from app.trials.flights import FlightTask
 from app.trials.flying import AbortFlag, AbortRegistry, Publish
 from app.trials.spool import Spool
-from app.trials.telemetry_logs import telemetry_log
 from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import get_kind

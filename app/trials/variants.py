@@ -8,8 +8,8 @@ from sqlalchemy.orm import Session
 from app.campaigns import proposing
 from app.campaigns.definitions import definition_of
 from app.campaigns.statistics import standing_within_bounds_of
+from app.common.errors import ConflictError
 from app.db.models import CampaignRow
-from app.errors import ConflictError
 from app.trials import history
 from app.trials.schemas import Variant
 from app.trials.states import TrialKind

@@ -6,14 +6,14 @@ from sqlalchemy.orm import Session
 
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
+from app.common.schemas import Gate, Interval
+from app.common.state_machine import allowed
 from app.core.experiments import get_experiment
 from app.core.thinning import select_samples
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.wording import percent
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
-from app.moves import allowed
-from app.schemas import Gate, Interval
 from app.trials import history, repository
 from app.trials.comparisons import ReferenceFlights, comparisons
 from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial

@@ -9,11 +9,11 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.pool import QueuePool
 
+from app.common.settings import Settings
 from app.db.session import Database
 from app.live.address import live_address
 from app.live.messages import WorkerHello
 from app.live.server import LiveServer
-from app.settings import Settings
 from tests.builders import get
 
 THREADS_OF_A_SERVER = 40

@@ -7,11 +7,11 @@ import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from app.access import Key
+from app.accounts.keyring import Keyring
+from app.accounts.permissions import Key
+from app.common.settings import Settings
 from app.db.session import Database
-from app.keyring import Keyring
 from app.main import create_app
-from app.settings import Settings
 from tests.builders import Json, create_campaign, create_csv, create_ready_campaign, create_trial, get, upload
 from tests.builders import stage as stage_claimed
 from tests.fleet.vehicles import (

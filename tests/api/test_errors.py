@@ -9,12 +9,12 @@ from fastapi.testclient import TestClient
 from httpx2 import Response
 from sqlalchemy import text
 
-from app import errors
+from app.common import errors
+from app.common.settings import Settings
 from app.core.errors import GainlineError
 from app.db.session import Database
 from app.fleet.states import VehicleState
 from app.main import create_app
-from app.settings import Settings
 from tests.builders import create_campaign, create_ready_campaign, get, problems_of
 from tests.conftest import Listen
 from tests.unlocking import client_here

@@ -5,10 +5,10 @@ from concurrent.futures import Future
 
 from fastapi.testclient import TestClient
 
+from app.common.settings import Settings
 from app.live.address import live_address
 from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello
 from app.live.server import LiveServer
-from app.settings import Settings
 from tests.api.test_abort import wait_until
 from tests.builders import get
 

@@ -3,8 +3,8 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.schemas import find_control_characters
 from app.controller_checks.service import named
-from app.core.control_characters import find_control_characters
 from tests.builders import create_campaign, problems_of
 from tests.fleet.vehicles import register
 

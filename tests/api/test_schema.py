@@ -23,9 +23,9 @@ from schemathesis.specs.openapi.checks import (
 )
 from starlette.types import Receive, Scope, Send
 
+from app.common.settings import Settings
 from app.db.session import Database
 from app.main import create_app
-from app.settings import Settings
 from tests.builders import create_flown_trial, create_imported_trial, create_ready_campaign, create_trial, run_jobs
 from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.unlocking import HERE

@@ -14,13 +14,13 @@ import segno
 from fastapi.testclient import TestClient
 
 from app import network
-from app.data_dir import folder_bytes
+from app.common.data_folder import folder_bytes
+from app.common.settings import Settings
 from app.db.backup import SPARE_BYTES
 from app.db.migrate import migrate
 from app.db.revision import REVISION
 from app.db.session import Database
 from app.main import create_app
-from app.settings import Settings
 from tests.builders import Json, create_campaign, get, problems_of
 
 TABLET = "http://192.0.2.7:8000"

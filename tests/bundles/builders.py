@@ -13,9 +13,9 @@ from typing import Any
 import httpx2
 from fastapi.testclient import TestClient
 
+from app.common.settings import Settings
 from app.db.session import Database
 from app.main import create_app
-from app.settings import Settings
 from tests.unlocking import client_here
 
 

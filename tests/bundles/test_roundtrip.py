@@ -10,10 +10,10 @@ from fastapi.testclient import TestClient
 
 from app.bundles.reading import Bundle
 from app.bundles.service import store_bundle
+from app.common.data_folder import telemetry_log
+from app.common.settings import Settings
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.session import Database
-from app.settings import Settings
-from app.trials.telemetry_logs import telemetry_log
 from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
 from tests.bundles.builders import download_bundle, import_bundle, parts_of, sealed, second_installation
 from tests.campaigns.test_recomputing import told

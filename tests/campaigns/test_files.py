@@ -7,8 +7,8 @@ import pytest
 
 from app.campaigns.definitions import check_campaign
 from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
+from app.common.errors import InputError, NotFoundError
 from app.core.definition import Definition
-from app.errors import InputError, NotFoundError
 
 
 def written(tmp_path: Path, text: str) -> Path:

@@ -11,7 +11,7 @@ from app.core.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.tasks import JobRunner
-from app.pool import ComputePool
+from app.processes.pool import ComputePool
 from tests.builders import WORKER, create_flown_trial, create_ready_campaign, get
 
 Json = dict[str, Any]

@@ -10,8 +10,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns import computation, proposing
+from app.common.settings import Settings
 from app.db.session import Database
-from app.settings import Settings
 from tests.builders import create_ready_campaign, create_trial, get, land, lift_off, run_jobs
 from tests.campaigns.test_statistics import modelled
 from tests.runtime.processes import environment

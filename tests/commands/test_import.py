@@ -8,8 +8,8 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner, Result
 
 from app.cli import app
+from app.common.settings import Settings
 from app.db.session import Database
-from app.settings import Settings
 from tests.builders import Json, create_ready_campaign, create_trial, get
 from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import LOGS, recorded

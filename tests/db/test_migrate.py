@@ -12,13 +12,13 @@ from alembic.script import ScriptDirectory
 from fastapi.testclient import TestClient
 from sqlalchemy import CheckConstraint
 
+from app.common.errors import SchemaError, StorageError
+from app.common.settings import Settings
 from app.db.migrate import migrate, require_current, revision_of
 from app.db.models import Base
 from app.db.revision import REVISION, is_current
 from app.db.session import open_engine
-from app.errors import SchemaError, StorageError
 from app.main import create_app
-from app.settings import Settings
 
 
 def test_the_newest_migration_is_the_one_that_the_program_works_with() -> None:

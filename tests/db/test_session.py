@@ -9,9 +9,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
+from app.common.errors import StorageError
 from app.db.models import CampaignRow, EventRow, FlightRow, JobRow, TrajectoryRow, VehicleRow
 from app.db.session import Database
-from app.errors import StorageError
 from app.fleet.states import VehicleState
 from app.jobs.states import JobState
 from app.trials.history import store_trajectory

@@ -15,20 +15,20 @@ from typing import Any, Final, TypeVar
 from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
+from app.accounts.permissions import LOCAL_CLI
 from app.campaigns import landscapes, proposing, rehearsing
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
+from app.common.errors import StorageError
+from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
 from app.core.landscape import plan_grid, predict_points
 from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
-from app.errors import StorageError
 from app.fleet import registering
-from app.fleet.control import LOCAL_CLI
 from app.fleet.schemas import NewVehicle
 from app.jobs import service as jobs
-from app.settings import Settings
 from app.studies import service as studies
 from app.studies.reproductions import get_reproduction
 from app.trials import flights, photos

@@ -13,9 +13,9 @@ from typing import Final
 import pytest
 from playwright.sync_api import FilePayload, Response, Route, expect
 
-import app.errors
+import app.common.errors
 from app.api import errors as over_http
-from app.errors import (
+from app.common.errors import (
     BusyError,
     ConflictError,
     GainlineError,
@@ -37,7 +37,7 @@ from tests.e2e.dashboard import Dashboard, Json, open_details
 from tests.e2e.states import States
 from tests.logs.recorded import recorded
 
-AT_START: Final = {app.errors.SchemaError, app.errors.AlreadyRunningError, app.errors.AddressError}
+AT_START: Final = {app.common.errors.SchemaError, app.common.errors.AlreadyRunningError, app.common.errors.AddressError}
 """These end the program before it answers anybody."""
 FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unforeseen")
 """What is refused before our own code, or by nobody on purpose."""
@@ -318,7 +318,7 @@ TITLES: Final = {
 
 def answered_kinds() -> set[type[GainlineError] | str]:
     """What the API can answer, as the program itself says: a class of errors that is new needs a story here."""
-    declared = {getattr(app.errors, name) for name in app.errors.__all__}
+    declared = {getattr(app.common.errors, name) for name in app.common.errors.__all__}
     classes = {one for one in declared if isinstance(one, type) and issubclass(one, GainlineError)}
     return (classes - AT_START) | set(over_http._KINDS) | set(map(str, over_http._HTTP)) | set(FRAMEWORK)
 

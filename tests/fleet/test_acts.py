@@ -6,6 +6,7 @@ from datetime import timedelta
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.settings import Settings
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
@@ -14,7 +15,6 @@ from app.fleet.session import ConnectionOpened, VehicleConnection
 from app.fleet.states import ActKind, VehicleState
 from app.fleet.tasks import VehicleConnectionManager
 from app.main import create_app
-from app.settings import Settings
 from app.trials.flying import AbortRegistry
 from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get

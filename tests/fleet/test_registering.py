@@ -2,12 +2,12 @@
 
 from fastapi.testclient import TestClient
 
+from app.common.settings import Settings
 from app.db.models import VehicleRow
 from app.db.session import Database
 from app.fleet import acts
 from app.fleet.states import VehicleState
 from app.main import create_app
-from app.settings import Settings
 from tests.builders import create_campaign, get, problems_of
 from tests.fleet.vehicles import (
     DEFAULT_GAINS,

@@ -11,8 +11,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from app.access import Key
-from app.keyring import Keyring
+from app.accounts.keyring import Keyring
+from app.accounts.permissions import Key
 from tests.runtime.processes import Serving, environment
 
 REAL = {

@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 from fastapi.testclient import TestClient
 from app.main import create_app
-from app.settings import Settings
+from app.common.settings import Settings
 data_dir, ui_dir = map(Path, sys.argv[1:])
 with TestClient(create_app(Settings(data_dir=data_dir, ui_dir=ui_dir)), base_url="http://127.0.0.1") as client:
     for path in ("/", "/api/health", "/api/campaigns", "/api/catalogue", "/api/vehicles"):
@@ -63,7 +63,7 @@ def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
     assert not imported(HELP).intersection((*NUMERICS, *DATABASE, "fastapi", "numpy", "structlog"))
 
 
-@pytest.mark.parametrize("module", ["app.campaigns.computation", "app.computing", "app.trials.cockpit"])
+@pytest.mark.parametrize("module", ["app.campaigns.computation", "app.processes.pool", "app.trials.cockpit"])
 def test_processes_that_compute_and_fly_do_not_import_the_database(module: str) -> None:
     assert not imported(f"import {module}").intersection((*NUMERICS, *DATABASE))
 

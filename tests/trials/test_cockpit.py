@@ -11,7 +11,7 @@ import pytest
 
 from app.core.experiments import get_experiment
 from app.live.messages import FlightPhase, Telemetry
-from app.locks import exclusive
+from app.processes.locks import exclusive
 from app.trials.cockpit import LOCK_TIMEOUT_S, FlightProcess
 from app.trials.crew import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.vehicles.base import FlightOptions

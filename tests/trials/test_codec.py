@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
+from app.common.errors import StorageError
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
-from app.errors import StorageError
 from app.trials.codec import pack, unpack
 from tests.builders import create_climb
 

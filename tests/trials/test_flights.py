@@ -3,9 +3,9 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.errors import ConflictError
 from app.core.definition import flight_seed
 from app.db.session import Database
-from app.errors import ConflictError
 from app.trials import flights
 from app.vehicles.base import FlightRecord
 from tests.builders import (

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.common.errors import StorageError
 from app.core.trajectory import Trajectory
-from app.errors import StorageError
 from app.trials.spool import RESERVED_BYTES, Spool
 from app.vehicles.base import FlightRecord
 

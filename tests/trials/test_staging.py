@@ -5,16 +5,16 @@ from datetime import timedelta
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.data_folder import telemetry_log
+from app.common.errors import ConflictError
+from app.common.settings import Settings
 from app.core.trajectory import Trajectory
 from app.db.models import FlightRow
 from app.db.session import Database
 from app.db.types import utc_now
-from app.errors import ConflictError
 from app.fleet import acts
 from app.main import create_app
-from app.settings import Settings
 from app.trials import flights
-from app.trials.telemetry_logs import telemetry_log
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     WORKER,

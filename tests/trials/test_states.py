@@ -6,8 +6,8 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy.orm import Session
 
+from app.common.errors import ConflictError
 from app.db.session import Database
-from app.errors import ConflictError
 from app.trials import flights
 from app.trials.states import TRANSITIONS, TrialState
 from tests.builders import Json, create_csv, create_record, get, upload

@@ -11,10 +11,10 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
+from app.common.settings import Settings
 from app.db.models import FlightRow
 from app.db.session import Database
 from app.live.messages import FlightPhase, PublishedMessage
-from app.settings import Settings
 from app.trials.crew import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
 from app.trials.flights import REQUEST_TIMEOUT
 from app.trials.flying import AbortRegistry

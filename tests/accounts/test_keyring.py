@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app.access import Key, RequestOrigin
-from app.errors import StorageError
-from app.keyring import LINK_VALID_S, Keyring
+from app.accounts.keyring import LINK_VALID_S, Keyring
+from app.accounts.permissions import Key, RequestOrigin
+from app.common.errors import StorageError
 
 
 class Clock:

@@ -1,5 +1,5 @@
 """Permissions: the one table that routes and services consult. Pure decisions; `app.api.access` reads the caller from a
-request, `app.keyring` holds the secret behind the keys.
+request, `app.accounts.keyring` holds the secret behind the keys.
 
 A caller is on this computer or elsewhere, and holds a key or none. A forwarded request counts as from elsewhere: a
 proxy or tunnel on this computer connects from loopback on behalf of remote clients.
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum, auto
 from typing import Final
 
-from app.errors import NotAllowedError
+from app.common.errors import NotAllowedError
 
 
 class RequestOrigin(Enum):
@@ -152,3 +152,18 @@ def _locked(act: Permission, vehicle: str) -> NotAllowedError:
         hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`. "
         "Abort and land need neither.",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class RequestContext:
+    """Origin of a request: the lease token that it carries, its caller, whether Gainline's own page sent it, and the
+    hosts that the administrator has listed as simulating vehicles."""
+
+    token: str | None = None
+    caller: Caller = COMMAND_LINE
+    from_our_page: bool = False
+    simulation_hosts: frozenset[str] = frozenset()
+
+
+LOCAL_CLI: Final = RequestContext()
+"""A user of this computer's command line, who is in control of no vehicle."""

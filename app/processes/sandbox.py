@@ -12,9 +12,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final, ParamSpec, TypeVar
 
-from app.computing import TaskError, TaskResult
-from app.errors import InputError, Problem, UnavailableError
+from app.common.errors import InputError, Problem, UnavailableError
 from app.processes import process_context
+from app.processes.pool import TaskError, TaskResult
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -5,9 +5,9 @@ from datetime import UTC, datetime, timedelta
 
 from fastapi.testclient import TestClient
 
+from app.common.settings import Settings
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.settings import Settings
 from tests.builders import get
 
 

@@ -93,7 +93,7 @@ class Supervisor(Generic[T]):
 
 
 def _dump_stacks(process: BaseProcess) -> None:
-    """Have the process write its threads' stacks to standard error (`app.observability`)."""
+    """Have the process write its threads' stacks to standard error (`app.common.logging`)."""
     if process.pid is not None:
         os.kill(process.pid, signal.SIGUSR1)
         time.sleep(STACK_DUMP_TIMEOUT_S)

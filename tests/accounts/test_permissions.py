@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from app.access import Caller, Key, Permission, RequestOrigin, is_allowed, require
-from app.errors import NotAllowedError
+from app.accounts.permissions import Caller, Key, Permission, RequestOrigin, is_allowed, require
+from app.common.errors import NotAllowedError
 
 ELSEWHERE = "from another device (192.0.2.9)"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.pool import ComputePool, CrashedError
+from app.processes.pool import ComputePool, CrashedError
 
 
 def double(number: int) -> int:

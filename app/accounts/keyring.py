@@ -20,8 +20,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final, Self
 
-from app.access import Key, RequestOrigin
-from app.errors import StorageError
+from app.accounts.permissions import Key, RequestOrigin
+from app.common.errors import StorageError
 
 LINK_VALID_S: Final = 15 * 60
 _SECRET_BYTES: Final = 32

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from app.data_dir import make_private, prepare_data_dir
-from app.errors import StorageError
-from app.locks import exclusive
+from app.common.data_folder import make_private, prepare_data_dir
+from app.common.errors import StorageError
+from app.processes.locks import exclusive
 from tests.runtime.processes import PATIENCE_S, environment
 
 

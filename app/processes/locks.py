@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+from app.common.errors import StorageError
 from app.core.clock import REAL_TIME, Clock
-from app.errors import StorageError
 
 POLL_S: Final = 0.1
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import TypeVar
 
-from app.errors import ConflictError, Problem
+from app.common.errors import ConflictError, Problem
 
 S = TypeVar("S", bound=StrEnum)
 

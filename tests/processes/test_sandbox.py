@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
+from app.common.errors import InputError, TrajectoryError
 from app.core.errors import Problem
-from app.errors import InputError, TrajectoryError
-from app.limited import FILE, Limits, run_limited
+from app.processes.sandbox import FILE, Limits, run_limited
 from app.trials import service
 
 LITTLE = Limits(processor_s=1, wall_s=20.0, memory_bytes=2**27)

@@ -11,7 +11,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.core.errors import InputError, Problem
 
-APP: Final = Path(__file__).resolve().parent
+APP: Final = Path(__file__).resolve().parents[1]
 CHECKOUT: Final = APP.parent
 
 

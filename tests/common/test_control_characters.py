@@ -1,6 +1,6 @@
 import pytest
 
-from app.core.control_characters import find_control_characters, is_control, without_control_characters
+from app.common.schemas import find_control_characters, is_control, without_control_characters
 
 
 @pytest.mark.parametrize("character", ["\x00", "\x1b", "\x7f", "\x9b", "\n", "\u202e", "\u2066", "\u200f", "\u2028"])

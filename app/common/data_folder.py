@@ -1,4 +1,7 @@
-"""The data folder: created if missing, with a clear error if it cannot be used."""
+"""The data folder: created if missing, with a clear error if it cannot be used.
+
+Paths of flights' telemetry logs.
+"""
 
 import errno
 import os
@@ -7,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from app.errors import Problem, StorageError
+from app.common.errors import Problem, StorageError
 
 PRIVATE: Final = 0o700
 OTHERS: Final = 0o077
@@ -66,3 +69,13 @@ def folder_bytes(folder: Path) -> int:
             with suppress(FileNotFoundError):
                 total += os.lstat(Path(path) / name).st_size
     return total
+
+
+def telemetry_log(data_dir: Path, flight_id: int) -> Path:
+    """Path of the .tlog that the flight's vehicle writes, if it keeps one."""
+    return data_dir / "tlogs" / f"flight-{flight_id}.tlog"
+
+
+def log_of_trial(data_dir: Path, trial_id: int) -> Path:
+    """Path of the .tlog imported with a trial that was flown elsewhere, if there is one."""
+    return data_dir / "tlogs" / f"trial-{trial_id}.tlog"

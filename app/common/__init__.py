@@ -1,0 +1,1 @@
+"""What every package uses: errors, settings, the data folder, logging, schemas, state machines."""

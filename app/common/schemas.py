@@ -1,0 +1,185 @@
+"""Common parts of the slices' request and response schemas.
+
+Invisible characters that change how text is displayed.
+
+In a name they can rewrite a terminal's lines, or reverse text so that one name looks like another.
+
+Cursors: the position where a page ended, so that the next page begins there whatever was added or changed
+meanwhile.
+"""
+
+import base64
+import binascii
+import json
+import unicodedata
+from datetime import datetime
+from typing import Annotated, Final, Generic, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+from app.common.errors import InputError
+from app.common.errors import Problem as FieldProblem
+
+_BIDIRECTIONAL: Final = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Marks, embeddings, overrides and isolates (Unicode Standard Annex 9)."""
+_LINE_ENDS: Final = frozenset("\u2028\u2029")
+
+
+def is_control(character: str) -> bool:
+    """Whether the character is in C0 or C1 (escape included), DEL, a bidirectional control or a line separator."""
+    return unicodedata.category(character) == "Cc" or character in _BIDIRECTIONAL or character in _LINE_ENDS
+
+
+def find_control_characters(text: str) -> tuple[str, ...]:
+    """Control characters in a text, as `U+001B`, each once and in code point order."""
+    return tuple(f"U+{ord(each):04X}" for each in sorted(set(filter(is_control, text))))
+
+
+def without_control_characters(text: str) -> str:
+    return "".join(each for each in text if not is_control(each))
+
+
+T = TypeVar("T")
+
+OptionValue = bool | int | float | str
+"""A setting of a strategy or vehicle; its type is checked by the setting."""
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A finite JSON number: no numeric text, no NaN, no infinity."""
+
+Gains = dict[str, int | float]
+"""Gains by name; whole numbers where the controller takes counts."""
+
+Text = Annotated[str, Field(max_length=2000)]
+
+
+def _shown_as_it_is(name: str) -> str:
+    """Return the name unless it holds control characters, which move a terminal's cursor or reverse text."""
+    if found := find_control_characters(name):
+        raise PydanticCustomError(
+            "control_character", "must not hold control characters ({found})", {"found": ", ".join(found)}
+        )
+    return name
+
+
+Shown = AfterValidator(_shown_as_it_is)
+Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120), Shown]
+Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
+Version = Annotated[int, Field(ge=1, strict=True, description="the version that was edited, as last read")]
+
+
+class Request(BaseModel):
+    """A request body; unknown fields are errors."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)
+
+
+class ProblemField(BaseModel):
+    """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
+    pass, by name, where any are known."""
+
+    field: str
+    reason: str
+    offer: Gains = {}
+
+
+class Problem(BaseModel):
+    """An error (RFC 9457): what happened, what to do about it, and the fields concerned."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    hint: str
+    problems: list[ProblemField]
+
+
+class Trouble(BaseModel):
+    """Why something is not available at present, and what to do about it."""
+
+    title: str
+    detail: str
+    hint: str
+
+
+class Page(BaseModel, Generic[T]):
+    """A part of a list. `next_cursor` requests the part after it; null at the end. `total` counts the whole list."""
+
+    items: list[T]
+    total: int
+    next_cursor: str | None
+
+
+class Interval(BaseModel):
+    """Interval that contains an error with probability `confidence`."""
+
+    lower: float
+    upper: float
+    confidence: float
+
+
+class Check(BaseModel):
+    """One check of the gate: its worst number and the limit, where it has them, and the gain and the case that gave it.
+    `offer` holds the nearest values of refused gains that would pass."""
+
+    name: str
+    passed: bool
+    sentence: str
+    worst: float | None
+    limit: float | None
+    gain: str = ""
+    case: str = ""
+    offer: Gains = {}
+
+
+class Gate(BaseModel):
+    """The gate's result for a gain set before its flight."""
+
+    passed: bool
+    checks: list[Check]
+
+
+Position = tuple[str | float, int]
+"""The sort value of a page's last item, and its id, which decides among equal values."""
+_LARGEST_ID: Final = 2**63 - 1
+
+
+def encode_cursor(order: str, position: Position) -> str:
+    """Encode a position as text for a URL; the sort order is included, because the position is valid only in that
+    order."""
+    return base64.urlsafe_b64encode(json.dumps([order, *position]).encode()).decode().rstrip("=")
+
+
+def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Position:
+    """Decode a cursor. Raises InputError unless it is one of this order, with a sort value of this kind."""
+    try:
+        found = json.loads(base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True))
+        said, value, identity = found
+        value = kind(value) if isinstance(value, int | float | str) and not isinstance(value, bool) else None
+    except (ValueError, TypeError, OverflowError, binascii.Error, RecursionError):
+        raise _refused("is not a cursor of this list") from None
+    if said != order:
+        raise _refused("belongs to another order of the list")
+    if value is None or type(identity) is not int or not 0 < identity <= _LARGEST_ID:
+        raise _refused("is not a cursor of this list")
+    return value, identity
+
+
+def instant(text: str | float) -> datetime:
+    """Convert a sort value to a time. Raises InputError when it is not one."""
+    try:
+        when = datetime.fromisoformat(str(text))
+    except ValueError:
+        raise _refused("is not a cursor of this list") from None
+    if when.tzinfo is None:
+        raise _refused("is not a cursor of this list")
+    return when
+
+
+def _refused(reason: str) -> InputError:
+    return InputError(
+        "This page cannot be found.",
+        problems=(FieldProblem("cursor", reason),),
+        hint="Begin without a cursor, and pass on `next_cursor` unchanged.",
+    )
