@@ -13,8 +13,8 @@ from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of, frozen_digest
 from app.campaigns.proposing import gate_json
 from app.campaigns.schemas import NewCampaign
-from app.campaigns.states import CampaignState
 from app.common.settings import Settings
+from app.common.states import CampaignState, JobState, TrialState
 from app.core.definition import Definition
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.gate import check_policy
@@ -24,11 +24,9 @@ from app.db.migrate import migrate
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrajectoryRow, TrialRow
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
-from app.jobs.states import JobState
 from app.trials import history
 from app.trials.codec import pack
 from app.trials.scoring import score
-from app.trials.states import TrialState
 
 SAMPLES: Final = 16_700
 SEED: Final = 20261122

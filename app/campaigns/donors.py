@@ -5,10 +5,10 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.schemas import Definition, Donor, Start
 from app.common.errors import NotFoundError
+from app.common.states import TrialState
 from app.core.errors import InputError, Problem
 from app.db.models import TrialRow
 from app.trials import history
-from app.trials.states import TrialState
 
 
 def fill_in_donor(session: Session, asked: Definition) -> Definition:

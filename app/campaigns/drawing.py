@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.proposing import is_stale
+from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
 from app.core.statistics import groups_of, pool_scatter, select_winner
@@ -26,7 +27,6 @@ from app.figures.history import Band, Curve, FlightData, History, NextFlight, No
 from app.figures.theme import ThemeName
 from app.trials import history
 from app.trials import service as trials_service
-from app.trials.states import TrialState
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}

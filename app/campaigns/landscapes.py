@@ -16,6 +16,7 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.drawing import history_of
 from app.campaigns.proposing import is_stale, read_history
 from app.common.errors import GainlineError
+from app.common.states import JobState
 from app.core.experiments import experiment_of
 from app.core.landscape import Landscape, LandscapePlan, free_gains, space_of
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
@@ -23,7 +24,6 @@ from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
-from app.jobs.states import JobState
 from app.trials import history
 
 LANDSCAPE_JOB: Final = "landscape"

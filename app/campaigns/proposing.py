@@ -14,9 +14,9 @@ from app.campaigns import repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.campaigns.definitions import definition_of
 from app.campaigns.rehearsals import notify_rehearsed_campaign
-from app.campaigns.states import TRANSITIONS, CampaignState, Outcome
 from app.common.errors import ConflictError, NotFoundError
 from app.common.state_machine import check_transition
+from app.common.states import CAMPAIGN_TRANSITIONS, UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
 from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
@@ -29,7 +29,6 @@ from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.jobs import service as jobs
 from app.trials import history
 from app.trials.lifecycle import cancel_unflown
-from app.trials.states import UNFLOWN, TrialState
 
 PROPOSAL_JOB: Final = "proposal"
 _COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
@@ -152,7 +151,7 @@ def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
     """Cancel the unflown trials of stale proposals."""
     trials = history.trials_of(session, campaign.id)
-    waiting = [row for row in trials if row.state in UNFLOWN and row.proposal_id is not None]
+    waiting = [row for row in trials if row.state in UNFLOWN_TRIAL_STATES and row.proposal_id is not None]
     proposals = repository.proposals_by_id(session, {row.proposal_id for row in waiting if row.proposal_id})
     outdated = [
         row for row in waiting if row.proposal_id and is_stale(session, campaign, proposals[row.proposal_id], trials)
@@ -213,7 +212,7 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
 
 def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:
     """Change a campaign's state. Raises ConflictError when the transition is not in the table."""
-    row.state = check_transition(TRANSITIONS, row.state, to, f"Campaign {row.id}")
+    row.state = check_transition(CAMPAIGN_TRANSITIONS, row.state, to, f"Campaign {row.id}")
 
 
 def space_of(definition: Definition) -> PolicySpace:

@@ -9,13 +9,12 @@ from sqlalchemy.orm import Session
 from app.campaigns import repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import Rehearsal, RehearsalState
-from app.campaigns.states import Outcome
 from app.common.errors import ConflictError
+from app.common.states import Outcome, TrialState
 from app.db.models import CampaignRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.trials import history
-from app.trials.states import TrialState
 
 FLIGHTS: Final = 3
 """Number of valid flights that passes a rehearsal, unless the campaign's own rule ends it earlier."""

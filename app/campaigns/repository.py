@@ -9,9 +9,9 @@ from sqlalchemy import ColumnElement, func, literal, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from app.campaigns.schemas import Sort
-from app.campaigns.states import CampaignState
 from app.common.errors import NotFoundError
 from app.common.schemas import Position, instant
+from app.common.states import CampaignState
 from app.db.models import CampaignRow, ProposalRow, RehearsalRow, VehicleRow
 from app.db.types import UtcDateTime
 from app.trials import history

@@ -18,9 +18,9 @@ from app.campaigns.schemas import (
     Promotion,
     Sort,
 )
-from app.campaigns.states import CampaignState
 from app.campaigns.statistics import campaign_statistics
 from app.common.schemas import Page
+from app.common.states import CampaignState
 from app.fleet.schemas import Vehicle
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])

@@ -6,8 +6,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, Field
 
-from app.campaigns.states import CampaignState, Outcome
 from app.common.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
+from app.common.states import CampaignState, Outcome
 from app.core.advice import AdviceKind
 from app.core.statistics import Verdict
 from app.core.strategies.base import Explanation, Kind

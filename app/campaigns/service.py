@@ -22,11 +22,11 @@ from app.campaigns.schemas import (
     Sort,
     Start,
 )
-from app.campaigns.states import ACTIONS, CampaignState, Outcome
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.state_machine import check_action, check_version
+from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
 from app.db.models import CampaignRow, VehicleRow
@@ -174,7 +174,7 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
     """
     row = repository.get_one(session, campaign_id)
     check_version(version, row.version, f"Campaign {row.id}", {})
-    check_action(ACTIONS, "delete", row.state, f"Campaign {row.id}")
+    check_action(CAMPAIGN_ACTIONS, "delete", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     if history.has_begun_flight(session, row.id):
         raise ConflictError(
@@ -192,7 +192,7 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
 def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign:
     """Finish a campaign on the operator's decision. Raises ConflictError unless it is between flights."""
     row = repository.get_one(session, campaign_id)
-    check_action(ACTIONS, "finish", row.state, f"Campaign {row.id}")
+    check_action(CAMPAIGN_ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     end_campaign(session, row, Outcome.STOPPED, reason)
     return campaign_view(session, row)
@@ -201,7 +201,7 @@ def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign
 def archive_campaign(session: Session, campaign_id: int) -> Campaign:
     """Archive a campaign. Raises ConflictError unless it is finished."""
     row = repository.get_one(session, campaign_id)
-    check_action(ACTIONS, "archive", row.state, f"Campaign {row.id}")
+    check_action(CAMPAIGN_ACTIONS, "archive", row.state, f"Campaign {row.id}")
     set_campaign_state(row, CampaignState.ARCHIVED)
     return campaign_view(session, row)
 
@@ -214,7 +214,7 @@ def next_flight(session: Session, campaign_id: int) -> NextFlight:
 def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
     """Request the proposal again. Raises ConflictError in states without proposals."""
     row = repository.get_one(session, campaign_id)
-    check_action(ACTIONS, "propose", row.state, f"Campaign {row.id}")
+    check_action(CAMPAIGN_ACTIONS, "propose", row.state, f"Campaign {row.id}")
     request_proposal(session, row)
     return next_flight_view(session, row)
 
@@ -267,7 +267,7 @@ def _checked(
 
 
 def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
-    check_action(ACTIONS, "define", row.state, f"Campaign {row.id}")
+    check_action(CAMPAIGN_ACTIONS, "define", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     asked = edit.definition or Definition.model_validate(row.definition)
     definition, options, row.vehicle = _checked(session, asked, edit.vehicle or _choice_of(row))

@@ -24,19 +24,17 @@ from app.campaigns.schemas import (
     StopVerdict,
     TrialCounts,
 )
-from app.campaigns.states import ACTIONS, CampaignState
 from app.campaigns.statistics import best_trial, standing_of
 from app.common.schemas import Gate, Interval, Trouble
 from app.common.state_machine import allowed
+from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
 from app.core.confirming import ComparisonState
 from app.core.statistics import Verdict
 from app.core.strategies.base import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs
-from app.jobs.states import JobState
 from app.trials import history
-from app.trials.states import TrialState
 
 SPARKS: Final = 7
 _EXPLANATION: Final = TypeAdapter(Explanation)
@@ -142,7 +140,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
         problem=Trouble(
             title="There is no proposal for the present flights.",
             detail="Its computation was cancelled." if cancelled else f"The campaign is {row.state}.",
-            hint="Compute it again." if row.state in ACTIONS["propose"] else "Clone the campaign to fly on.",
+            hint="Compute it again." if row.state in CAMPAIGN_ACTIONS["propose"] else "Clone the campaign to fly on.",
         ),
     )
 
@@ -233,7 +231,7 @@ def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> li
     impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
     if history.has_begun_flight(session, row.id):
         impossible.add("delete")
-    return [action for action in allowed(ACTIONS, row.state) if action not in impossible]
+    return [action for action in allowed(CAMPAIGN_ACTIONS, row.state) if action not in impossible]
 
 
 def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> Mapping[int, list[SparkCurve]]:

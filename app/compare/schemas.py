@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, Field
 
 from app.common.schemas import Gains, OptionValue
+from app.common.states import TrialState
 from app.core.statistics import Verdict
 from app.trials.schemas import GroupBrief
-from app.trials.states import TrialState
 
 Basis = Literal["gains", "repeats", "apart", "no error"]
 _BASIS = (

@@ -19,12 +19,24 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
-from app.campaigns.states import CampaignState, Outcome
+from app.common.states import (
+    ACTIVE_ACT_STATES,
+    ACTIVE_FLIGHT_STATES,
+    AbortCause,
+    ActKind,
+    ActState,
+    CampaignState,
+    Ending,
+    FlightMode,
+    FlightState,
+    JobState,
+    Outcome,
+    TrialKind,
+    TrialState,
+    VehicleState,
+)
 from app.core.strategies.base import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
-from app.fleet.states import ACTIVE_ACT_STATES, ActKind, ActState, VehicleState
-from app.jobs.states import JobState
-from app.trials.states import ACTIVE_STATES, AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]
 JsonObject = dict[str, Any]
@@ -314,7 +326,7 @@ class ControllerCheckRow(Base, Reported):
         return "check", self.id, None
 
 
-_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_STATES))
+_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_FLIGHT_STATES))
 
 
 class FlightRow(Base, Reported):

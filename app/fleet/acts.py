@@ -19,6 +19,7 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import Permission, RequestContext
 from app.common.errors import ConflictError
 from app.common.state_machine import check_action, check_transition
+from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
 from app.core.policy import Gains
 from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now
@@ -27,7 +28,6 @@ from app.fleet.control import record_act, require_may, require_may_command, requ
 from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, require_idle, set_vehicle_state
-from app.fleet.states import ACT_TRANSITIONS, ACTIONS, GIVES_GAINS, ActKind, ActState, VehicleState
 from app.fleet.views import act_view, is_linked_or_wanted, vehicle_view
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
@@ -97,7 +97,7 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, context: 
     if row.registered:
         _requested(session, row, ActKind.RELEASE, context, reason=statement)
         return vehicle_view(row)
-    check_action(ACTIONS, "release", row.state, row.name)
+    check_action(VEHICLE_ACTIONS, "release", row.state, row.name)
     by = require_not_controlled_by_other(row, context)
     record_act(session, row, ActKind.RELEASE, by=by, reason=statement)
     record_released(session, row.id)
@@ -108,7 +108,7 @@ def release_vehicle(session: Session, vehicle_id: int, statement: str, context: 
 def _requested(
     session: Session, row: VehicleRow, kind: ActKind, context: RequestContext, *, reason: str = ""
 ) -> VehicleActRow:
-    check_action(ACTIONS, kind, row.state, row.name)
+    check_action(VEHICLE_ACTIONS, kind, row.state, row.name)
     if kind == ActKind.DISCONNECT:
         require_may(Permission.STOP, row, context)
         if not is_linked_or_wanted(row):

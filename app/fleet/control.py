@@ -14,11 +14,11 @@ from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext, require
 from app.common.errors import ConflictError, NotAllowedError
+from app.common.states import ActKind, ActState
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import repository
 from app.fleet.schemas import Control, Lease, LeaseRequest
-from app.fleet.states import ActKind, ActState
 
 LEASE: Final = timedelta(seconds=15)
 """A browser renews the lease every 5 s; without renewal it ends after this time."""

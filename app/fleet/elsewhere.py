@@ -7,9 +7,9 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.common.schemas import OptionValue
+from app.common.states import VehicleState
 from app.db.models import VehicleRow
 from app.fleet import repository
-from app.fleet.states import VehicleState
 from app.vehicles.imported import IMPORT
 
 _ROOM: Final = 90

@@ -8,6 +8,7 @@ from app.accounts.permissions import Permission, RequestContext, require
 from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
 from app.common.state_machine import check_action, check_version
+from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
 from app.core.experiments import get_experiment
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
@@ -16,7 +17,6 @@ from app.fleet.control import record_act, require_may_command, require_not_contr
 from app.fleet.kinds import is_registered_one_by_one, settings_of
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
-from app.fleet.states import ACTIONS, ActKind, VehicleState
 from app.fleet.views import vehicle_view
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind
@@ -71,7 +71,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
     check_version(edit.version, row.version, row.name, _differences(row, edit))
     _require_own(row)
     require_may_command(row, context)
-    check_action(ACTIONS, "edit", row.state, row.name)
+    check_action(VEHICLE_ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     by = require_not_controlled_by_other(row, context)
     if edit.options is not None:
@@ -96,7 +96,7 @@ def promote_gains(
     check_version(version, row.version, row.name, {"safe_gains": (row.safe_gains, dict(gains))})
     _require_own(row)
     require_may_command(row, context)
-    check_action(ACTIONS, "edit", row.state, row.name)
+    check_action(VEHICLE_ACTIONS, "edit", row.state, row.name)
     require_idle(session, row)
     _set_safe_gains(session, row, gains, statement=reason, by=require_not_controlled_by_other(row, context))
     row.version += 1

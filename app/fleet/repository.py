@@ -8,10 +8,9 @@ from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
 from app.common.schemas import Position, instant
+from app.common.states import ACTIVE_ACT_STATES, ACTIVE_FLIGHT_STATES, GIVES_GAINS, ActKind, ActState, VehicleState
 from app.db.models import FlightRow, VehicleActRow, VehicleRow
 from app.db.types import UtcDateTime
-from app.fleet.states import ACTIVE_ACT_STATES, GIVES_GAINS, ActKind, ActState, VehicleState
-from app.trials.states import ACTIVE_STATES
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
 Line = tuple[str, int]
@@ -55,7 +54,7 @@ def registered_in(session: Session, *states: VehicleState) -> Sequence[VehicleRo
 
 def flight_under_way(session: Session, vehicle_id: int) -> FlightRow | None:
     return session.scalar(
-        select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(ACTIVE_STATES))
+        select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(ACTIVE_FLIGHT_STATES))
     )
 
 

@@ -21,6 +21,7 @@ from app.api.deps import (
 )
 from app.campaigns import service as campaigns
 from app.common.schemas import Page
+from app.common.states import ActKind
 from app.fleet import acts, control, registering, service, views
 from app.fleet.schemas import (
     GivenGains,
@@ -34,7 +35,6 @@ from app.fleet.schemas import (
     VehicleEdit,
     VehicleOrder,
 )
-from app.fleet.states import ActKind
 from app.live.messages import NO_LINK
 
 router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, Field
 
 from app.common.schemas import Gains, Name, Number, OptionValue, Reason, Request, Shown, Version
-from app.fleet.states import ActKind, ActState, VehicleState
+from app.common.states import ActKind, ActState, VehicleState
 
 OrderReason = Annotated[str, Field(max_length=500)]
 Battery = Annotated[str, Field(max_length=60), Shown]

@@ -14,6 +14,7 @@ from dataclasses import fields
 from multiprocessing.connection import Connection
 from typing import Final
 
+from app.common.states import ActKind
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
 from app.fleet.pipe import PipeClosedError, WorkerPipe
@@ -27,7 +28,6 @@ from app.fleet.session import (
     VehicleRequest,
     VehicleResponse,
 )
-from app.fleet.states import ActKind
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.trials.crew import (
     CancelFlight,

@@ -12,13 +12,13 @@ from sqlalchemy.orm import Session
 from app.common.errors import BusyError, ConflictError, InputError, Problem
 from app.common.schemas import Page, decode_cursor, encode_cursor
 from app.common.state_machine import check_action, check_transition
+from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, VehicleState
 from app.core.policy import Gains
 from app.db.models import VehicleRow
 from app.db.types import utc_now
 from app.fleet import repository
 from app.fleet.kinds import can_fly, experiments_of, is_registered_one_by_one, needs_staging
 from app.fleet.schemas import Vehicle, VehicleChoice
-from app.fleet.states import ACTIONS, TRANSITIONS, VehicleState
 from app.fleet.views import campaign_vehicle, options_of, vehicle_view
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
@@ -121,7 +121,7 @@ def require_ready(session: Session, row: VehicleRow, action: str) -> None:
         )
     if row.state == VehicleState.DISCONNECTED:
         raise ConflictError(f"{row.name} is not connected.", hint="Connect it on its page, then ask again.")
-    check_action(ACTIONS, action, row.state, row.name)
+    check_action(VEHICLE_ACTIONS, action, row.state, row.name)
     require_idle(session, row)
 
 
@@ -138,7 +138,7 @@ def require_idle(session: Session, row: VehicleRow) -> None:
 
 def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:
     """Change a vehicle's state. Raises ConflictError when the transition is not in the table."""
-    row.state = check_transition(TRANSITIONS, row.state, to, row.name)
+    row.state = check_transition(VEHICLE_TRANSITIONS, row.state, to, row.name)
 
 
 def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:

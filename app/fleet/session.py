@@ -21,8 +21,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
 
+from app.common.states import ActKind
 from app.core.clock import REAL_TIME, Clock
-from app.fleet.states import ActKind
 from app.live.messages import NO_LINK, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import process_context
 from app.trials.crew import (

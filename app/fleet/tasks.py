@@ -18,6 +18,7 @@ from sqlalchemy.orm import Session as Transaction
 
 from app.common.data_folder import trial_parameters_folder
 from app.common.errors import ConflictError, StorageError
+from app.common.states import GIVES_GAINS, ActKind
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.db.session import Database
@@ -25,7 +26,6 @@ from app.fleet import acts
 from app.fleet.acts import ActTask, LinkedVehicle
 from app.fleet.seat import run_vehicle_process
 from app.fleet.session import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleConnection, VehicleResponse
-from app.fleet.states import GIVES_GAINS, ActKind
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.trials.flying import AbortRegistry, Publish
 from app.vehicles.errors import SafeGainsError, VehicleError

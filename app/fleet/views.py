@@ -6,12 +6,12 @@ from sqlalchemy.orm import Session
 
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.state_machine import allowed
+from app.common.states import VEHICLE_ACTIONS, VehicleState
 from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.kinds import can_fly, experiments_of, needs_staging, settings_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
-from app.fleet.states import ACTIONS, VehicleState
 
 _OF_SHARED: Final = frozenset({"fly", "release"})
 _NEWEST_FIRST: Final = "-at"
@@ -104,7 +104,7 @@ def is_linked_or_wanted(row: VehicleRow) -> bool:
 
 
 def _actions(row: VehicleRow) -> list[str]:
-    possible = allowed(ACTIONS, row.state)
+    possible = allowed(VEHICLE_ACTIONS, row.state)
     if not row.registered:
         possible = [action for action in possible if action in _OF_SHARED]
     impossible = set() if can_fly(row) else {"fly", "stage"}

@@ -7,8 +7,8 @@ from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
+from app.common.states import JobState
 from app.db.models import JobRow
-from app.jobs.states import JobState
 
 
 def get_one(session: Session, job_id: int) -> JobRow:

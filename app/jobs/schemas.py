@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from app.common.schemas import Trouble
-from app.jobs.states import JobState
+from app.common.states import JobState
 
 
 class Job(BaseModel):

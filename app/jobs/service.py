@@ -16,12 +16,12 @@ from sqlalchemy.orm import Session
 from app.common.logging import lines_of_job
 from app.common.schemas import Page, Trouble, decode_cursor, encode_cursor
 from app.common.state_machine import allowed, check_action, check_transition
+from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
 from app.db.types import utc_now
 from app.jobs import repository
 from app.jobs.schemas import Job, JobLog
-from app.jobs.states import ACTIONS, TRANSITIONS, JobState
 
 LEAST_PACE_S: Final = 30.0
 LEAST_PACE_SHARE: Final = 0.1
@@ -205,7 +205,7 @@ def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> Job
 def cancel_job(session: Session, job_id: int) -> Job:
     """Cancel a job. Raises ConflictError when it has ended already."""
     row = repository.get_one(session, job_id)
-    check_action(ACTIONS, "cancel", row.state, _name(row))
+    check_action(JOB_ACTIONS, "cancel", row.state, _name(row))
     _move(row, JobState.CANCELLED)
     row.finished_at, row.lease_until = utc_now(), None
     session.flush()
@@ -215,7 +215,7 @@ def cancel_job(session: Session, job_id: int) -> Job:
 def retry_job(session: Session, job_id: int) -> Job:
     """Queue a job again. Raises ConflictError unless it failed or was cancelled."""
     row = repository.get_one(session, job_id)
-    check_action(ACTIONS, "retry", row.state, _name(row))
+    check_action(JOB_ACTIONS, "retry", row.state, _name(row))
     _move(row, JobState.QUEUED)
     row.attempts, row.problem, row.finished_at = 0, None, None
     row.done_share, row.doing = None, ""
@@ -238,7 +238,7 @@ def job_view(row: JobRow) -> Job:
         created_at=row.created_at,
         started_at=row.started_at,
         finished_at=row.finished_at,
-        actions=allowed(ACTIONS, row.state),
+        actions=allowed(JOB_ACTIONS, row.state),
     )
 
 
@@ -288,7 +288,7 @@ def _end(row: JobRow, state: JobState, happened: str, hint: str, problems: list[
 
 
 def _move(row: JobRow, to: JobState) -> None:
-    row.state = check_transition(TRANSITIONS, row.state, to, _name(row))
+    row.state = check_transition(JOB_TRANSITIONS, row.state, to, _name(row))
 
 
 def _name(row: JobRow) -> str:

@@ -7,13 +7,13 @@ from pydantic import TypeAdapter, ValidationError
 from sqlalchemy.orm import Session
 
 from app.common.errors import GainlineError, NotFoundError
+from app.common.states import JobState
 from app.db.models import JobRow
 from app.figures.base import Card, card_of
 from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
 from app.jobs.schemas import Job
-from app.jobs.states import JobState
 from app.studies import schemas
 from app.studies.reproductions import REPRODUCTIONS, Reproduction
 from app.studies.results import Result, result_from_json

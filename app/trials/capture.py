@@ -4,6 +4,7 @@ from dataclasses import asdict
 
 from sqlalchemy.orm import Session
 
+from app.common.states import Ending, TrialState
 from app.core.experiments import get_experiment
 from app.core.glitches import find_glitches, repaired
 from app.core.stopping import landing_battery_v
@@ -13,7 +14,6 @@ from app.fleet import service as fleet
 from app.trials import history
 from app.trials.lifecycle import set_trial_state
 from app.trials.scoring import score
-from app.trials.states import Ending, TrialState
 
 
 def capture(

@@ -23,15 +23,14 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import service as campaigns
 from app.common.errors import ConflictError
+from app.common.states import FlightMode, FlightState, TrialState, VehicleState
 from app.core.stopping import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.fleet.states import VehicleState
 from app.trials import repository
 from app.trials.capture import capture
 from app.trials.lifecycle import set_flight_state, set_trial_state
-from app.trials.states import FlightMode, FlightState, TrialState
 from app.vehicles.base import FlightRecord, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)

@@ -10,13 +10,13 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError, StorageError
+from app.common.states import HISTORY_TRIAL_STATES, NOT_AGAINST_GAINS, TrialState
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
 from app.db.models import FlightRow, TrajectoryRow, TrialRow
 from app.trials import repository
 from app.trials.codec import Packed, pack, unpack
-from app.trials.states import HISTORY, NOT_AGAINST_GAINS, TrialState
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
@@ -84,7 +84,7 @@ def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
 
 def in_history(trials: Sequence[TrialRow]) -> list[TrialRow]:
     """The valid and the aborted trials."""
-    return [row for row in trials if row.state in HISTORY]
+    return [row for row in trials if row.state in HISTORY_TRIAL_STATES]
 
 
 def last_battery_v(trials: Sequence[TrialRow]) -> float | None:

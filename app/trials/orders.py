@@ -9,9 +9,10 @@ from app.accounts.permissions import RequestContext
 from app.campaigns import rehearsals
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
-from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.state_machine import check_action
+from app.common.states import CAMPAIGN_ACTIONS as CAMPAIGN_ACTIONS
+from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState, TrialState
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
@@ -21,7 +22,6 @@ from app.trials import history, repository
 from app.trials.judging import check_own_gains
 from app.trials.lifecycle import set_flight_state, set_trial_state
 from app.trials.schemas import AbortAnswer, FlightOrder, Trial
-from app.trials.states import ACTIONS, HISTORY, FlightMode, FlightState, TrialState
 from app.trials.views import trial_view
 
 
@@ -55,9 +55,9 @@ def _request_trial_flight(
     session: Session, trial_id: int, mode: FlightMode, speed: float | None, context: RequestContext
 ) -> Trial:
     row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, mode, row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, mode, row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
-    require_open(session, campaign, HISTORY)
+    require_open(session, campaign, HISTORY_TRIAL_STATES)
     judged = check_own_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
     request_flight(session, campaign, row, context, mode=mode, speed=speed)
@@ -112,7 +112,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> 
     already, another operator is in control, or the rehearsal is no longer satisfied; NotAllowedError otherwise.
     """
     row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, "take-off", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "take-off", row.state, f"Trial {row.number}")
     campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
     if flight.take_off_at is not None:
         raise ConflictError(f"The take-off of trial {row.number} was asked for already.", hint="Watch the flight.")
@@ -133,7 +133,7 @@ def unstage_trial(session: Session, trial_id: int) -> Trial:
     Raises ConflictError when nothing is staged.
     """
     row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, "unstage", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "unstage", row.state, f"Trial {row.number}")
     _staged(session, row).stand_down = "unstaged by the operator"
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
@@ -175,7 +175,7 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
 def cancel_trial(session: Session, trial_id: int) -> Trial:
     """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
     row = repository.get_one(session, trial_id)
-    check_action(ACTIONS, "cancel", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "cancel", row.state, f"Trial {row.number}")
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")

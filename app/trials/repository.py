@@ -7,8 +7,8 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, defer, joinedload, undefer
 
 from app.common.errors import NotFoundError
+from app.common.states import ACTIVE_FLIGHT_STATES, FlightState, TrialState
 from app.db.models import CampaignRow, FlightRow, GainsJson, TrajectoryRow, TrialPhotoRow, TrialRow
-from app.trials.states import ACTIVE_STATES, FlightState, TrialState
 
 BEST_ERROR: Final = (
     select(func.min(TrialRow.error))
@@ -139,7 +139,7 @@ def get_flight(session: Session, flight_id: int) -> FlightRow:
 def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRow | None:
     return session.scalar(
         select(FlightRow)
-        .where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(ACTIVE_STATES))
+        .where(FlightRow.campaign_id == campaign_id, FlightRow.state.in_(ACTIVE_FLIGHT_STATES))
         .order_by(FlightRow.id)
         .limit(1)
     )
@@ -147,7 +147,9 @@ def flight_of_campaign_under_way(session: Session, campaign_id: int) -> FlightRo
 
 def first_under_way(session: Session) -> FlightRow | None:
     """The first active flight of any vehicle."""
-    return session.scalar(select(FlightRow).where(FlightRow.state.in_(ACTIVE_STATES)).order_by(FlightRow.id).limit(1))
+    return session.scalar(
+        select(FlightRow).where(FlightRow.state.in_(ACTIVE_FLIGHT_STATES)).order_by(FlightRow.id).limit(1)
+    )
 
 
 def first_requested(session: Session) -> FlightRow | None:

@@ -12,11 +12,19 @@ from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.campaigns import proposing
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
-from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, NotFoundError
 from app.common.schemas import Page, decode_cursor, encode_cursor
 from app.common.state_machine import check_action, check_transition, check_version
+from app.common.states import (
+    BUDGETED_TRIAL_STATES,
+    HISTORY_TRIAL_STATES,
+    TRIAL_ACTIONS,
+    TRIAL_TRANSITIONS,
+    TrialKind,
+    TrialState,
+)
+from app.common.states import CAMPAIGN_ACTIONS as CAMPAIGN_ACTIONS
 from app.core.definition import flight_seed
 from app.core.errors import GainlineError, InputError, Problem
 from app.core.experiments import get_experiment
@@ -36,7 +44,6 @@ from app.trials.records import settle_gains
 from app.trials.schemas import AbortJudgement, Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
-from app.trials.states import ACTIONS, BUDGETED_STATES, HISTORY, TRANSITIONS, TrialKind, TrialState
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
 
@@ -64,7 +71,7 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, context: Req
     """
     campaign = campaigns.get_row(session, campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
-    require_open(session, campaign, BUDGETED_STATES)
+    require_open(session, campaign, BUDGETED_TRIAL_STATES)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
     number = repository.next_number(session, campaign_id)
@@ -123,8 +130,8 @@ def classify_trial(session: Session, trial_id: int, said: Classification, contex
         f"Trial {row.number}",
         {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)},
     )
-    check_action(ACTIONS, "classify", row.state, f"Trial {row.number}")
-    check_transition(TRANSITIONS, row.state, outcome, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "classify", row.state, f"Trial {row.number}")
+    check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Trial {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     set_trial_state(row, outcome, reason=said.reason)
@@ -143,7 +150,7 @@ def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: 
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
     check_version(said.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", said.cause)})
-    check_action(ACTIONS, "judge abort", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "judge abort", row.state, f"Trial {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     if row.abort_cause == "limit":
         raise ConflictError(
@@ -187,7 +194,7 @@ def import_record(
     row = repository.get_one(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
-    check_action(ACTIONS, "upload", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "upload", row.state, f"Trial {row.number}")
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         settle_gains(session, campaign, row, flown, confirmed=confirmed)
@@ -199,7 +206,7 @@ def import_record(
             f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
             hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
         )
-    require_open(session, campaign, HISTORY)
+    require_open(session, campaign, HISTORY_TRIAL_STATES)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
     campaigns.start_flying(campaign)
     row.flown_at = utc_now()
@@ -224,7 +231,7 @@ def import_into_campaign(
         if not chosen:
             raise NotFoundError("trial", number, hint=f"Campaign {campaign_id} has {len(trials)} trials.")
     else:
-        waits = {TrialState.LOST} if fleet.can_fly(row.vehicle) else ACTIONS["upload"]
+        waits = {TrialState.LOST} if fleet.can_fly(row.vehicle) else TRIAL_ACTIONS["upload"]
         chosen = [trial for trial in trials if trial.state in waits]
     if len(chosen) > 1:
         raise InputError(

@@ -9,10 +9,10 @@ from app.campaigns import proposing
 from app.campaigns.definitions import definition_of
 from app.campaigns.statistics import standing_within_bounds_of
 from app.common.errors import ConflictError
+from app.common.states import TrialKind
 from app.db.models import CampaignRow
 from app.trials import history
 from app.trials.schemas import Variant
-from app.trials.states import TrialKind
 
 KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repeat": "repeat", "baseline": "baseline"}
 

@@ -5,9 +5,10 @@ from collections.abc import Iterable, Sequence
 from sqlalchemy.orm import Session
 
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
-from app.campaigns.states import ACTIONS as CAMPAIGN_ACTIONS
 from app.common.schemas import Gate, Interval
 from app.common.state_machine import allowed
+from app.common.states import ACTIVE_FLIGHT_STATES, TRIAL_ACTIONS, FlightState, TrialState
+from app.common.states import CAMPAIGN_ACTIONS as CAMPAIGN_ACTIONS
 from app.core.experiments import get_experiment
 from app.core.thinning import select_samples
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
@@ -18,7 +19,6 @@ from app.trials import history, repository
 from app.trials.comparisons import ReferenceFlights, comparisons
 from app.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial
 from app.trials.schemas import Trajectory as TrajectoryOut
-from app.trials.states import ACTIONS, ACTIVE_STATES, FlightState, TrialState
 
 
 def trial_view(session: Session, campaign: CampaignRow, row: TrialRow) -> Trial:
@@ -210,7 +210,7 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, reh
     """Allowed actions: those of the state table, less what the vehicle cannot do, what an active flight rules out, and
     what a missing rehearsal of a real vehicle rules out."""
     vehicle = campaign.vehicle
-    under_way = flight is not None and flight.state in ACTIVE_STATES
+    under_way = flight is not None and flight.state in ACTIVE_FLIGHT_STATES
     impossible = set()
     if under_way or not fleet.can_fly(vehicle):
         impossible |= {"fly", "stage"}
@@ -228,5 +228,5 @@ def _actions(campaign: CampaignRow, row: TrialRow, flight: FlightRow | None, reh
         impossible |= {"classify", "upload", "judge abort"}
     if row.abort_cause == "limit":
         impossible.add("judge abort")
-    possible = [action for action in allowed(ACTIONS, row.state) if action not in impossible]
+    possible = [action for action in allowed(TRIAL_ACTIONS, row.state) if action not in impossible]
     return [*possible, "abort"] if under_way and "abort" not in possible else possible

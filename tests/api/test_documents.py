@@ -10,11 +10,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns.schemas import Definition, Sort
-from app.campaigns.states import CampaignState, Outcome
+from app.common.states import CampaignState, JobState, Outcome, TrialState, VehicleState
 from app.core.trajectory import CHANNEL_UNITS
-from app.fleet.states import VehicleState
-from app.jobs.states import JobState
-from app.trials.states import TrialState
 from tests.runtime.processes import Serving, environment
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "api.md"

@@ -11,9 +11,9 @@ from sqlalchemy import text
 
 from app.common import errors
 from app.common.settings import Settings
+from app.common.states import VehicleState
 from app.core.errors import GainlineError
 from app.db.session import Database
-from app.fleet.states import VehicleState
 from app.main import create_app
 from tests.builders import create_campaign, create_ready_campaign, get, problems_of
 from tests.conftest import Listen

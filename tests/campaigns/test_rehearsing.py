@@ -6,10 +6,9 @@ from fastapi.testclient import TestClient
 from app.campaigns.definitions import definition_of
 from app.campaigns.rehearsals import RehearsalTrial, rehearsal_of, rehearsal_result
 from app.campaigns.service import get_row
-from app.campaigns.states import Outcome
+from app.common.states import Outcome, TrialState
 from app.db import outbox
 from app.db.session import Database
-from app.trials.states import TrialState
 from tests.builders import (
     Json,
     create_flown_trial,

@@ -10,12 +10,10 @@ from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from app.common.errors import StorageError
+from app.common.states import FlightState, JobState, VehicleState
 from app.db.models import CampaignRow, EventRow, FlightRow, JobRow, TrajectoryRow, VehicleRow
 from app.db.session import Database
-from app.fleet.states import VehicleState
-from app.jobs.states import JobState
 from app.trials.history import store_trajectory
-from app.trials.states import FlightState
 from tests.builders import create_campaign, create_climb, create_ready_campaign, create_trial
 from tests.conftest import Listen
 

@@ -7,12 +7,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
+from app.common.states import ActKind, VehicleState
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
 from app.fleet.session import ConnectionOpened, VehicleConnection
-from app.fleet.states import ActKind, VehicleState
 from app.fleet.tasks import VehicleConnectionManager
 from app.main import create_app
 from app.trials.flying import AbortRegistry

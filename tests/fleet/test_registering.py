@@ -3,10 +3,10 @@
 from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
+from app.common.states import VehicleState
 from app.db.models import VehicleRow
 from app.db.session import Database
 from app.fleet import acts
-from app.fleet.states import VehicleState
 from app.main import create_app
 from tests.builders import create_campaign, get, problems_of
 from tests.fleet.vehicles import (

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from app.common.states import ActKind
 from app.fleet import seat as seat_module
 from app.fleet.pipe import PipeClosedError, WorkerPipe
 from app.fleet.seat import VehicleProcess
@@ -22,7 +23,6 @@ from app.fleet.session import (
     VehicleCommand,
     VehicleRequest,
 )
-from app.fleet.states import ActKind
 from app.trials.crew import (
     CancelFlight,
     CancelTakeOff,

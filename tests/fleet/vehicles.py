@@ -4,11 +4,10 @@ from typing import Any
 
 import httpx2
 
+from app.common.states import TrialState, VehicleState
 from app.db.models import TrialRow, VehicleRow
 from app.db.session import Database
 from app.fleet import acts
-from app.fleet.states import VehicleState
-from app.trials.states import TrialState
 from app.vehicles.base import Identity
 from tests.builders import WORKER, Json, get, run_jobs
 from tests.unlocking import unlock

@@ -5,10 +5,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.states import JobState
 from app.core.errors import InputError, Problem
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.jobs.states import JobState
 from tests.builders import create_campaign, create_ready_campaign, get, run_jobs
 
 KIND = ("proposal",)

@@ -11,10 +11,10 @@ from multiprocessing import active_children
 
 import pytest
 
+from app.common.states import JobState
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.schemas import Job
-from app.jobs.states import JobState
 from app.jobs.tasks import ClaimedJob, JobRunner
 from app.studies import service
 from app.studies.service import REPRODUCTION_JOB

@@ -2,10 +2,10 @@
 
 from fastapi.testclient import TestClient
 
+from app.common.states import TrialState
 from app.db.models import VehicleRow
 from app.db.session import Database
 from app.trials import flights
-from app.trials.states import TrialState
 from tests.builders import Json, create_ready_campaign, create_record, create_trial, csv_of, land, lift_off, stage
 
 

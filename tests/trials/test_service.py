@@ -3,10 +3,10 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.states import TrialState
 from app.db.models import TrialRow
 from app.db.session import Database
 from app.trials import flights
-from app.trials.states import TrialState
 from tests.builders import (
     claim,
     create_csv,

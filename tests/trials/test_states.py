@@ -7,9 +7,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy.orm import Session
 
 from app.common.errors import ConflictError
+from app.common.states import TRIAL_TRANSITIONS, TrialState
 from app.db.session import Database
 from app.trials import flights
-from app.trials.states import TRANSITIONS, TrialState
 from tests.builders import Json, create_csv, create_record, get, upload
 from tests.trials.states import create_trial_in
 
@@ -106,8 +106,8 @@ STEPS: dict[str, Step] = {
 
 def reachable(start: TrialState) -> set[TrialState]:
     """By one move, or through `captured` to its class in one step."""
-    one = set(TRANSITIONS[start])
-    return {start} | one | (set(TRANSITIONS[TrialState.CAPTURED]) if TrialState.CAPTURED in one else set())
+    one = set(TRIAL_TRANSITIONS[start])
+    return {start} | one | (set(TRIAL_TRANSITIONS[TrialState.CAPTURED]) if TrialState.CAPTURED in one else set())
 
 
 @pytest.mark.parametrize(

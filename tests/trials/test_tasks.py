@@ -12,13 +12,13 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.common.settings import Settings
+from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow
 from app.db.session import Database
 from app.live.messages import FlightPhase, PublishedMessage
 from app.trials.crew import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
 from app.trials.flights import REQUEST_TIMEOUT
 from app.trials.flying import AbortRegistry
-from app.trials.states import FlightState, TrialState
 from app.trials.tasks import FlightRunner
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.clocks import SimulatedClock

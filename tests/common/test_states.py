@@ -7,12 +7,9 @@ from typing import Any
 
 import pytest
 
-from app.campaigns import states as campaigns
+from app.common import states
 from app.common.errors import ConflictError
 from app.common.state_machine import allowed, check_action, check_transition, check_version
-from app.fleet import states as fleet
-from app.jobs import states as jobs
-from app.trials import states as trials
 
 # What the domain allows, written apart from the program's tables: "from: to, to". Back from flying to planned is
 # docs/decisions/0020.
@@ -67,12 +64,12 @@ failed:
 
 Moves = Mapping[Any, frozenset[Any]]
 MACHINES: dict[str, tuple[Moves, str]] = {
-    "trial": (trials.TRANSITIONS, TRIAL),
-    "campaign": (campaigns.TRANSITIONS, CAMPAIGN),
-    "job": (jobs.TRANSITIONS, JOB),
-    "flight": (trials.FLIGHT_TRANSITIONS, FLIGHT),
-    "vehicle": (fleet.TRANSITIONS, VEHICLE),
-    "act": (fleet.ACT_TRANSITIONS, ACT),
+    "trial": (states.TRIAL_TRANSITIONS, TRIAL),
+    "campaign": (states.CAMPAIGN_TRANSITIONS, CAMPAIGN),
+    "job": (states.JOB_TRANSITIONS, JOB),
+    "flight": (states.FLIGHT_TRANSITIONS, FLIGHT),
+    "vehicle": (states.VEHICLE_TRANSITIONS, VEHICLE),
+    "act": (states.ACT_TRANSITIONS, ACT),
 }
 
 
@@ -102,26 +99,26 @@ def test_every_state_has_its_line_in_the_table(machine: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "states",
+    "kind",
     [
-        trials.TrialState,
-        trials.FlightState,
-        campaigns.CampaignState,
-        jobs.JobState,
-        fleet.VehicleState,
-        fleet.ActState,
+        states.TrialState,
+        states.FlightState,
+        states.CampaignState,
+        states.JobState,
+        states.VehicleState,
+        states.ActState,
     ],
 )
-def test_every_lifecycle_is_drawn_in_its_docstring(states: type[StrEnum]) -> None:
-    assert states.__doc__ is not None
-    missing = [state.value for state in states if state.value not in states.__doc__.lower()]
+def test_every_lifecycle_is_drawn_in_its_docstring(kind: type[StrEnum]) -> None:
+    assert kind.__doc__ is not None
+    missing = [state.value for state in kind if state.value not in kind.__doc__.lower()]
     assert not missing
 
 
 def test_a_refused_action_says_when_it_is_possible() -> None:
     with pytest.raises(ConflictError, match="only while it is cancelled or failed"):
-        check_action(jobs.ACTIONS, "retry", jobs.JobState.DONE, "Job 1")
-    assert allowed(jobs.ACTIONS, jobs.JobState.RUNNING) == ["cancel"]
+        check_action(states.JOB_ACTIONS, "retry", states.JobState.DONE, "Job 1")
+    assert allowed(states.JOB_ACTIONS, states.JobState.RUNNING) == ["cancel"]
 
 
 def test_an_edit_of_an_outdated_version_names_what_changed() -> None:
