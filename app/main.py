@@ -11,13 +11,9 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
 from app.accounts.keyring import Keyring
-from app.api import catalogue, errors, events, figures, landscapes, system, unlock, vehicle_figures
-from app.api.access import AccessMiddleware
-from app.api.assets import Assets
-from app.api.headers import HeadersMiddleware
-from app.api.limits import BodyLimitMiddleware
-from app.api.openapi import describe
 from app.bundles.router import router as bundles
+from app.campaigns import catalogue
+from app.campaigns.router import figures_router, landscape_router, vehicles_router
 from app.campaigns.router import router as campaigns
 from app.common.errors import NotFoundError
 from app.common.settings import Settings
@@ -33,6 +29,10 @@ from app.reports.router import router as reports
 from app.studies.router import router as reproductions
 from app.trials.router import records
 from app.trials.router import router as trials
+from app.web import errors, events, system
+from app.web.errors import describe
+from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware
+from app.web.origin import AccessMiddleware, unlock_router
 
 # Modules loaded by now stay for good: the garbage collector skips them, also as the process ends.
 gc.freeze()
@@ -73,7 +73,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     own = (
         catalogue.router,
         system.router,
-        unlock.router,
+        unlock_router,
         campaigns,
         trials,
         records,
@@ -85,9 +85,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         compare,
         reports,
         bundles,
-        landscapes.router,
-        vehicle_figures.router,
-        figures.router,
+        landscape_router,
+        vehicles_router,
+        figures_router,
         events.router,
     )
     for router in own:

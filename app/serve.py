@@ -17,9 +17,9 @@ from app.common.errors import AddressError, AlreadyRunningError, Problem
 from app.common.logging import configure_logs
 from app.common.settings import Settings
 from app.db.revision import is_current
-from app.network import exposure, web_address
 from app.processes.locks import LockedError, exclusive
 from app.processes.supervisor import Supervisor
+from app.web.addresses import exposure, web_address
 from app.worker_process import run_worker_process
 
 THREAD_SWITCH_INTERVAL_S: Final = 0.001

@@ -21,8 +21,7 @@ from app.core.clock import REAL_TIME
 from app.db.outbox import latest_event_id
 from app.http_protocol import LimitedProtocol
 from app.main import create_app
-from app.network import addresses_elsewhere, unlock_link, web_address
-from app.qr import qr_text
+from app.web.addresses import addresses_elsewhere, qr_text, unlock_link, web_address
 
 STREAMS_END_WITHIN_S: Final = 3
 TICKS_A_SECOND: Final = 10

@@ -32,13 +32,12 @@ from app.common.logging import configure_logs
 from app.common.settings import Settings, is_loopback
 from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
+from app.db.outbox import DatabaseWatch
 from app.db.session import Database
 from app.fleet.tasks import VehicleConnectionManager
 from app.jobs.tasks import JobRunner, recover
-from app.live.address import live_address
-from app.live.messages import PublishedMessage, WorkerHello
+from app.live.messages import PublishedMessage, WorkerHello, live_address
 from app.live.server import LiveServer
-from app.live.watch import DatabaseWatch
 from app.processes.locks import LockedError, exclusive
 from app.processes.pool import ComputePool
 from app.studies.service import REPRODUCTION_JOB

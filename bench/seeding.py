@@ -20,12 +20,13 @@ from app.core.experiments.takeoff import WINDOW_S, Takeoff
 from app.core.gate import check_policy
 from app.core.strategies.base import Explanation, Interval, band_channels
 from app.core.trajectory import Trajectory
+from app.db import trajectories
 from app.db.migrate import migrate
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrajectoryRow, TrialRow
 from app.db.session import Database
+from app.db.trajectories import pack
 from app.fleet.schemas import VehicleChoice
 from app.trials import history
-from app.trials.codec import pack
 from app.trials.scoring import score
 
 SAMPLES: Final = 16_700
@@ -99,7 +100,7 @@ def _campaign(database: Database, name: str, flights: int, takeoffs: Takeoffs) -
                 gains = takeoffs.gains(number)
                 record = takeoffs.record(gains)
                 row = _trial(campaign_id, number, gains)
-                row.trajectory = history.store_trajectory(session, record)
+                row.trajectory = trajectories.store_trajectory(session, record)
                 judged = score(Takeoff(), record)
                 row.overshoot_m, row.curve = judged.overshoot, judged.curve
                 if number % SPOILT_EVERY == 0:
@@ -140,7 +141,7 @@ def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: i
         lower, upper = band_channels(Takeoff.output)
         altitude_m = modelled["altitude_m"]
         band = {Takeoff.output: altitude_m, lower: altitude_m - 0.15, upper: altitude_m + 0.15}
-        predicted = history.store_trajectory(session, Trajectory(modelled.time_s, band, "model", "simulation"))
+        predicted = trajectories.store_trajectory(session, Trajectory(modelled.time_s, band, "model", "simulation"))
         row = ProposalRow(
             campaign_id=campaign_id,
             history_digest=history.history_digest(

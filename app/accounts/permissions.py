@@ -1,4 +1,4 @@
-"""Permissions: the one table that routes and services consult. Pure decisions; `app.api.access` reads the caller from a
+"""Permissions: the one table that routes and services consult. Pure decisions; `app.web.origin` reads the caller from a
 request, `app.accounts.keyring` holds the secret behind the keys.
 
 A caller is on this computer or elsewhere, and holds a key or none. A forwarded request counts as from elsewhere: a

@@ -2,7 +2,7 @@
 
 A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
 campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
-in the database (`app.trials.codec`), with its own checksum. Version 1 lacks `abort_cause`.
+in the database (`app.db.trajectories`), with its own checksum. Version 1 lacks `abort_cause`.
 """
 
 from functools import cache

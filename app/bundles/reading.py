@@ -21,7 +21,7 @@ from pydantic import BaseModel, ValidationError
 from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Photo, Record
 from app.common.errors import GainlineError, InputError, Problem
 from app.core.experiments import EXPERIMENTS
-from app.trials.codec import Packed, unpack
+from app.db.trajectories import Packed, unpack
 from app.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.trials.photos import media_type_of
 

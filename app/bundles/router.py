@@ -7,11 +7,10 @@ from fastapi import APIRouter, status
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from app.api.deps import CurrentDatabase, CurrentSettings, Id
-from app.api.uploads import FILE_BODY, Record
 from app.bundles.reading import Bundle
 from app.bundles.service import store_bundle, write_bundle
 from app.campaigns.schemas import Campaign
+from app.web.dependencies import FILE_BODY, CurrentDatabase, CurrentSettings, Id, Record
 
 router = APIRouter(prefix="/api", tags=["bundles"])
 

@@ -18,6 +18,7 @@ from app.core.experiments.base import Scatter
 from app.core.statistics import groups_of, pool_scatter, select_winner
 from app.core.strategies.base import band_channels
 from app.core.trajectory import CHANNEL_UNITS, Trajectory
+from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
@@ -155,7 +156,7 @@ def _curves(session: Session, flown: Sequence[TrialRow], whole: Collection[int],
     At full rate for those in `whole` whose record is not damaged, else coarse.
     """
     recorded = [row for row in flown if row.trajectory_id is not None]
-    records = history.readable_of(
+    records = trajectories.readable_of(
         session, [row.trajectory_id for row in recorded if row.trajectory_id is not None and row.number in whole]
     )
     coarse = history.curves_of(session, [row for row in recorded if row.trajectory_id not in records])
@@ -224,7 +225,7 @@ def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _
     """Predicted curve of a proposal and its band, where there are any."""
     if proposal is None or proposal.predicted_id is None:
         return {"curve": None, "band": None}
-    predicted = history.readable_of(session, [proposal.predicted_id]).get(proposal.predicted_id)
+    predicted = trajectories.readable_of(session, [proposal.predicted_id]).get(proposal.predicted_id)
     if predicted is None:
         return {"curve": None, "band": None}
     lower, upper = band_channels(output)
@@ -237,7 +238,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     campaign = repository.get_one(session, row.campaign_id)
     experiment = get_experiment(campaign.experiment)
     set_point, reference = _goal(experiment.name)
-    record = None if row.trajectory_id is None else history.trajectory_of(session, row.trajectory_id)
+    record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)
     best = history.best_of(trials)
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
     channels = {} if record is None else record.channels

@@ -25,6 +25,7 @@ from app.core.gate import GateResult
 from app.core.policy import Gains, PolicySpace
 from app.core.spread import ParameterDistribution, prior_distribution
 from app.core.stopping import Reason, StopVerdict
+from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.jobs import service as jobs
 from app.trials import history
@@ -79,7 +80,7 @@ def store_proposal(session: Session, campaign_id: int, computed: ProposalComputa
     """
     campaign = repository.get_one(session, campaign_id)
     proposal = computed.proposal
-    predicted = None if proposal.predicted is None else history.store_trajectory(session, proposal.predicted)
+    predicted = None if proposal.predicted is None else trajectories.store_trajectory(session, proposal.predicted)
     row = ProposalRow(
         campaign_id=campaign_id,
         history_digest=computed.history_digest,

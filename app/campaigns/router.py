@@ -1,11 +1,18 @@
-"""Campaigns and their proposals over HTTP."""
+"""Campaigns and their proposals over HTTP.
 
-from typing import Annotated
+Figures over HTTP: Plotly JSON for the browser, with the same data as a table.
+
+The error landscape of a campaign over HTTP: a figure that is computed when it is first requested.
+
+Condition of a vehicle over HTTP, from its flights: calibration and batteries.
+"""
+
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, status
 
-from app.api.deps import CursorText, Id, IdempotentPost, Limit, Reader, RequestContextDep, Writer, json_only
-from app.campaigns import promoting, rehearsing, service
+from app.accounts.permissions import Permission, is_allowed
+from app.campaigns import drawing, landscapes, promoting, rehearsing, service, wear
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -19,9 +26,25 @@ from app.campaigns.schemas import (
     Sort,
 )
 from app.campaigns.statistics import campaign_statistics
-from app.common.schemas import Page
+from app.campaigns.wear import VehicleCalibration
+from app.common.errors import InputError, Problem
+from app.common.schemas import FigureCard, Page, figure_card
 from app.common.states import CampaignState
-from app.fleet.schemas import Vehicle
+from app.figures.history import Range
+from app.fleet import registering
+from app.fleet.schemas import Vehicle, VehicleEdit
+from app.web.dependencies import (
+    CurrentDatabase,
+    CursorText,
+    Id,
+    IdempotentPost,
+    Limit,
+    Reader,
+    RequestContextDep,
+    Theme,
+    Writer,
+    json_only,
+)
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
 
@@ -116,3 +139,99 @@ def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
 def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
     """Compute the proposal again."""
     return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))
+
+
+figures_router = APIRouter(prefix="/api", tags=["figures"])
+
+FigureName = Literal["takeoffs", "errors", "gains"]
+
+
+@figures_router.get("/campaigns/{campaign_id}/figures/{name}")
+def get_campaign_figure(
+    session: Reader,
+    campaign_id: Id,
+    name: FigureName,
+    theme: Theme = "light",
+    from_s: Annotated[float | None, Query(description="first second of the curves that is looked at")] = None,
+    to_s: Annotated[float | None, Query(description="last second of the curves that is looked at")] = None,
+    flight: Annotated[
+        int | None, Query(ge=1, le=2**31, description="number of a flight that is to have a curve of its own")
+    ] = None,
+) -> FigureCard:
+    """All takeoffs over the set point, the error of each flight, or the gains of each flight.
+
+    With more than 30 flights the takeoffs are drawn as an envelope; the first, the best, the latest and that `flight`
+    are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
+    """
+    view = drawing.FigureView(window=_window(from_s, to_s), chosen=flight)
+    return figure_card(drawing.campaign_figure(session, campaign_id, name, theme, view))
+
+
+def _window(from_s: float | None, to_s: float | None) -> Range | None:
+    """Time range of the curves. Raises InputError when it ends before it begins, or has one end only."""
+    if from_s is None and to_s is None:
+        return None
+    if from_s is None or to_s is None or not from_s < to_s:
+        raise InputError(
+            "These seconds cannot be drawn.",
+            problems=(Problem("to_s", "must be given together with from_s, and be later"),),
+            hint="Give both ends in seconds since the command, or none for the whole flight.",
+        )
+    return Range(from_s, to_s)
+
+
+@figures_router.get("/trials/{trial_id}/figure")
+def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> FigureCard:
+    """One flight, with its prediction and its commands."""
+    return figure_card(drawing.flight_figure(session, trial_id, theme))
+
+
+landscape_router = APIRouter(prefix="/api", tags=["figures"])
+
+
+@landscape_router.get("/campaigns/{campaign_id}/figures/landscape")
+def get_landscape(
+    database: CurrentDatabase,
+    asking: RequestContextDep,
+    campaign_id: Id,
+    theme: Theme = "light",
+    stacked: Annotated[bool, Query(description="slices one below the other, for a narrow page")] = False,
+) -> FigureCard:
+    """The gains as a path over the error that the strategy's model predicts, two gains at a time.
+
+    A job computes it for each proposal, started at the first request by a client that may make changes; until it is
+    done the card is `waiting`.
+    """
+    with database.read() as session:
+        asked = landscapes.landscape_card(session, campaign_id, theme, stacked=stacked)
+    if asked.wanted and is_allowed(Permission.CHANGE, asking.caller):
+        with database.write() as session:
+            landscapes.request_landscape(session, campaign_id)
+    return figure_card(asked.card)
+
+
+vehicles_router = APIRouter(prefix="/api/vehicles", tags=["vehicles"])
+
+
+@vehicles_router.get("/{vehicle_id}/calibration")
+def get_calibration(session: Reader, vehicle_id: Id) -> VehicleCalibration:
+    """The model as fitted after each flight, over all campaigns of the vehicle, and whether it should be tuned
+    again."""
+    return wear.calibration_of(session, vehicle_id)
+
+
+@vehicles_router.get("/{vehicle_id}/figures/{name}")
+def get_vehicle_figure(
+    session: Reader, vehicle_id: Id, name: Literal["calibration", "batteries"], theme: Theme = "light"
+) -> FigureCard:
+    """The fitted parameters over the vehicle's flights, or the battery voltages before and after each flight."""
+    return figure_card(wear.vehicle_figure(session, vehicle_id, name, theme))
+
+
+@vehicles_router.patch("/{vehicle_id}", dependencies=[Depends(json_only)])
+def edit_vehicle(session: Writer, asking: RequestContextDep, vehicle_id: Id, body: VehicleEdit) -> Vehicle:
+    """Change a registered vehicle's name, settings, battery or safe gains, while it is at rest."""
+    edited = registering.edit_vehicle(session, vehicle_id, body, asking)
+    if body.safe_gains is not None:
+        service.safe_gains_changed(session, vehicle_id)
+    return edited

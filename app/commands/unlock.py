@@ -10,8 +10,8 @@ from app.accounts.keyring import LINK_VALID_S, Keyring
 from app.accounts.permissions import Key
 from app.common.errors import UnavailableError
 from app.common.settings import Settings
-from app.network import unlock_link
 from app.processes.locks import signature
+from app.web.addresses import unlock_link
 
 _ANSWERS_WITHIN_S = 5.0
 

@@ -1,4 +1,4 @@
-"""The application's errors, derived from the core's root. Only `app.api.errors` maps them to HTTP.
+"""The application's errors, derived from the core's root. Only `app.web.errors` maps them to HTTP.
 
 GainlineError                 (app.core.errors)
 ├── InputError                unusable input

@@ -13,13 +13,14 @@ import binascii
 import json
 import unicodedata
 from datetime import datetime
-from typing import Annotated, Final, Generic, TypeVar
+from typing import Annotated, Final, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
 from app.common.errors import InputError
 from app.common.errors import Problem as FieldProblem
+from app.figures.base import Card
 
 _BIDIRECTIONAL: Final = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Marks, embeddings, overrides and isolates (Unicode Standard Annex 9)."""
@@ -183,3 +184,36 @@ def _refused(reason: str) -> InputError:
         problems=(FieldProblem("cursor", reason),),
         hint="Begin without a cursor, and pass on `next_cursor` unchanged.",
     )
+
+
+class FigureColumn(BaseModel):
+    """One column of a figure's table; `digits` after the decimal point, null for text."""
+
+    name: str
+    title: str
+    unit: str
+    digits: int | None
+
+
+class FigureTable(BaseModel):
+    """The figure's data as a table."""
+
+    columns: list[FigureColumn]
+    rows: list[list[str | int | float | None]]
+
+
+class FigureCard(BaseModel):
+    """A figure, or why there is none: `waiting` for data, or `failed`. `summary` says in a sentence what it shows."""
+
+    name: str
+    title: str
+    state: Literal["ready", "waiting", "failed"]
+    summary: str
+    reason: str
+    figure: Annotated[dict[str, object] | None, Field(description="Plotly's own JSON: data and layout")]
+    table: FigureTable | None
+
+
+def figure_card(card: Card) -> FigureCard:
+    """Convert a card to its API schema."""
+    return FigureCard.model_validate(card, from_attributes=True)

@@ -1,5 +1,5 @@
-"""States of campaigns, trials and their flights, vehicles and their acts, and jobs, with the transitions and actions that
-each allows. Stored and sent by their values.
+"""States of campaigns, trials and their flights, vehicles and their acts, and jobs, with the transitions and actions
+that each allows. Stored and sent by their values.
 """
 
 from collections.abc import Mapping

@@ -4,10 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import Reader
-from app.api.figures import FigureCard, Theme, figure_card
+from app.common.schemas import FigureCard, figure_card
 from app.compare import service
 from app.compare.schemas import FlightComparison
+from app.web.dependencies import Reader, Theme
 
 router = APIRouter(prefix="/api/compare", tags=["compare"])
 

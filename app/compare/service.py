@@ -15,11 +15,11 @@ from app.compare.sides import ComparisonFlight, sides_of
 from app.compare.verdicts import compare_pair, list_notes, overall_verdict
 from app.compare.words import file_stem
 from app.core.trajectory import CHANNEL_UNITS, Samples
+from app.db import trajectories
 from app.figures.base import Card, card_of
 from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure
 from app.figures.history import Curve
 from app.figures.theme import ThemeName
-from app.trials import history
 from app.trials.schemas import GroupBrief
 
 GRID_STEP_S: Final = 0.02
@@ -109,7 +109,7 @@ def _flight(side: ComparisonFlight, settings: list[FlightSetting]) -> ComparedFl
 def _drawn(session: Session, sides: Sequence[ComparisonFlight]) -> ComparisonData:
     experiment = sides[0].experiment
     recorded = [side.row.trajectory_id for side in sides if side.row.trajectory_id is not None]
-    records = history.trajectories_of(session, recorded)
+    records = trajectories.trajectories_of(session, recorded)
     unit = CHANNEL_UNITS[experiment.output]
     return ComparisonData(
         output_title=experiment.output.removesuffix(f"_{unit}").replace("_", " ").capitalize(),

@@ -4,12 +4,21 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, status
 
-from app.api.deps import CursorText, Id, IdempotentPost, Limit, Reader, Writer, json_only
-from app.api.figures import FigureCard, Theme, figure_card
-from app.api.uploads import REQUEST_BODY, Record
-from app.common.schemas import Page
+from app.common.schemas import FigureCard, Page, figure_card
 from app.controller_checks import service
 from app.controller_checks.schemas import ControllerCheck, ControllerCheckSummary
+from app.web.dependencies import (
+    REQUEST_BODY,
+    CursorText,
+    Id,
+    IdempotentPost,
+    Limit,
+    Reader,
+    Record,
+    Theme,
+    Writer,
+    json_only,
+)
 
 PREFIX = "/api/controller-checks"
 

@@ -222,7 +222,7 @@ class RehearsalRow(Base):
 
 
 class TrajectoryRow(Base):
-    """One recorded or predicted flight, packed by `app.trials.codec`. Written once; the database refuses changes."""
+    """One recorded or predicted flight, packed by `app.db.trajectories`. Written once; the database refuses changes."""
 
     __tablename__ = "trajectory"
     __table_args__ = (_NEVER_REUSE_IDS,)

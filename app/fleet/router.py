@@ -7,19 +7,6 @@ from starlette.concurrency import run_in_threadpool
 
 from app.accounts import permissions
 from app.accounts.permissions import is_allowed
-from app.api.deps import (
-    CurrentDatabase,
-    CursorText,
-    Id,
-    IdempotentPost,
-    Limit,
-    Live,
-    Reader,
-    RequestContextDep,
-    Writer,
-    json_only,
-)
-from app.campaigns import service as campaigns
 from app.common.schemas import Page
 from app.common.states import ActKind
 from app.fleet import acts, control, registering, service, views
@@ -32,10 +19,21 @@ from app.fleet.schemas import (
     Release,
     Vehicle,
     VehicleAct,
-    VehicleEdit,
     VehicleOrder,
 )
 from app.live.messages import NO_LINK
+from app.web.dependencies import (
+    CurrentDatabase,
+    CursorText,
+    Id,
+    IdempotentPost,
+    Limit,
+    Live,
+    Reader,
+    RequestContextDep,
+    Writer,
+    json_only,
+)
 
 router = APIRouter(prefix="/api/vehicles", tags=["vehicles"], dependencies=[Depends(json_only)])
 
@@ -55,15 +53,6 @@ def register_vehicle(act: IdempotentPost, asking: RequestContextDep, body: NewVe
 @router.get("/{vehicle_id}")
 def get_vehicle(session: Reader, vehicle_id: Id) -> Vehicle:
     return service.get_vehicle(session, vehicle_id)
-
-
-@router.patch("/{vehicle_id}")
-def edit_vehicle(session: Writer, asking: RequestContextDep, vehicle_id: Id, body: VehicleEdit) -> Vehicle:
-    """Change a registered vehicle's name, settings, battery or safe gains, while it is at rest."""
-    edited = registering.edit_vehicle(session, vehicle_id, body, asking)
-    if body.safe_gains is not None:
-        campaigns.safe_gains_changed(session, vehicle_id)
-    return edited
 
 
 @router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)

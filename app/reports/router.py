@@ -2,13 +2,13 @@
 
 from fastapi import APIRouter, Response
 
-from app.api.deps import CurrentDatabase, CurrentSettings, Id
 from app.campaigns.service import get_row
 from app.common.settings import Settings
 from app.db.session import Database
 from app.reports.printing import print_pdf
 from app.reports.rendering import Document, chart_library, file_name, render
 from app.reports.service import report_of
+from app.web.dependencies import CurrentDatabase, CurrentSettings, Id
 
 router = APIRouter(prefix="/api/campaigns", tags=["reports"])
 

@@ -12,6 +12,7 @@ from app.campaigns.landscapes import landscape_card
 from app.campaigns.schemas import Campaign
 from app.campaigns.statistics import campaign_statistics
 from app.common.schemas import Page
+from app.db.trajectories import damaged_trials
 from app.db.types import utc_now
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
@@ -21,7 +22,6 @@ from app.reports import anomalies, remarks
 from app.reports.content import Anomaly, Report
 from app.reports.settings_in_words import describe_method, describe_vehicle, experiment_of
 from app.trials import service as trials_service
-from app.trials.integrity import damaged_trials
 from app.trials.schemas import Trial
 
 _PAGE: Final = 200

@@ -4,12 +4,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, status
 
-from app.api.deps import IdempotentPost, Reader, json_only
-from app.api.figures import FigureCard, Theme, figure_card
-from app.common.schemas import Page
+from app.common.schemas import FigureCard, Page, figure_card
 from app.jobs.schemas import Job
 from app.studies import service
 from app.studies.schemas import Reproduction, ReproductionSummary, Run
+from app.web.dependencies import IdempotentPost, Reader, Theme, json_only
 
 router = APIRouter(prefix="/api/reproductions", tags=["reproductions"], dependencies=[Depends(json_only)])
 

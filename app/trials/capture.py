@@ -9,9 +9,9 @@ from app.core.experiments import get_experiment
 from app.core.glitches import find_glitches, repaired
 from app.core.stopping import landing_battery_v
 from app.core.trajectory import Trajectory
+from app.db import trajectories
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
-from app.trials import history
 from app.trials.lifecycle import set_trial_state
 from app.trials.scoring import score
 
@@ -34,9 +34,9 @@ def capture(
     that was aborted `on_request` counts against its gains only once a person says that the vehicle behaved badly.
     Raises TrajectoryError when the record cannot be stored.
     """
-    stored = history.store_trajectory(session, trajectory)
+    stored = trajectories.store_trajectory(session, trajectory)
     row.trajectory = stored
-    recorded = history.trajectory_of(session, stored.id)
+    recorded = trajectories.trajectory_of(session, stored.id)
     experiment = get_experiment(campaign.experiment)
     judged = score(experiment, recorded)
     glitches = find_glitches(experiment, recorded)

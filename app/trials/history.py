@@ -2,8 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
@@ -14,9 +13,10 @@ from app.common.states import HISTORY_TRIAL_STATES, NOT_AGAINST_GAINS, TrialStat
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
+from app.db import trajectories
 from app.db.models import FlightRow, TrajectoryRow, TrialRow
+from app.db.trajectories import trajectory_of, unpacked
 from app.trials import repository
-from app.trials.codec import Packed, pack, unpack
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
@@ -48,7 +48,7 @@ def curves_of(session: Session, trials: Sequence[TrialRow]) -> Mapping[int, list
 def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
     """The valid and aborted flights with their trajectories as stored."""
     rows = in_history(trials_of(session, campaign_id))
-    records = repository.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
+    records = trajectories.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
     return tuple(
         _flight(row, _NOTHING if row.trajectory_id is None else _recorded(row, records[row.trajectory_id]))
         for row in rows
@@ -157,63 +157,7 @@ def record_of(session: Session, row: TrialRow) -> Trajectory:
     """Full record of a trial. Raises NotFoundError when it has none, StorageError when it is damaged."""
     if row.trajectory_id is None:
         raise NotFoundError("record of trial", row.id, hint=f"The trial is {row.state}; only flights leave a record.")
-    return _recorded(row, repository.samples_of(session, [row.trajectory_id])[row.trajectory_id])
-
-
-def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
-    """A stored trajectory, verified against its checksum."""
-    return unpacked(repository.samples_of(session, [trajectory_id])[trajectory_id])
-
-
-def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
-    """Several stored trajectories, by id."""
-    return {identity: unpacked(row) for identity, row in repository.samples_of(session, trajectory_ids).items()}
-
-
-def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
-    """Several stored trajectories, by id, without the damaged ones."""
-    found: dict[int, Trajectory] = {}
-    for identity, row in repository.samples_of(session, trajectory_ids).items():
-        with suppress(StorageError):
-            found[identity] = unpacked(row)
-    return found
-
-
-def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
-    """Store a trajectory; the database refuses any later change.
-
-    Raises TrajectoryError when single precision cannot hold it.
-    """
-    packed = pack(trajectory)
-    row = TrajectoryRow(
-        codec=packed.codec,
-        columns=packed.columns,
-        samples=packed.samples,
-        duration_s=packed.duration_s,
-        source=packed.source,
-        clock=packed.clock,
-        checksum=packed.checksum,
-        data=packed.data,
-    )
-    session.add(row)
-    session.flush()
-    return row
-
-
-def unpacked(row: TrajectoryRow) -> Trajectory:
-    """A stored record, verified against its checksum. Raises StorageError when it is damaged."""
-    return unpack(
-        Packed(
-            codec=row.codec,
-            columns=row.columns,
-            samples=row.samples,
-            duration_s=row.duration_s,
-            source=row.source,
-            clock=row.clock,
-            checksum=row.checksum,
-            data=row.data,
-        )
-    )
+    return _recorded(row, trajectories.samples_of(session, [row.trajectory_id])[row.trajectory_id])
 
 
 def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:

@@ -11,8 +11,7 @@ from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.state_machine import check_action
-from app.common.states import CAMPAIGN_ACTIONS as CAMPAIGN_ACTIONS
-from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState, TrialState
+from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState, TrialState
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from sqlalchemy import delete, func, select
-from sqlalchemy.orm import Session, defer, joinedload, undefer
+from sqlalchemy.orm import Session, defer, joinedload
 
 from app.common.errors import NotFoundError
 from app.common.states import ACTIVE_FLIGHT_STATES, FlightState, TrialState
@@ -97,25 +97,6 @@ def delete_unclaimed_flights(session: Session, campaign_id: int) -> None:
 def next_number(session: Session, campaign_id: int) -> int:
     last = session.scalar(select(func.max(TrialRow.number)).where(TrialRow.campaign_id == campaign_id))
     return (last or 0) + 1
-
-
-def recorded(session: Session, campaign_id: int | None = None) -> Sequence[TrialRow]:
-    """Trials of one campaign, or of all, that have a record; by campaign and number."""
-    wanted = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
-    if campaign_id is not None:
-        wanted = wanted.where(TrialRow.campaign_id == campaign_id)
-    large = (TrialRow.gate, TrialRow.curve, TrialRow.settings)
-    return session.scalars(
-        wanted.options(*(defer(column) for column in large)).order_by(TrialRow.campaign_id, TrialRow.number)
-    ).all()
-
-
-def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
-    """Records with their samples, by id."""
-    rows = session.scalars(
-        select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids)).options(undefer(TrajectoryRow.data))
-    )
-    return {row.id: row for row in rows}
 
 
 def photos(session: Session, trial_id: int) -> Sequence[TrialPhotoRow]:

@@ -6,20 +6,6 @@ from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from app.api.deps import (
-    CurrentDatabase,
-    CurrentSettings,
-    CursorText,
-    Id,
-    IdempotentPost,
-    Limit,
-    Live,
-    Reader,
-    RequestContextDep,
-    Writer,
-    json_only,
-)
-from app.api.uploads import FILE_BODY, REQUEST_BODY, Record
 from app.common.schemas import Page
 from app.trials import orders, photos, service
 from app.trials.schemas import (
@@ -33,6 +19,22 @@ from app.trials.schemas import (
     Trial,
     TrialEdit,
     TrialPhoto,
+)
+from app.web.dependencies import (
+    FILE_BODY,
+    REQUEST_BODY,
+    CurrentDatabase,
+    CurrentSettings,
+    CursorText,
+    Id,
+    IdempotentPost,
+    Limit,
+    Live,
+    Reader,
+    Record,
+    RequestContextDep,
+    Writer,
+    json_only,
 )
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])

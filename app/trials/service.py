@@ -18,13 +18,13 @@ from app.common.schemas import Page, decode_cursor, encode_cursor
 from app.common.state_machine import check_action, check_transition, check_version
 from app.common.states import (
     BUDGETED_TRIAL_STATES,
+    CAMPAIGN_ACTIONS,
     HISTORY_TRIAL_STATES,
     TRIAL_ACTIONS,
     TRIAL_TRANSITIONS,
     TrialKind,
     TrialState,
 )
-from app.common.states import CAMPAIGN_ACTIONS as CAMPAIGN_ACTIONS
 from app.core.definition import flight_seed
 from app.core.errors import GainlineError, InputError, Problem
 from app.core.experiments import get_experiment

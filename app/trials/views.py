@@ -7,8 +7,7 @@ from sqlalchemy.orm import Session
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.common.schemas import Gate, Interval
 from app.common.state_machine import allowed
-from app.common.states import ACTIVE_FLIGHT_STATES, TRIAL_ACTIONS, FlightState, TrialState
-from app.common.states import CAMPAIGN_ACTIONS as CAMPAIGN_ACTIONS
+from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.experiments import get_experiment
 from app.core.thinning import select_samples
 from app.core.trajectory import CHANNEL_UNITS, Trajectory

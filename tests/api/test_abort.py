@@ -11,8 +11,7 @@ from sqlalchemy.pool import QueuePool
 
 from app.common.settings import Settings
 from app.db.session import Database
-from app.live.address import live_address
-from app.live.messages import WorkerHello
+from app.live.messages import WorkerHello, live_address
 from app.live.server import LiveServer
 from tests.builders import get
 

@@ -6,8 +6,7 @@ from concurrent.futures import Future
 from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
-from app.live.address import live_address
-from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello
+from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello, live_address
 from app.live.server import LiveServer
 from tests.api.test_abort import wait_until
 from tests.builders import get

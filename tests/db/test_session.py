@@ -13,7 +13,7 @@ from app.common.errors import StorageError
 from app.common.states import FlightState, JobState, VehicleState
 from app.db.models import CampaignRow, EventRow, FlightRow, JobRow, TrajectoryRow, VehicleRow
 from app.db.session import Database
-from app.trials.history import store_trajectory
+from app.db.trajectories import store_trajectory
 from tests.builders import create_campaign, create_climb, create_ready_campaign, create_trial
 from tests.conftest import Listen
 

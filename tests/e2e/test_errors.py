@@ -14,7 +14,6 @@ import pytest
 from playwright.sync_api import FilePayload, Response, Route, expect
 
 import app.common.errors
-from app.api import errors as over_http
 from app.common.errors import (
     BusyError,
     ConflictError,
@@ -31,7 +30,8 @@ from app.common.errors import (
     UnavailableError,
     UnconfirmedError,
 )
-from app.live.client import LinkDownError
+from app.live.link import LinkDownError
+from app.web import errors as over_http
 from tests.e2e.conftest import Opener, Server, served
 from tests.e2e.dashboard import Dashboard, Json, open_details
 from tests.e2e.states import States

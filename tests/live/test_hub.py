@@ -6,10 +6,9 @@ import threading
 from dataclasses import replace
 from pathlib import Path
 
-from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live
-from app.live.memory import LiveState
+from app.db.outbox import DatabaseWatch
+from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live, LiveState
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
-from app.live.watch import DatabaseWatch
 
 
 def change(number: int) -> Change:

@@ -16,11 +16,10 @@ import pytest
 
 from app.core.errors import InputError
 from app.db.session import Database
-from app.live import client as client_module
-from app.live.address import LONGEST_PATH_BYTES, live_address
-from app.live.client import LinkDownError, LiveClient
-from app.live.link import live_link
+from app.live import link as client_module
+from app.live.link import LinkDownError, LiveClient, live_link
 from app.live.messages import (
+    LONGEST_PATH_BYTES,
     Abort,
     AbortAnswer,
     FlightPhase,
@@ -34,6 +33,7 @@ from app.live.messages import (
     WorkerHello,
     decode,
     encode,
+    live_address,
 )
 from app.live.server import SLOW_CLIENT_BYTES, LiveServer
 

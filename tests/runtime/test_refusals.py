@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.network import addresses_elsewhere, exposure, web_address
+from app.web.addresses import addresses_elsewhere, exposure, web_address
 from tests.runtime.processes import PATIENCE_S, Serving, environment, stream
 
 

@@ -1,5 +1,9 @@
-"""Addresses under which other devices reach this server, and what that exposes."""
+"""Addresses under which other devices reach this server, and what that exposes.
 
+QR codes of addresses: as SVG for a page, as text for a terminal.
+"""
+
+import io
 import ipaddress
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -76,3 +80,25 @@ def _own_addresses(version: int) -> Iterator[tuple[ipaddress.IPv4Address | ipadd
             unusable = address.is_loopback or (address.version == 6 and address.is_link_local)
             if address.version == version and not unusable:
                 yield address, adapter.nice_name
+
+
+_WHITE_ON_BLACK: Final = "\x1b[97;40m"
+_RESET: Final = "\x1b[0m"
+
+
+def qr_svg(text: str) -> bytes:
+    """SVG of dark modules on white with the quiet zone that readers need, so that it also works on a dark page."""
+    import segno
+
+    drawn = io.BytesIO()
+    segno.make_qr(text).save(drawn, kind="svg", border=4, dark="#000", light="#fff", omitsize=True, title=text)
+    return drawn.getvalue()
+
+
+def qr_text(text: str) -> str:
+    """The code in half blocks, white on black whatever the terminal's colours."""
+    import segno
+
+    drawn = io.StringIO()
+    segno.make_qr(text).terminal(drawn, border=2, compact=True)
+    return "\n".join(f"{_WHITE_ON_BLACK}{line}{_RESET}" for line in drawn.getvalue().splitlines())

@@ -13,7 +13,7 @@ from app.common.errors import StorageError
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
 from app.core.trajectory import Trajectory
-from app.trials.codec import pack, unpack
+from app.db.trajectories import pack, unpack
 from tests.builders import create_climb
 
 SINGLE = st.floats(width=32, allow_nan=False, allow_infinity=False)

@@ -9,14 +9,14 @@ from fastapi import APIRouter, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app import __version__
-from app.api.deps import CurrentDatabase, Live
 from app.db.outbox import holds_everything_after, latest_event_before, latest_event_id
 from app.db.session import Database
 from app.db.types import utc_now
 from app.live.hub import Change, LinkState
 from app.live.hub import Live as LiveItem
+from app.live.link import changes_after
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
-from app.live.tail import changes_after
+from app.web.dependencies import CurrentDatabase, Live
 
 RETRY_MS: Final = 1000
 MAX_SINCE_S: Final = 60.0

@@ -1,4 +1,7 @@
-"""Errors over HTTP: problem details (RFC 9457) with a hint. The only module that maps errors to status codes."""
+"""Errors over HTTP: problem details (RFC 9457) with a hint. The only module that maps errors to status codes.
+
+The OpenAPI document: FastAPI's own, plus the problem details that every operation may answer with.
+"""
 
 import errno
 import json
@@ -10,6 +13,7 @@ from typing import Any, Final
 import structlog
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from fastapi.openapi.constants import REF_TEMPLATE
 from starlette.exceptions import HTTPException
 
 from app.common.errors import (
@@ -29,7 +33,7 @@ from app.common.errors import (
     UnconfirmedError,
 )
 from app.common.schemas import Problem, ProblemField
-from app.live.client import LinkDownError
+from app.live.link import LinkDownError
 
 MEDIA_TYPE: Final = "application/problem+json"
 
@@ -187,3 +191,19 @@ async def _unforeseen(request: Request, error: Exception) -> Response:
         f"The program made a mistake (number {number}); nothing of this request was stored.",
         f"Try again. If it happens again, report it with the number {number} and the log.",
     )
+
+
+def describe(app: FastAPI) -> None:
+    """Add the problem schema to the application's OpenAPI document."""
+    plain = app.openapi
+
+    def complete() -> dict[str, Any]:
+        document = plain()
+        schemas = document.setdefault("components", {}).setdefault("schemas", {})
+        if "Problem" not in schemas:
+            problem = Problem.model_json_schema(ref_template=REF_TEMPLATE)
+            schemas.update(problem.pop("$defs"))
+            schemas["Problem"] = problem
+        return document
+
+    app.openapi = complete  # type: ignore[method-assign]

@@ -10,14 +10,13 @@ from fastapi.responses import StreamingResponse
 from pydantic import BaseModel
 
 from app import __version__
-from app.api.deps import CurrentDatabase, CurrentSettings, Live
 from app.common.data_folder import folder_bytes
 from app.common.errors import InputError, Problem
 from app.db.backup import database_bytes, take_backup
 from app.db.migrate import revision_of
-from app.network import EXPOSES, addresses_elsewhere, exposure, is_in_container
-from app.qr import qr_svg
-from app.trials.integrity import require_intact
+from app.db.trajectories import require_intact
+from app.web.addresses import EXPOSES, addresses_elsewhere, exposure, is_in_container, qr_svg
+from app.web.dependencies import CurrentDatabase, CurrentSettings, Live
 
 router = APIRouter(prefix="/api/system", tags=["system"])
 

@@ -6,7 +6,6 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from app import __version__
-from app.api.deps import Live
 from app.campaigns.files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue
@@ -17,6 +16,7 @@ from app.core.trajectory import CHANNEL_UNITS
 from app.fleet.kinds import is_registered_one_by_one
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind
+from app.web.dependencies import Live
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 

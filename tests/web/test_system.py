@@ -13,7 +13,6 @@ import pytest
 import segno
 from fastapi.testclient import TestClient
 
-from app import network
 from app.common.data_folder import folder_bytes
 from app.common.settings import Settings
 from app.db.backup import SPARE_BYTES
@@ -21,6 +20,7 @@ from app.db.migrate import migrate
 from app.db.revision import REVISION
 from app.db.session import Database
 from app.main import create_app
+from app.web import addresses
 from tests.builders import Json, create_campaign, get, problems_of
 
 TABLET = "http://192.0.2.7:8000"
@@ -98,7 +98,7 @@ def test_listening_everywhere_is_told_as_the_addresses_of_this_machine(monkeypat
     everywhere = "0.0.0.0"
     hosts = {"wlan0": ["192.0.2.7", "169.254.1.1"], "lo": ["127.0.0.1"], "docker0": ["172.17.0.1"]}
     monkeypatch.setattr(ifaddr, "get_adapters", lambda: [Adapter(name, ips) for name, ips in hosts.items()])
-    found = [(each.url, each.interface) for each in network.addresses_elsewhere(everywhere, 8000)]
+    found = [(each.url, each.interface) for each in addresses.addresses_elsewhere(everywhere, 8000)]
     assert found == [("http://192.0.2.7:8000", "wlan0"), ("http://169.254.1.1:8000", "wlan0")]
 
 

@@ -1,0 +1,254 @@
+"""Storage format of a trajectory: single-precision columns, byte-shuffled and compressed, with a version number.
+
+Version 1: the columns (time first) as little-endian float32, shape (columns, samples). The four bytes of each column's
+numbers are gathered plane by plane, because neighbouring samples share their high bytes; then zstd level 3 over all.
+The checksum is the SHA-256 of the column names, a NUL, and the plain float32 bytes.
+
+Integrity of stored flight records: every record is verified against its checksum.
+"""
+
+import hashlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+from sqlalchemy import select
+from sqlalchemy.orm import Session, defer, undefer
+
+from app.common.errors import StorageError
+from app.core.errors import Problem, TrajectoryError
+from app.core.trajectory import Trajectory
+from app.db.models import TrajectoryRow, TrialRow
+from app.db.session import Database
+
+VERSION: Final = 1
+_LEVEL: Final = 3
+_TIME: Final = "time_s"
+_WIDTH: Final = 4
+
+Table = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Packed:
+    """A trajectory as stored in the database."""
+
+    codec: int
+    columns: list[str]
+    samples: int
+    duration_s: float
+    source: str
+    clock: str
+    checksum: str
+    data: bytes
+
+
+def pack(trajectory: Trajectory) -> Packed:
+    """Pack a trajectory for storage.
+
+    Raises TrajectoryError when single precision cannot hold it: a number is too large, or time stamps collapse.
+    """
+    columns = [_TIME, *trajectory.channels]
+    with np.errstate(over="ignore"):
+        table = np.vstack([trajectory.time_s, *trajectory.channels.values()]).astype("<f4")
+    _require_storable(columns, table)
+    plain = table.tobytes()
+    planes = table.view(np.uint8).reshape(len(columns), -1, _WIDTH).transpose(0, 2, 1)
+    return Packed(
+        codec=VERSION,
+        columns=columns,
+        samples=table.shape[1],
+        duration_s=float(table[0, -1] - table[0, 0]),
+        source=trajectory.source,
+        clock=trajectory.clock,
+        checksum=_checksum(columns, plain),
+        data=zstandard.ZstdCompressor(level=_LEVEL).compress(planes.tobytes()),
+    )
+
+
+def unpack(packed: Packed) -> Trajectory:
+    """Unpack a stored trajectory in single precision. Raises StorageError when the record is damaged."""
+    if packed.codec != VERSION:
+        raise StorageError(
+            f"A flight record has the unknown version {packed.codec}.",
+            hint="It was written by a newer Gainline; open it with that one.",
+        )
+    size = len(packed.columns) * packed.samples * _WIDTH
+    try:
+        planes = zstandard.ZstdDecompressor().decompress(packed.data, max_output_size=size)
+        shuffled = np.frombuffer(planes, np.uint8).reshape(len(packed.columns), _WIDTH, packed.samples)
+    except (zstandard.ZstdError, ValueError) as error:
+        raise _damaged() from error
+    table = np.ascontiguousarray(shuffled.transpose(0, 2, 1)).view("<f4")[..., 0]
+    if _checksum(packed.columns, table.tobytes()) != packed.checksum:
+        raise _damaged()
+    numbers = table.astype(np.float64)
+    return Trajectory(numbers[0], dict(zip(packed.columns[1:], numbers[1:], strict=True)), packed.source, packed.clock)
+
+
+def _require_storable(columns: list[str], table: Table) -> None:
+    if table.shape[1] == 0:
+        raise TrajectoryError(
+            "This record is empty.",
+            hint="Send a record with at least two samples.",
+            problems=(Problem(_TIME, "has no samples"),),
+        )
+    finite = np.isfinite(table)
+    if not finite.all():
+        column, sample = (int(index) for index in np.argwhere(~finite)[0])
+        raise TrajectoryError(
+            "This record holds a number that cannot be stored.",
+            hint="Correct the record and send it again.",
+            problems=(Problem(columns[column], f"is not finite, or larger than 3.4e38, at sample {sample}"),),
+        )
+    if (np.diff(table[0]) <= 0).any():
+        sample = int(np.argmax(np.diff(table[0]) <= 0)) + 1
+        raise TrajectoryError(
+            "The time stamps of this record do not rise once they are stored (single precision).",
+            hint="Let time start near zero at the command, and sample no faster than 100 kHz.",
+            problems=(Problem(_TIME, f"does not rise at sample {sample}"),),
+        )
+
+
+def _checksum(columns: list[str], plain: bytes) -> str:
+    return hashlib.sha256(b"\n".join(name.encode() for name in columns) + b"\0" + plain).hexdigest()
+
+
+def _damaged() -> StorageError:
+    return StorageError(
+        "A stored flight record is damaged: its checksum does not fit.",
+        hint="Restore it from a backup; the trial's other figures are intact.",
+    )
+
+
+def recorded(session: Session, campaign_id: int | None = None) -> Sequence[TrialRow]:
+    """Trials of one campaign, or of all, that have a record; by campaign and number."""
+    wanted = select(TrialRow).where(TrialRow.trajectory_id.is_not(None))
+    if campaign_id is not None:
+        wanted = wanted.where(TrialRow.campaign_id == campaign_id)
+    large = (TrialRow.gate, TrialRow.curve, TrialRow.settings)
+    return session.scalars(
+        wanted.options(*(defer(column) for column in large)).order_by(TrialRow.campaign_id, TrialRow.number)
+    ).all()
+
+
+def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int, TrajectoryRow]:
+    """Records with their samples, by id."""
+    rows = session.scalars(
+        select(TrajectoryRow).where(TrajectoryRow.id.in_(trajectory_ids)).options(undefer(TrajectoryRow.data))
+    )
+    return {row.id: row for row in rows}
+
+
+def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
+    """A stored trajectory, verified against its checksum."""
+    return unpacked(samples_of(session, [trajectory_id])[trajectory_id])
+
+
+def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
+    """Several stored trajectories, by id."""
+    return {identity: unpacked(row) for identity, row in samples_of(session, trajectory_ids).items()}
+
+
+def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
+    """Several stored trajectories, by id, without the damaged ones."""
+    found: dict[int, Trajectory] = {}
+    for identity, row in samples_of(session, trajectory_ids).items():
+        with suppress(StorageError):
+            found[identity] = unpacked(row)
+    return found
+
+
+def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
+    """Store a trajectory; the database refuses any later change.
+
+    Raises TrajectoryError when single precision cannot hold it.
+    """
+    packed = pack(trajectory)
+    row = TrajectoryRow(
+        codec=packed.codec,
+        columns=packed.columns,
+        samples=packed.samples,
+        duration_s=packed.duration_s,
+        source=packed.source,
+        clock=packed.clock,
+        checksum=packed.checksum,
+        data=packed.data,
+    )
+    session.add(row)
+    session.flush()
+    return row
+
+
+def unpacked(row: TrajectoryRow) -> Trajectory:
+    """A stored record, verified against its checksum. Raises StorageError when it is damaged."""
+    return unpack(
+        Packed(
+            codec=row.codec,
+            columns=row.columns,
+            samples=row.samples,
+            duration_s=row.duration_s,
+            source=row.source,
+            clock=row.clock,
+            checksum=row.checksum,
+            data=row.data,
+        )
+    )
+
+
+_NAMED: Final = 5
+_AT_ONCE: Final = 20
+
+
+def is_intact(row: TrajectoryRow) -> bool:
+    """Whether the record's samples match its checksum."""
+    try:
+        unpacked(row)
+    except StorageError:
+        return False
+    return True
+
+
+def damaged_trials(session: Session, campaign_id: int | None = None) -> list[TrialRow]:
+    """Trials of one campaign, or of all, whose record is damaged; by campaign and number."""
+    return [row for row, record in _recorded(session, campaign_id) if not is_intact(record)]
+
+
+def require_intact(database_file: Path) -> None:
+    """Verify all records of a database. Raises StorageError that names every trial whose record is damaged."""
+    with closing(Database(database_file)) as database, database.read() as session:
+        damaged = damaged_trials(session)
+        if damaged:
+            raise refused_for(damaged, "The backup was not made")
+
+
+def refused_for(damaged: Sequence[TrialRow], what: str) -> StorageError:
+    """Error that says what was not done because these trials' records are damaged."""
+    names = [f"trial {row.number} of campaign {row.campaign_id}" for row in damaged]
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    records = "the record of" if len(names) == 1 else f"{len(names)} records are damaged, those of"
+    ending = " is damaged: its checksum does not fit." if len(names) == 1 else "."
+    return StorageError(
+        f"{what}: {records} {', '.join(names[:_NAMED])}{more}{ending}",
+        hint="Everything else is intact. Take the damaged records from an earlier backup or bundle; to keep the "
+        "database as it is, stop Gainline and copy gainline.sqlite3.",
+        problems=tuple(Problem(name, "its record does not fit its checksum") for name in names),
+    )
+
+
+def _recorded(session: Session, campaign_id: int | None) -> Iterator[tuple[TrialRow, TrajectoryRow]]:
+    """Trials with their records, loaded in batches because all of them may not fit into memory."""
+    rows = recorded(session, campaign_id)
+    for first in range(0, len(rows), _AT_ONCE):
+        some = rows[first : first + _AT_ONCE]
+        records = samples_of(session, [row.trajectory_id for row in some if row.trajectory_id is not None])
+        for row in some:
+            if row.trajectory_id is not None:
+                yield row, records[row.trajectory_id]
+        for record in records.values():
+            session.expire(record, ["data"])

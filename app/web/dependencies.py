@@ -1,0 +1,281 @@
+"""Dependencies of routes: a session to read, a session to write, and idempotent POST requests.
+
+Uploaded flight records: spooled while they arrive, limited by the application's limit on bodies.
+"""
+
+import hashlib
+import tempfile
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Annotated, BinaryIO, Final, TypeVar
+
+from fastapi import Depends, Header, Path, Query, Request
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import FormData, UploadFile
+
+from app.accounts.permissions import RequestContext
+from app.common.errors import InputError, MediaTypeError, Problem
+from app.common.settings import Settings
+from app.db.idempotency import carry_out_once
+from app.db.session import Database
+from app.figures.theme import ThemeName
+from app.live.link import Live as LiveLink
+from app.web.origin import caller_of
+
+M = TypeVar("M", bound=BaseModel)
+
+Id = Annotated[int, Path(ge=1, le=2**63 - 1)]
+Limit = Annotated[int, Query(ge=1, le=200, description="how many items the page may hold")]
+CursorText = Annotated[str | None, Query(max_length=500, description="`next_cursor` of the page before")]
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        description="a text of the caller's own, new for each act: the same request sent again with it is harmless",
+    ),
+]
+
+ControlToken = Annotated[
+    str | None,
+    Header(
+        alias="X-Gainline-Control",
+        max_length=100,
+        description="token of the lease by which one is in control of the vehicle",
+    ),
+]
+
+
+# These are coroutines and so need no thread: an abort gets through while every thread waits for the database.
+
+
+async def _database(request: Request) -> Database:
+    database: Database = request.app.state.database
+    return database
+
+
+async def _live(request: Request) -> LiveLink:
+    live: LiveLink = request.app.state.live
+    return live
+
+
+CurrentDatabase = Annotated[Database, Depends(_database)]
+Live = Annotated[LiveLink, Depends(_live)]
+
+
+async def _settings(request: Request) -> Settings:
+    settings: Settings = request.app.state.settings
+    return settings
+
+
+CurrentSettings = Annotated[Settings, Depends(_settings)]
+
+
+async def _request_context(request: Request, settings: CurrentSettings, token: ControlToken = None) -> RequestContext:
+    """Build the request context. Scripts in a page cannot set Sec-Fetch-Site; only the browser does."""
+    return RequestContext(
+        token=token,
+        caller=caller_of(request),
+        from_our_page=request.headers.get("sec-fetch-site") == "same-origin",
+        simulation_hosts=settings.simulation_hosts,
+    )
+
+
+RequestContextDep = Annotated[RequestContext, Depends(_request_context)]
+
+
+def _reader(database: CurrentDatabase) -> Iterator[Session]:
+    with database.read() as session:
+        yield session
+
+
+def _writer(database: CurrentDatabase) -> Iterator[Session]:
+    with database.write() as session:
+        yield session
+
+
+# Scope "function": the transaction has ended before the response is sent.
+Reader = Annotated[Session, Depends(_reader, scope="function")]
+Writer = Annotated[Session, Depends(_writer, scope="function")]
+
+
+class IdempotentRequest:
+    """Carries out a POST in one transaction, and only once for requests with the same idempotency key."""
+
+    def __init__(self, database: Database, key: str | None, fingerprint: str) -> None:
+        self._database = database
+        self._key = key
+        self._fingerprint = fingerprint
+
+    def __call__(
+        self, answer: type[M], work: Callable[[Session], M], *, ahead: Callable[[Session], None] | None = None
+    ) -> M:
+        """Return the result of `work`, or its stored result of the first time. Raises KeyReusedError for another
+        request.
+
+        `ahead` reads and computes before the transaction, so that the write lock is held for a short time only.
+        """
+        if ahead is not None:
+            with self._database.read() as session:
+                ahead(session)
+        with self._database.write() as session:
+            if self._key is None:
+                return work(session)
+            return carry_out_once(session, self._key, self._fingerprint, answer, work)
+
+
+def fingerprint(request: Request, body_digest: str) -> str:
+    """Fingerprint of a request; two requests are the same if method, path and body are."""
+    return hashlib.sha256(f"{request.method} {request.url.path} {body_digest}".encode()).hexdigest()
+
+
+async def _once(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> IdempotentRequest:
+    return IdempotentRequest(database, key, fingerprint(request, hashlib.sha256(await request.body()).hexdigest()))
+
+
+IdempotentPost = Annotated[IdempotentRequest, Depends(_once)]
+
+
+async def json_only(request: Request) -> None:
+    """Refuse a body that is not JSON with a sentence about it, rather than with a list of missing fields."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    has_body = request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers
+    if has_body and kind != "application/json":
+        raise MediaTypeError(
+            f"The body is {kind or 'of no stated type'}, and JSON is expected here.",
+            hint="Send JSON with the header `Content-Type: application/json`.",
+        )
+
+
+Theme = Annotated[ThemeName, Query(description="colours for a light or a dark page")]
+
+
+_IN_MEMORY_BYTES: Final = 2**20
+_CHUNK_BYTES: Final = 2**18
+_CSV: Final = "text/csv"
+_ANY: Final = "application/octet-stream"
+
+_BINARY: Final = {"schema": {"type": "string", "format": "binary"}}
+REQUEST_BODY: Final = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {
+                        "file": {"type": "string", "format": "binary"},
+                        "companion": {
+                            "type": "string",
+                            "format": "binary",
+                            "description": "the .log file that Paparazzi writes beside a .data file",
+                        },
+                    },
+                }
+            },
+            _CSV: _BINARY,
+            _ANY: _BINARY,
+        },
+    }
+}
+"""Request body of a flight record, for OpenAPI."""
+
+FILE_BODY: Final = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {"type": "object", "required": ["file"], "properties": {"file": _BINARY["schema"]}}
+            },
+            _ANY: _BINARY,
+        },
+    }
+}
+"""Request body of one file of any kind, for OpenAPI."""
+
+
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """A completely received record, and the transaction that may store it; `name` is its file name, empty if not
+    given."""
+
+    file: BinaryIO
+    name: str
+    companion: BinaryIO | None
+    once: IdempotentRequest
+
+    def content(self) -> bytes:
+        """The whole file; its size is bounded by the limit on bodies."""
+        self.file.seek(0)
+        return self.file.read()
+
+    def read_companion(self) -> bytes | None:
+        """The whole companion file, if there is one."""
+        if self.companion is None:
+            return None
+        self.companion.seek(0)
+        return self.companion.read()
+
+
+@dataclass(frozen=True, slots=True)
+class _ReceivedUpload:
+    file: BinaryIO
+    name: str
+    companion: BinaryIO | None
+    digest: str
+
+
+async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> AsyncIterator[Upload]:
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    arriving = _ARRIVING.get(kind)
+    if arriving is None:
+        raise MediaTypeError(
+            f"A record of type {kind or 'that is not stated'} is not read here.",
+            hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
+        )
+    async with arriving(request) as arrived:
+        once = IdempotentRequest(database, key, fingerprint(request, f"{request.url.query} {arrived.digest}"))
+        yield Upload(arrived.file, arrived.name, arrived.companion, once)
+
+
+@asynccontextmanager
+async def _raw(request: Request) -> AsyncIterator[_ReceivedUpload]:
+    digest = hashlib.sha256()
+    with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as spool:
+        async for chunk in request.stream():
+            digest.update(chunk)
+            await run_in_threadpool(spool.write, chunk)
+        yield _ReceivedUpload(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]  # it reads and seeks as BinaryIO does
+
+
+@asynccontextmanager
+async def _form(request: Request) -> AsyncIterator[_ReceivedUpload]:
+    digest = hashlib.sha256()
+    async with request.form(max_files=2, max_fields=4) as form:
+        part, companion = _part(form, "file"), _part(form, "companion")
+        if part is None:
+            raise InputError(
+                "The form holds no file.",
+                hint="Send the record in the form field `file`.",
+                problems=(Problem("file", "is missing"),),
+            )
+        for each in (part, companion):
+            while each is not None and (chunk := await each.read(_CHUNK_BYTES)):
+                digest.update(chunk)
+        beside = None if companion is None else companion.file
+        yield _ReceivedUpload(part.file, part.filename or "", beside, digest.hexdigest())
+
+
+def _part(form: FormData, name: str) -> UploadFile | None:
+    part = form.get(name)
+    return part if isinstance(part, UploadFile) else None
+
+
+_ARRIVING: Final = {_CSV: _raw, "application/csv": _raw, _ANY: _raw, "multipart/form-data": _form}
+
+Record = Annotated[Upload, Depends(_upload)]
