@@ -23,6 +23,7 @@ from app.controller_checks.router import router as controller_checks
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.fleet.router import router as fleet
+from app.flights.router import router as flights
 from app.jobs.router import router as jobs
 from app.live.link import live_link
 from app.reports.router import router as reports
@@ -76,6 +77,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         unlock_router,
         campaigns,
         trials,
+        flights,
         records,
         fleet,
         jobs,

@@ -34,7 +34,9 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import Database
-from app.fleet.tasks import VehicleConnectionManager
+from app.flights.abort import AbortRegistry
+from app.flights.connection_manager import VehicleConnectionManager
+from app.flights.runner import FlightRunner
 from app.jobs.tasks import JobRunner, recover
 from app.live.messages import PublishedMessage, WorkerHello, live_address
 from app.live.server import LiveServer
@@ -42,8 +44,6 @@ from app.processes.locks import LockedError, exclusive
 from app.processes.pool import ComputePool
 from app.studies.service import REPRODUCTION_JOB
 from app.studies.tasks import ReproductionJob
-from app.trials.flying import AbortRegistry
-from app.trials.tasks import FlightRunner
 
 FLIGHTS_AT_ONCE: Final = 8
 ACTS_AT_ONCE: Final = 8

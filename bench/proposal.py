@@ -23,10 +23,9 @@ from app.campaigns.tasks import ProposalJob
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
+from app.flights import queue, requests
 from app.jobs.tasks import JobRunner
 from app.processes.pool import ComputePool
-from app.trials import flights
-from app.trials import service as trials
 from app.trials.schemas import FlightOrder, NewTrial
 from app.vehicles.base import FlightOptions as Order
 from app.vehicles.open import open_vehicle
@@ -59,16 +58,16 @@ def fly(database: Database, campaign_id: int) -> bool:
         following = campaigns.next_flight(session, campaign_id).proposal
         if following is None or "plan" not in campaigns.get_campaign(session, campaign_id).actions:
             return False
-        trials.create_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
-        task = flights.claim_flight(session, WORKER)
+        requests.plan_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
+        task = queue.claim_flight(session, WORKER)
     assert task is not None
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
         read_back = vehicle.stage(task.gains)
         record = vehicle.fly(Order(seed=task.seed), on_sample=lambda _: None, should_stop=lambda: None)
     with database.write() as session:
-        flights.record_staged(session, task.flight_id, read_back)
-        flights.record_lift_off(session, task.flight_id)
-        flights.record_landing(session, task.flight_id, record)
+        queue.record_staged(session, task.flight_id, read_back)
+        queue.record_lift_off(session, task.flight_id)
+        queue.record_landing(session, task.flight_id, record)
     return True
 
 

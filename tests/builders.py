@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from app.campaigns import computation, proposing
 from app.core.trajectory import Trajectory
 from app.db.session import Database
+from app.flights import queue
+from app.flights.queue import FlightTask
 from app.jobs import service as jobs
-from app.trials import flights
-from app.trials.flights import FlightTask
 from app.vehicles.base import Ending, FlightRecord
 
 Json = dict[str, Any]
@@ -141,7 +141,7 @@ def run_jobs(database: Database) -> int:
 def claim(database: Database) -> FlightTask:
     """The flight that waits."""
     with database.write() as session:
-        task = flights.claim_flight(session, WORKER)
+        task = queue.claim_flight(session, WORKER)
     assert task is not None
     return task
 
@@ -150,7 +150,7 @@ def stage(database: Database) -> FlightTask:
     """Claim the flight that waits and have the vehicle take its gains."""
     task = claim(database)
     with database.write() as session:
-        flights.record_staged(session, task.flight_id, dict(task.gains))
+        queue.record_staged(session, task.flight_id, dict(task.gains))
     return task
 
 
@@ -158,10 +158,10 @@ def lift_off(database: Database) -> FlightTask:
     """Claim, stage and begin the flight that waits."""
     task = stage(database)
     with database.write() as session:
-        flights.record_lift_off(session, task.flight_id)
+        queue.record_lift_off(session, task.flight_id)
     return task
 
 
 def land(database: Database, task: FlightTask, record: FlightRecord) -> None:
     with database.write() as session:
-        flights.record_landing(session, task.flight_id, record)
+        queue.record_landing(session, task.flight_id, record)

@@ -20,7 +20,7 @@ from app.client import (
 )
 from app.common.settings import Settings
 from app.db.session import Database
-from app.trials import flights
+from app.flights import queue
 from app.trials.schemas import Classification
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
 from tests.fleet.vehicles import create_campaign_on, create_connected
@@ -113,7 +113,7 @@ def test_a_flight_that_did_not_take_place_is_raised(gainline: Client, database: 
     trial = gainline.fly(campaign.id, gainline.ask(campaign.id))
     task = claim(database)
     with database.write() as session:
-        flights.record_failure(session, task.flight_id, "the vehicle did not answer.")
+        queue.record_failure(session, task.flight_id, "the vehicle did not answer.")
     with pytest.raises(RefusedError, match="was not flown: the vehicle did not answer"):
         gainline.wait(trial.id)
 

@@ -5,7 +5,7 @@ from collections import deque
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
-from app.fleet.session import FromVehicleProcess, ToVehicleProcess, VehicleCommand
+from app.flights.process_messages import FromVehicleProcess, ToVehicleProcess, VehicleCommand
 
 
 class PipeClosedError(Exception):

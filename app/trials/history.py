@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
@@ -130,6 +130,31 @@ def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:
 def any_flight_under_way(session: Session) -> FlightRow | None:
     """A flight of any campaign that is requested or running."""
     return repository.first_under_way(session)
+
+
+def trial_row(session: Session, trial_id: int) -> TrialRow:
+    """Raises NotFoundError."""
+    return repository.get_one(session, trial_id)
+
+
+def get_flight(session: Session, flight_id: int) -> FlightRow:
+    """Raises NotFoundError."""
+    return repository.get_flight(session, flight_id)
+
+
+def first_requested_flight(session: Session) -> FlightRow | None:
+    """The oldest request that no worker has claimed."""
+    return repository.first_requested(session)
+
+
+def running_flights(session: Session) -> Sequence[FlightRow]:
+    """Flights that a worker has claimed and not ended."""
+    return repository.running(session)
+
+
+def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:
+    """The latest flight of each of these trials that has one."""
+    return repository.latest_flights(session, trial_ids)
 
 
 def has_begun_flight(session: Session, campaign_id: int) -> bool:

@@ -4,32 +4,18 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
-from starlette.concurrency import run_in_threadpool
 
 from app.common.schemas import Page
-from app.trials import orders, photos, service
-from app.trials.schemas import (
-    Abort,
-    AbortAnswer,
-    AbortJudgement,
-    Classification,
-    FlightOrder,
-    NewTrial,
-    Trajectory,
-    Trial,
-    TrialEdit,
-    TrialPhoto,
-)
+from app.trials import photos, service
+from app.trials.schemas import AbortJudgement, Classification, Trajectory, Trial, TrialEdit, TrialPhoto
 from app.web.dependencies import (
     FILE_BODY,
     REQUEST_BODY,
-    CurrentDatabase,
     CurrentSettings,
     CursorText,
     Id,
     IdempotentPost,
     Limit,
-    Live,
     Reader,
     Record,
     RequestContextDep,
@@ -46,16 +32,6 @@ def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: Cur
     return service.list_trials(session, campaign_id, limit=limit, cursor=cursor)
 
 
-@router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
-def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: NewTrial) -> Trial:
-    """Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once."""
-    return act(
-        Trial,
-        lambda session: service.create_trial(session, campaign_id, body, asking),
-        ahead=lambda session: service.warm_gate_cache_for_new(session, campaign_id, body),
-    )
-
-
 @router.get("/trials/{trial_id}")
 def get_trial(session: Reader, trial_id: Id) -> Trial:
     return service.get_trial(session, trial_id)
@@ -67,60 +43,10 @@ def edit_trial(session: Writer, trial_id: Id, body: TrialEdit) -> Trial:
     return service.edit_trial(session, trial_id, body)
 
 
-@router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
-def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: FlightOrder | None = None) -> Trial:
-    """Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
-    for a real vehicle, which has to be staged."""
-    return act(
-        Trial,
-        lambda session: orders.fly_trial(session, trial_id, body or FlightOrder(), asking),
-        ahead=lambda session: orders.warm_gate_cache(session, trial_id),
-    )
-
-
-@router.post("/trials/{trial_id}/stage", status_code=status.HTTP_202_ACCEPTED)
-def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
-    """Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator."""
-    return act(
-        Trial,
-        lambda session: orders.stage_trial(session, trial_id, asking),
-        ahead=lambda session: orders.warm_gate_cache(session, trial_id),
-    )
-
-
-@router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
-def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
-    """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
-    return act(Trial, lambda session: orders.unstage_trial(session, trial_id))
-
-
-@router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
-def take_off_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
-    """Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
-    own page on this computer, with the token of the operator in control."""
-    return act(Trial, lambda session: orders.take_off_trial(session, trial_id, asking))
-
-
-@router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)
-async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body: Abort | None = None) -> AbortAnswer:
-    """End a flight now. Goes straight to the worker without waiting for storage; may be repeated."""
-    reason = (body or Abort()).reason
-    if live.worker_running and (await live.abort(trial_id, reason)).accepted:
-        return AbortAnswer(
-            trial_id=trial_id, accepted=True, sentence="The worker ends the flight and restores the safe gains."
-        )
-    return await run_in_threadpool(_withdraw, database, trial_id, reason)
-
-
-def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAnswer:
-    with database.write() as session:
-        return orders.withdraw_flight(session, trial_id, reason)
-
-
 @router.post("/trials/{trial_id}/cancel")
 def cancel_trial(act: IdempotentPost, trial_id: Id) -> Trial:
     """Cancel a trial that has not flown."""
-    return act(Trial, lambda session: orders.cancel_trial(session, trial_id))
+    return act(Trial, lambda session: service.cancel_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/classify")

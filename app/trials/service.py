@@ -1,5 +1,6 @@
 """Operations on trials for clients: people and scripts. The worker's side of a flight is in `flights`."""
 
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from app.common.states import (
     HISTORY_TRIAL_STATES,
     TRIAL_ACTIONS,
     TRIAL_TRANSITIONS,
+    FlightState,
     TrialKind,
     TrialState,
 )
@@ -38,14 +40,41 @@ from app.processes.sandbox import FILE, run_limited
 from app.trials import history, repository
 from app.trials.capture import capture
 from app.trials.judging import GateDecision, check_own_gains, check_proposal
-from app.trials.lifecycle import set_trial_state
-from app.trials.orders import request_flight, require_open
+from app.trials.lifecycle import set_flight_state, set_trial_state
 from app.trials.records import settle_gains
 from app.trials.schemas import AbortJudgement, Classification, NewTrial, Trial, TrialEdit
 from app.trials.schemas import Trajectory as TrajectoryOut
 from app.trials.scoring import score
 from app.trials.variants import KINDS, gains_of
 from app.trials.views import trajectory_view, trial_view, trial_views
+
+
+def cancel_trial(session: Session, trial_id: int) -> Trial:
+    """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
+    row = repository.get_one(session, trial_id)
+    check_action(TRIAL_ACTIONS, "cancel", row.state, f"Trial {row.number}")
+    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    if flight is not None and flight.state == FlightState.REQUESTED:
+        set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")
+    set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
+    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+
+
+def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
+    """Raise ConflictError unless the campaign can take another trial now; trials in `spent_by` use up its budget."""
+    check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
+    trials = history.trials_of(session, campaign.id)
+    budget = definition_of(campaign).stop.max_flights
+    if sum(row.state in spent_by for row in trials) >= budget:
+        raise ConflictError(
+            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
+            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
+        )
+    if (waiting := history.find_unreviewed(trials)) is not None:
+        raise ConflictError(
+            f"Flight {waiting.number} waits for its class.",
+            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
+        )
 
 
 def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
@@ -63,11 +92,11 @@ def get_trial(session: Session, trial_id: int) -> Trial:
 
 
 def create_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
-    """Plan a trial and, with `fly`, request its flight.
+    """Plan a trial; `fly` is not read here.
 
     Raises ConflictError for a stale proposal, an unclassified flight, a spent budget, a campaign that is over or not
-    ready; GainsError that names what the gate refuses, unless that is overruled; NotAllowedError when the client may
-    not command a real vehicle; and what `fly_trial` raises.
+    ready; GainsError that names what the gate refuses, unless that is overruled; and NotAllowedError when the client
+    may not command a real vehicle.
     """
     campaign = campaigns.get_row(session, campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
@@ -91,8 +120,6 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, context: Req
     )
     session.add(row)
     session.flush()
-    if new.fly is not None:
-        request_flight(session, campaign, row, context, speed=new.fly.speed)
     return trial_view(session, campaign, row)
 
 

@@ -8,8 +8,8 @@ from fastapi.testclient import TestClient
 from app.common.settings import Settings
 from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello, live_address
 from app.live.server import LiveServer
-from tests.api.test_abort import wait_until
 from tests.builders import get
+from tests.flights.test_abort import wait_until
 
 
 def status(vehicle_id: int, state: VehicleLinkState, trouble: str = "") -> VehicleStatus:

@@ -11,7 +11,7 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.proposing import read_history
 from app.db.models import CampaignRow, FlightRow
 from app.db.session import Database
-from app.trials import flights
+from app.flights import queue
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -34,7 +34,7 @@ def test_a_vehicles_ledger_outlives_the_wish_to_delete_a_campaign(client: TestCl
     create_trial(client, campaign["id"], fly={"speed": None})
     task = claim(database)
     with database.write() as session:
-        flights.record_failure(session, task.flight_id, "the vehicle did not answer")
+        queue.record_failure(session, task.flight_id, "the vehicle did not answer")
     answer = client.delete(f"{path}?version=1")
     assert answer.status_code == 409
     assert "ledger" in answer.json()["detail"]

@@ -28,12 +28,13 @@ from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registering
 from app.fleet.schemas import NewVehicle
+from app.flights import queue, requests
+from app.flights.process_messages import mark_if_requested
 from app.jobs import service as jobs
 from app.studies import service as studies
 from app.studies.reproductions import get_reproduction
-from app.trials import flights, photos
+from app.trials import photos
 from app.trials import service as trials
-from app.trials.crew import mark_if_requested
 from app.trials.schemas import Classification, NewTrial
 from app.vehicles.base import FlightOptions, StopRequest
 from app.vehicles.open import open_vehicle, restore_safe_gains
@@ -214,7 +215,7 @@ class States:
         def fly(session: Session) -> int:
             what = {"proposal_id": _proposed(session, campaign_id).id} if chosen is None else chosen
             new = NewTrial.model_validate({**what, "fly": {"speed": None}})
-            trial = trials.create_trial(session, campaign_id, new)
+            trial = requests.plan_trial(session, campaign_id, new)
             _carry_out(session, trial.id, stop)
             _propose(session, campaign_id)
             return trial.id
@@ -239,12 +240,12 @@ def _proposed(session: Session, campaign_id: int) -> ProposalRow:
 
 def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> None:
     """What a worker does with the flight that was asked for, which `stop` ends after two seconds."""
-    task = flights.claim_flight(session, WORKER)
+    task = queue.claim_flight(session, WORKER)
     assert task is not None
     assert task.trial_id == trial_id, "another flight waits"
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
-        flights.record_staged(session, task.flight_id, vehicle.stage(task.gains))
-        flights.record_lift_off(session, task.flight_id)
+        queue.record_staged(session, task.flight_id, vehicle.stage(task.gains))
+        queue.record_lift_off(session, task.flight_id)
         order = FlightOptions(seed=task.seed)
         seen = count()
         record = vehicle.fly(
@@ -252,8 +253,8 @@ def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> Non
         )
         record = mark_if_requested(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
-    flights.record_landing(session, task.flight_id, record)
-    flights.record_restored(session, task.flight_id, restored)
+    queue.record_landing(session, task.flight_id, record)
+    queue.record_restored(session, task.flight_id, restored)
 
 
 def _propose(session: Session, campaign_id: int) -> None:

@@ -12,10 +12,11 @@ from app.db.models import VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
-from app.fleet.session import ConnectionOpened, VehicleConnection
-from app.fleet.tasks import VehicleConnectionManager
+from app.flights.abort import AbortRegistry
+from app.flights.connection_manager import VehicleConnectionManager
+from app.flights.process_messages import ConnectionOpened
+from app.flights.vehicle_connection import VehicleConnection
 from app.main import create_app
-from app.trials.flying import AbortRegistry
 from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
 from tests.fleet.vehicles import (
@@ -329,7 +330,7 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
         def close(self) -> None:
             events.append("closed")
 
-    monkeypatch.setattr("app.fleet.tasks.VehicleConnection", Found)
+    monkeypatch.setattr("app.flights.connection_manager.VehicleConnection", Found)
     with database.write() as session:
         acts.record_disconnected(session, vehicle["id"])
     manager = VehicleConnectionManager(

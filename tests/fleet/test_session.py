@@ -11,14 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from app.fleet import session as session_module
-from app.fleet.session import (
-    CommandForwarded,
-    ConnectionOpened,
-    ConnectionRequest,
-    VehicleCommand,
-    VehicleConnection,
-)
+from app.flights import vehicle_connection as session_module
+from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleCommand
+from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import VehicleStatus
 from app.vehicles.base import Identity
 

@@ -63,7 +63,7 @@ def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
     assert not imported(HELP).intersection((*NUMERICS, *DATABASE, "fastapi", "numpy", "structlog"))
 
 
-@pytest.mark.parametrize("module", ["app.campaigns.computation", "app.processes.pool", "app.trials.cockpit"])
+@pytest.mark.parametrize("module", ["app.campaigns.computation", "app.processes.pool", "app.flights.flight_process"])
 def test_processes_that_compute_and_fly_do_not_import_the_database(module: str) -> None:
     assert not imported(f"import {module}").intersection((*NUMERICS, *DATABASE))
 

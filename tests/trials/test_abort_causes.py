@@ -7,8 +7,8 @@ from fastapi.testclient import TestClient
 
 from app.db.models import TrialRow
 from app.db.session import Database
-from app.trials.crew import mark_if_requested
-from app.trials.spool import Spool
+from app.flights.process_messages import mark_if_requested
+from app.flights.record_spool import Spool
 from tests.builders import (
     Json,
     create_flown_trial,

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.common.errors import ConflictError
 from app.common.states import TRIAL_TRANSITIONS, TrialState
 from app.db.session import Database
-from app.trials import flights
+from app.flights import queue
 from tests.builders import Json, create_csv, create_record, get, upload
 from tests.trials.states import create_trial_in
 
@@ -90,17 +90,17 @@ def test_the_offered_actions_are_those_that_work(client: TestClient, database: D
 
 Step = Callable[[Session, int], object]
 STEPS: dict[str, Step] = {
-    "staged": lambda session, flight: flights.record_staged(session, flight, {"kp": 283, "ki": 13, "kd": 82}),
-    "lift-off": flights.record_lift_off,
-    "landing": lambda session, flight: flights.record_landing(session, flight, create_record()),
-    "short landing": lambda session, flight: flights.record_landing(session, flight, create_record(until_s=9.0)),
-    "abort": lambda session, flight: flights.record_landing(session, flight, create_record(ending="aborted")),
-    "loss": lambda session, flight: flights.record_loss(session, flight, "gone"),
-    "failure": lambda session, flight: flights.record_failure(session, flight, "refused"),
-    "withdrawal": lambda session, flight: flights.record_withdrawal(session, flight, "ended"),
-    "restart": lambda session, _flight: flights.lose_running_flights(session),
-    "recovery": lambda session, flight: flights.recover_record(session, flight, create_record()),
-    "quarantine": lambda session, flight: flights.quarantine_vehicle(session, flight, "not verified"),
+    "staged": lambda session, flight: queue.record_staged(session, flight, {"kp": 283, "ki": 13, "kd": 82}),
+    "lift-off": queue.record_lift_off,
+    "landing": lambda session, flight: queue.record_landing(session, flight, create_record()),
+    "short landing": lambda session, flight: queue.record_landing(session, flight, create_record(until_s=9.0)),
+    "abort": lambda session, flight: queue.record_landing(session, flight, create_record(ending="aborted")),
+    "loss": lambda session, flight: queue.record_loss(session, flight, "gone"),
+    "failure": lambda session, flight: queue.record_failure(session, flight, "refused"),
+    "withdrawal": lambda session, flight: queue.record_withdrawal(session, flight, "ended"),
+    "restart": lambda session, _flight: queue.lose_running_flights(session),
+    "recovery": lambda session, flight: queue.recover_record(session, flight, create_record()),
+    "quarantine": lambda session, flight: queue.quarantine_vehicle(session, flight, "not verified"),
 }
 
 

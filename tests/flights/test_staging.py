@@ -13,8 +13,8 @@ from app.db.models import FlightRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import acts
+from app.flights import queue
 from app.main import create_app
-from app.trials import flights
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     WORKER,
@@ -74,7 +74,7 @@ def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
     """Whether its worker may take off, and why it is to stand down."""
     with database.read() as session:
         flight_id = staged["flight"]["id"]
-        return flights.take_off_wanted(session, flight_id), flights.stand_down_wanted(session, flight_id)
+        return queue.take_off_wanted(session, flight_id), queue.stand_down_wanted(session, flight_id)
 
 
 def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
@@ -83,7 +83,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
     assert staged["actions"] == ["take-off", "unstage", "cancel", "abort", "note"]
     assert is_wanted(database, staged) == (False, None)
     with pytest.raises(ConflictError, match="nobody has asked for its take-off"), database.write() as session:
-        flights.record_lift_off(session, staged["flight"]["id"])
+        queue.record_lift_off(session, staged["flight"]["id"])
 
     status, sentence = take_off(client, staged, {})
     assert (status, sentence) == (
@@ -104,7 +104,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
         f"The take-off of trial {staged['number']} was asked for already.",
     )
     with database.write() as session:
-        flights.record_lift_off(session, staged["flight"]["id"])
+        queue.record_lift_off(session, staged["flight"]["id"])
     assert trial(client, staged)["state"] == "flying"
     assert seen(client, real)["state"] == "flying"
 
@@ -141,7 +141,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     why = "it could not take off within 10 s of the operator's word"
     assert is_wanted(database, staged) == (False, why)
     with pytest.raises(ConflictError, match=why), database.write() as session:
-        flights.record_lift_off(session, staged["flight"]["id"])
+        queue.record_lift_off(session, staged["flight"]["id"])
 
 
 def test_a_real_vehicle_is_never_flown_in_one_go(client: TestClient, planned: Json) -> None:
@@ -184,8 +184,8 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
         f"Trial {staged['number']} is being unstaged: unstaged by the operator.",
     )
     with database.write() as session:
-        flights.record_withdrawal(session, staged["flight"]["id"], "unstaged by the operator")
-        flights.record_restored(session, staged["flight"]["id"], DEFAULT_GAINS)
+        queue.record_withdrawal(session, staged["flight"]["id"], "unstaged by the operator")
+        queue.record_restored(session, staged["flight"]["id"], DEFAULT_GAINS)
     after = trial(client, staged)
     assert (after["state"], after["flight"]["state"], after["actions"][0]) == ("planned", "cancelled", "stage")
     assert seen(client, real)["state"] == "ready"
@@ -197,7 +197,7 @@ def test_a_take_off_does_not_pass_an_unstaging(
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     client.post(f"/api/trials/{staged['id']}/unstage")
     with pytest.raises(ConflictError, match="unstaged by the operator"), database.write() as session:
-        flights.record_lift_off(session, staged["flight"]["id"])
+        queue.record_lift_off(session, staged["flight"]["id"])
 
 
 def test_a_cancelled_trial_stands_its_vehicle_down(client: TestClient, database: Database, staged: Json) -> None:
@@ -210,7 +210,7 @@ def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
 ) -> None:
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     with database.write() as session:
-        assert flights.lose_running_flights(session) == []
+        assert queue.lose_running_flights(session) == []
     assert is_wanted(database, staged) == (False, "the flight is failed")
     after = trial(client, staged)
     assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker ended before lift-off")
@@ -242,7 +242,7 @@ def test_a_simulated_vehicle_is_staged_by_a_script_too(client: TestClient, datab
     assert seen(client, vehicle)["held"] == task.gains
     assert take_off(client, planned, {}) == (202, "")
     with database.write() as session:
-        flights.record_lift_off(session, task.flight_id)
+        queue.record_lift_off(session, task.flight_id)
 
 
 def test_a_shared_simulation_is_not_staged(client: TestClient, database: Database) -> None:
@@ -262,10 +262,10 @@ def fly(client: TestClient, database: Database, vehicle: Json, planned: Json, re
     task = stage_claimed(database)
     take_off(client, planned, {**OUR_PAGE, **control_header(client, vehicle)})
     with database.write() as session:
-        flights.record_lift_off(session, task.flight_id)
+        queue.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        flights.record_landing(session, task.flight_id, record)
-        flights.record_restored(session, task.flight_id, task.safe_gains)
+        queue.record_landing(session, task.flight_id, record)
+        queue.record_restored(session, task.flight_id, task.safe_gains)
     return trial(client, planned)
 
 
@@ -338,9 +338,9 @@ def test_safe_gains_that_did_not_come_back_stand_in_the_ledger_as_they_were_read
 ) -> None:
     wrong = {"kp": 283, "ki": 0, "kd": 82}
     with database.write() as session:
-        flights.record_failure(session, staged["flight"]["id"], "refused")
-        flights.record_restored(session, staged["flight"]["id"], wrong)
-        flights.quarantine_vehicle(session, staged["flight"]["id"], "ki was read back as 0")
+        queue.record_failure(session, staged["flight"]["id"], "refused")
+        queue.record_restored(session, staged["flight"]["id"], wrong)
+        queue.quarantine_vehicle(session, staged["flight"]["id"], "ki was read back as 0")
     line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
     assert (line["asked"], line["read_back"], line["outcome"]) == (DEFAULT_GAINS, wrong, "failed")
     assert seen(client, real)["state"] == "quarantined"

@@ -16,13 +16,13 @@ from typing import Final
 
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
-from app.processes import process_context
-from app.trials.crew import (
+from app.flights.process_messages import (
     CancelFlight,
     CancelTakeOff,
     FlightFinished,
     FlightLanded,
     FlightMessage,
+    FlightMonitor,
     FlightRequest,
     GainsStaged,
     TakeOffCommand,
@@ -32,7 +32,7 @@ from app.trials.crew import (
     mark_if_requested,
     process_died_error,
 )
-from app.trials.flying import FlightMonitor
+from app.processes import process_context
 from app.vehicles.base import FlightRecord, ShouldStop, StopRequest, Vehicle
 from app.vehicles.jsbsim.kind import prepare
 from app.vehicles.open import open_vehicle

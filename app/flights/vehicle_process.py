@@ -18,32 +18,30 @@ from app.common.states import ActKind
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
 from app.fleet.pipe import PipeClosedError, WorkerPipe
-from app.fleet.session import (
-    TAKE_OFF_TIMEOUT_S,
+from app.flights.process_messages import (
+    CancelFlight,
+    CancelTakeOff,
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
-    ToVehicleProcess,
-    VehicleCommand,
-    VehicleRequest,
-    VehicleResponse,
-)
-from app.live.messages import FlightPhase, Telemetry, VehicleStatus
-from app.trials.crew import (
-    CancelFlight,
-    CancelTakeOff,
     FlightFinished,
     FlightLanded,
+    FlightMonitor,
     FlightRequest,
     GainsStaged,
     SafeGainsRestored,
     TakeOffCommand,
+    ToVehicleProcess,
+    VehicleCommand,
+    VehicleRequest,
+    VehicleResponse,
     failure_from,
     hold_vehicle_lock,
     internal_error,
     mark_if_requested,
 )
-from app.trials.flying import FlightMonitor
+from app.flights.vehicle_connection import TAKE_OFF_TIMEOUT_S
+from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.vehicles.base import ConnectedVehicle, FlightRecord, StopRequest
 from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, restore_safe_gains

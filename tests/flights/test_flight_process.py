@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from app.core.experiments import get_experiment
+from app.flights.flight_process import LOCK_TIMEOUT_S, FlightProcess
+from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import FlightPhase, Telemetry
 from app.processes.locks import exclusive
-from app.trials.cockpit import LOCK_TIMEOUT_S, FlightProcess
-from app.trials.crew import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.vehicles.base import FlightOptions
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import open_vehicle

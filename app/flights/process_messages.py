@@ -8,15 +8,19 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Final, Protocol
 
+import numpy as np
+
+from app.common.states import ActKind
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
-from app.live.messages import FlightPhase, Telemetry
+from app.core.experiments.base import Experiment
+from app.live.messages import FlightPhase, Phase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes.locks import LockedError, exclusive
-from app.vehicles.base import MOTORS_OFF_ASKED, FlightOptions, FlightRecord, OptionValue
+from app.vehicles.base import MOTORS_OFF_ASKED, CheckItem, FlightOptions, FlightRecord, Identity, OptionValue, Sample
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 
@@ -181,3 +185,151 @@ def hold_vehicle_lock(
             f"The vehicle is still under the control of {error.holder or 'another process'}.",
             hint="Wait until that process has landed it, or end the process; then fly again.",
         ) from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConnectionRequest:
+    """What the process needs to connect to a vehicle.
+
+    `lock` is held as long as the process has the vehicle. `identity` is the pinned one, None before the first
+    connection. `trial_parameters` is the folder for parameters that a trial changes besides the gains. `keep_retrying`:
+    retry until the vehicle answers.
+    """
+
+    vehicle_id: int
+    name: str
+    kind: str
+    options: Mapping[str, OptionValue]
+    safe_gains: Mapping[str, float]
+    identity: Identity | None
+    lock: Path
+    trial_parameters: Path
+    keep_retrying: bool = False
+    clock: Clock = REAL_TIME
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConnectionOpened:
+    """From the process: the link is open; `concern` is why the vehicle may only be observed."""
+
+    identity: Identity
+    concern: str
+    held: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleRequest:
+    """To the process: carry out this act, for a vehicle with these safe gains."""
+
+    kind: ActKind
+    safe_gains: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleResponse:
+    """From the process: outcome of an act; `problem` when it failed. `held` are the gains as last read back."""
+
+    problem: str = ""
+    concern: str = ""
+    held: dict[str, float] = field(default_factory=dict)
+    checks: tuple[CheckItem, ...] | None = None
+    parameters: dict[str, float] | None = None
+    identity: Identity | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleCommand:
+    """To the process, at any moment: land, or motors off.
+
+    Not to be carried out after `by_s` of this computer's monotonic clock, s. The answer carries the same `number`.
+    """
+
+    number: int
+    order: VehicleCommandKind
+    reason: str
+    by_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class CommandForwarded:
+    """From the process: a command was forwarded to the vehicle; `problem` when it could not be."""
+
+    number: int
+    order: VehicleCommandKind
+    reason: str
+    problem: str = ""
+
+
+FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | FlightMessage
+ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
+
+
+MESSAGES_PER_S: Final = 25
+
+Publish = Callable[[PublishedMessage], None]
+
+
+class FlightMonitor:
+    """Collects one flight's samples and publishes them in at most 25 messages a second, with the error so far.
+
+    The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral
+    where the experiment's error is one), within the time that the experiment scores. The flight's own error is computed
+    from its full-rate record.
+    """
+
+    def __init__(
+        self, campaign_id: int, trial_id: int, experiment: Experiment, publish: Publish, clock: Clock = REAL_TIME
+    ) -> None:
+        self._campaign_id = campaign_id
+        self._trial_id = trial_id
+        self._experiment = experiment
+        self._columns: list[str] = []
+        self._scored_until_s = float(experiment.grid_s[-1])
+        self._publish = publish
+        self._clock = clock
+        self._rows: list[list[float]] = []
+        self._due_s = 0.0
+        self._last: tuple[float, float] | None = None
+        self._integral = 0.0
+
+    def phase(self, phase: Phase, note: str = "") -> None:
+        self._publish(FlightPhase(campaign_id=self._campaign_id, trial_id=self._trial_id, phase=phase, note=note))
+
+    def sample(self, sample: Sample) -> None:
+        output = self._experiment.output
+        set_point = float(self._experiment.set_point(np.array([sample.time_s]))[0])
+        self._score(sample.time_s, abs(set_point - sample[output]))
+        others = [name for name in sample.channels if name != output]
+        self._columns = ["time_s", output, *others]
+        self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
+        now_s = self._clock.now_s()
+        if now_s >= self._due_s:
+            self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
+            self.flush()
+
+    def flush(self) -> None:
+        """Publish the collected samples."""
+        if self._rows:
+            rows, self._rows = self._rows, []
+            self._publish(
+                Telemetry(
+                    campaign_id=self._campaign_id,
+                    trial_id=self._trial_id,
+                    time_s=rows[-1][0],
+                    columns=self._columns,
+                    samples=rows,
+                    error_so_far=self.error_so_far,
+                )
+            )
+
+    @property
+    def error_so_far(self) -> float | None:
+        if self._last is None or self._last[0] <= 0.0:
+            return None
+        return self._integral if self._experiment.integrates else self._integral / self._last[0]
+
+    def _score(self, time_s: float, deviation: float) -> None:
+        if 0.0 <= time_s <= self._scored_until_s:
+            before_s, before = self._last if self._last is not None else (0.0, deviation)
+            self._integral += (time_s - before_s) * (before + deviation) / 2.0
+            self._last = (time_s, deviation)

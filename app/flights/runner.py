@@ -18,13 +18,21 @@ from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
 from app.core.clock import REAL_TIME, Clock
 from app.db.session import Database
+from app.flights import queue
+from app.flights.abort import AbortFlag, AbortRegistry
+from app.flights.flight_process import FlightProcess, FlightProcessPool
+from app.flights.process_messages import (
+    FlightBackend,
+    FlightFailure,
+    FlightLanded,
+    FlightRequest,
+    GainsStaged,
+    Publish,
+    SafeGainsRestored,
+)
+from app.flights.queue import FlightTask
+from app.flights.record_spool import Spool
 from app.live.messages import FlightPhase, Phase, Telemetry
-from app.trials import flights
-from app.trials.cockpit import FlightProcess, FlightProcessPool
-from app.trials.crew import FlightBackend, FlightFailure, FlightLanded, FlightRequest, GainsStaged, SafeGainsRestored
-from app.trials.flights import FlightTask
-from app.trials.flying import AbortFlag, AbortRegistry, Publish
-from app.trials.spool import Spool
 from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import get_kind
@@ -100,9 +108,9 @@ class FlightRunner:
         are withdrawn. Raises StorageError.
         """
         with self._database.write() as session:
-            for flight_id in flights.withdraw_requested_flights(session, "the worker was away when it was asked for"):
+            for flight_id in queue.withdraw_requested_flights(session, "the worker was away when it was asked for"):
                 _log.warning("flight withdrawn: it was asked for before this worker began", flight_id=flight_id)
-            for trial_id in flights.lose_running_flights(session):
+            for trial_id in queue.lose_running_flights(session):
                 _log.warning("flight lost: the worker ended while it was under way", trial_id=trial_id)
         for flight_id in self._spool.flight_ids():
             self._recover_record(flight_id)
@@ -112,7 +120,7 @@ class FlightRunner:
         """Claim the oldest requested flight for this worker; None when there is none. Raises StorageError."""
         with ExitStack() as undo:
             with self._database.write() as session:
-                if (task := flights.claim_flight(session, self._worker)) is not None:
+                if (task := queue.claim_flight(session, self._worker)) is not None:
                     self._abort_registry.register(task.trial_id)  # before a client can see that it runs, and abort it
                     undo.callback(self._abort_registry.unregister, task.trial_id)
             undo.pop_all()
@@ -187,13 +195,13 @@ class FlightRunner:
         """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
         try:
-            self._store(lambda session: flights.record_staged(session, task.flight_id, read_back))
+            self._store(lambda session: queue.record_staged(session, task.flight_id, read_back))
             if (problem := describe_mismatch(task.gains, read_back)) is not None:
                 ended = FlightOutcome(problem=problem)
             elif (withdrawn := self._await_takeoff_clearance(task, flag, backend)) is not None:
                 ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
-                self._store(lambda session: flights.record_lift_off(session, task.flight_id))
+                self._store(lambda session: queue.record_lift_off(session, task.flight_id))
         except GainlineError as error:
             ended = FlightOutcome(problem=f"It was not flown, because that could not be recorded: {error}")
         if ended.lifted_off:
@@ -216,9 +224,9 @@ class FlightRunner:
                 return "the process that has the vehicle ended"
             try:
                 with self._database.read() as session:
-                    if (reason := flights.stand_down_wanted(session, task.flight_id)) is not None:
+                    if (reason := queue.stand_down_wanted(session, task.flight_id)) is not None:
                         return reason
-                    if flights.take_off_wanted(session, task.flight_id):
+                    if queue.take_off_wanted(session, task.flight_id):
                         return None
             except StorageError as error:
                 _log.error("the operator's word cannot be read", why=str(error))
@@ -298,7 +306,7 @@ class FlightRunner:
             self._set_record_aside(flight_id, error)
             return
         try:
-            self._store(lambda session: flights.recover_record(session, flight_id, record))
+            self._store(lambda session: queue.recover_record(session, flight_id, record))
         except StorageError:
             raise
         except GainlineError as error:
@@ -332,25 +340,25 @@ def _describe_error(error: Exception) -> str:
 
 def _record(session: Session, task: FlightTask, ended: FlightOutcome) -> None:
     if ended.record is not None:
-        flights.record_landing(session, task.flight_id, ended.record)
+        queue.record_landing(session, task.flight_id, ended.record)
     elif ended.lifted_off:
-        flights.record_loss(session, task.flight_id, ended.problem or "its process ended without a record")
+        queue.record_loss(session, task.flight_id, ended.problem or "its process ended without a record")
     elif ended.withdrawn:
-        flights.record_withdrawal(session, task.flight_id, ended.problem)
+        queue.record_withdrawal(session, task.flight_id, ended.problem)
     else:
-        flights.record_failure(session, task.flight_id, ended.problem)
+        queue.record_failure(session, task.flight_id, ended.problem)
     if ended.restored is not None:
-        flights.record_restored(session, task.flight_id, ended.restored)
+        queue.record_restored(session, task.flight_id, ended.restored)
     _record_doubts(session, task, ended)
 
 
 def _give_up(session: Session, task: FlightTask, ended: FlightOutcome, problem: str) -> None:
-    flights.give_up_flight(session, task.flight_id, problem)
+    queue.give_up_flight(session, task.flight_id, problem)
     _record_doubts(session, task, ended)
 
 
 def _record_doubts(session: Session, task: FlightTask, ended: FlightOutcome) -> None:
     if ended.concern:
-        flights.quarantine_vehicle(session, task.flight_id, ended.concern)
+        queue.quarantine_vehicle(session, task.flight_id, ended.concern)
     elif ended.unheard:
-        flights.doubt_vehicle(session, task.flight_id)
+        queue.doubt_vehicle(session, task.flight_id)

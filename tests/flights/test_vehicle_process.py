@@ -12,28 +12,26 @@ from types import SimpleNamespace
 import pytest
 
 from app.common.states import ActKind
-from app.fleet import seat as seat_module
 from app.fleet.pipe import PipeClosedError, WorkerPipe
-from app.fleet.seat import VehicleProcess
-from app.fleet.session import (
+from app.flights import vehicle_process as seat_module
+from app.flights.process_messages import (
+    CancelFlight,
+    CancelTakeOff,
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
-    FromVehicleProcess,
-    VehicleCommand,
-    VehicleRequest,
-)
-from app.trials.crew import (
-    CancelFlight,
-    CancelTakeOff,
     FlightFailure,
     FlightFinished,
     FlightLanded,
     FlightRequest,
+    FromVehicleProcess,
     GainsStaged,
     SafeGainsRestored,
     TakeOffCommand,
+    VehicleCommand,
+    VehicleRequest,
 )
+from app.flights.vehicle_process import VehicleProcess
 from app.vehicles.base import FlightOptions, Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import Message

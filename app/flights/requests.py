@@ -1,34 +1,43 @@
 """Requests for flights, from the first to the operator's take-off request. The worker's side is in `flights`."""
 
-from collections.abc import Collection
 from contextlib import suppress
 
 from sqlalchemy.orm import Session
 
-from app.accounts.permissions import RequestContext
+from app.accounts.permissions import LOCAL_CLI, RequestContext
 from app.campaigns import rehearsals
 from app.campaigns import service as campaigns
-from app.campaigns.definitions import definition_of
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.state_machine import check_action
-from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState, TrialState
+from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_control, require_may_command, require_not_controlled_by_other
-from app.trials import history, repository
+from app.trials import history
+from app.trials import service as trials
 from app.trials.judging import check_own_gains
-from app.trials.lifecycle import set_flight_state, set_trial_state
-from app.trials.schemas import AbortAnswer, FlightOrder, Trial
+from app.trials.lifecycle import set_flight_state
+from app.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Trial
 from app.trials.views import trial_view
 
 
 def warm_gate_cache(session: Session, trial_id: int) -> None:
     """Run the gate's simulations before the transaction of `fly_trial` or `stage_trial` needs the results."""
     with suppress(GainlineError):
-        row = repository.get_one(session, trial_id)
+        row = history.trial_row(session, trial_id)
         check_own_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
+
+
+def plan_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Plan a trial and, with `fly`, request its flight. Raises as `create_trial` and `fly_trial` do."""
+    trial = trials.create_trial(session, campaign_id, new, context)
+    if new.fly is None:
+        return trial
+    campaign, row = campaigns.get_row(session, campaign_id), history.trial_row(session, trial.id)
+    request_flight(session, campaign, row, context, speed=new.fly.speed)
+    return trial_view(session, campaign, row)
 
 
 def fly_trial(session: Session, trial_id: int, order: FlightOrder, context: RequestContext) -> Trial:
@@ -53,10 +62,10 @@ def stage_trial(session: Session, trial_id: int, context: RequestContext) -> Tri
 def _request_trial_flight(
     session: Session, trial_id: int, mode: FlightMode, speed: float | None, context: RequestContext
 ) -> Trial:
-    row = repository.get_one(session, trial_id)
+    row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, mode, row.state, f"Trial {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
-    require_open(session, campaign, HISTORY_TRIAL_STATES)
+    trials.require_open(session, campaign, HISTORY_TRIAL_STATES)
     judged = check_own_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
     row.gate, row.overrule_reason = judged.gate, judged.overrule_reason
     request_flight(session, campaign, row, context, mode=mode, speed=speed)
@@ -110,7 +119,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> 
     the token of the operator in control. Raises ConflictError when nothing is staged, the take-off was requested
     already, another operator is in control, or the rehearsal is no longer satisfied; NotAllowedError otherwise.
     """
-    row = repository.get_one(session, trial_id)
+    row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "take-off", row.state, f"Trial {row.number}")
     campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
     if flight.take_off_at is not None:
@@ -131,14 +140,14 @@ def unstage_trial(session: Session, trial_id: int) -> Trial:
 
     Raises ConflictError when nothing is staged.
     """
-    row = repository.get_one(session, trial_id)
+    row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "unstage", row.state, f"Trial {row.number}")
     _staged(session, row).stand_down = "unstaged by the operator"
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
 
 def _staged(session: Session, row: TrialRow) -> FlightRow:
-    flight = repository.latest_flights(session, [row.id]).get(row.id)
+    flight = history.latest_flights(session, [row.id]).get(row.id)
     if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING:
         raise ConflictError(f"Trial {row.number} flies in one go.", hint="Watch it, or abort it.")
     if flight.stand_down:
@@ -153,8 +162,8 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
 
     Raises ConflictError when no flight was requested, or when the worker that flies it does not answer.
     """
-    row = repository.get_one(session, trial_id)
-    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    row = history.trial_row(session, trial_id)
+    flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, problem=reason)
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
@@ -169,31 +178,3 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
         f"Trial {row.number} is {row.state}: there is no flight to abort.",
         hint="None was asked for; load the trial again.",
     )
-
-
-def cancel_trial(session: Session, trial_id: int) -> Trial:
-    """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
-    row = repository.get_one(session, trial_id)
-    check_action(TRIAL_ACTIONS, "cancel", row.state, f"Trial {row.number}")
-    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
-    if flight is not None and flight.state == FlightState.REQUESTED:
-        set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")
-    set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
-    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
-
-
-def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
-    """Raise ConflictError unless the campaign can take another trial now; trials in `spent_by` use up its budget."""
-    check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
-    trials = history.trials_of(session, campaign.id)
-    budget = definition_of(campaign).stop.max_flights
-    if sum(row.state in spent_by for row in trials) >= budget:
-        raise ConflictError(
-            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
-            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
-        )
-    if (waiting := history.find_unreviewed(trials)) is not None:
-        raise ConflictError(
-            f"Flight {waiting.number} waits for its class.",
-            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
-        )

@@ -6,7 +6,7 @@ from fastapi.testclient import TestClient
 from app.common.errors import ConflictError
 from app.core.definition import flight_seed
 from app.db.session import Database
-from app.trials import flights
+from app.flights import queue
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -36,7 +36,7 @@ def test_a_claimed_flight_carries_everything_that_the_worker_needs(client: TestC
     assert (task.vehicle_kind, task.vehicle_options["scatter"], task.speed) == ("twin", 1.0, 10.0)
     assert task.seed == flight_seed(7, 1)
     with database.write() as session:
-        assert flights.claim_flight(session, "another") is None
+        assert queue.claim_flight(session, "another") is None
 
 
 def test_a_landed_flight_is_scored_as_it_is_stored_and_classed_by_the_program(
@@ -62,7 +62,7 @@ def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient
     stage(database)
     assert get(client, f"/api/campaigns/{campaign['id']}")["definition_digest"] is None
     with database.write() as session:
-        flights.record_lift_off(session, 1)
+        queue.record_lift_off(session, 1)
     flying = get(client, f"/api/campaigns/{campaign['id']}")
     assert flying["state"] == "flying"
     assert len(flying["definition_digest"]) == 64
@@ -72,9 +72,9 @@ def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient
     assert answer.status_code == 409
 
 
-def claim_task(database: Database) -> flights.FlightTask:
+def claim_task(database: Database) -> queue.FlightTask:
     """The task of the only flight, which runs."""
-    return flights.FlightTask(
+    return queue.FlightTask(
         flight_id=1,
         trial_id=1,
         campaign_id=1,
@@ -94,11 +94,11 @@ def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, databa
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     task = claim(database)
     with database.write() as session:
-        flights.record_staged(session, task.flight_id, {"kp": 282, "ki": 13, "kd": 82})
+        queue.record_staged(session, task.flight_id, {"kp": 282, "ki": 13, "kd": 82})
     with pytest.raises(ConflictError, match="must not fly"), database.write() as session:
-        flights.record_lift_off(session, task.flight_id)
+        queue.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        flights.record_failure(session, task.flight_id, "the vehicle did not take the gains")
+        queue.record_failure(session, task.flight_id, "the vehicle did not take the gains")
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
     assert after["flight"]["problem"] == "the vehicle did not take the gains"
@@ -138,8 +138,8 @@ def test_a_worker_that_died_leaves_a_lost_flight_that_is_not_flown_again(
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     lift_off(database)
     with database.write() as session:
-        assert flights.lose_running_flights(session) == [trial["id"]]
-        assert flights.claim_flight(session, "the next worker") is None
+        assert queue.lose_running_flights(session) == [trial["id"]]
+        assert queue.claim_flight(session, "the next worker") is None
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("lost", "lost")
     assert "fly" not in after["actions"]
@@ -152,7 +152,7 @@ def test_a_worker_that_died_before_lift_off_leaves_a_planned_trial(client: TestC
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     stage(database)
     with database.write() as session:
-        assert flights.lose_running_flights(session) == []
+        assert queue.lose_running_flights(session) == []
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
     assert client.post(f"/api/trials/{trial['id']}/fly").status_code == 202
@@ -163,10 +163,10 @@ def test_the_record_of_a_lost_flight_can_be_recovered_once(client: TestClient, d
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     task = lift_off(database)
     with database.write() as session:
-        flights.lose_running_flights(session)
+        queue.lose_running_flights(session)
     for _ in range(2):
         with database.write() as session:
-            flights.recover_record(session, task.flight_id, create_record(2.0))
+            queue.recover_record(session, task.flight_id, create_record(2.0))
     after = get(client, f"/api/trials/{trial['id']}")
     assert after["state"] == "valid"
     assert after["error"] == pytest.approx(climb_error(2.0), rel=1e-4)
@@ -211,7 +211,7 @@ def test_a_real_vehicle_whose_flight_was_lost_is_quarantined_until_a_person_rele
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     lift_off(database)
     with database.write() as session:
-        flights.lose_running_flights(session)
+        queue.lose_running_flights(session)
     vehicle = f"/api/vehicles/{campaign['vehicle']['id']}"
     assert get(client, vehicle)["state"] == "quarantined"
     client.post(f"/api/trials/{trial['id']}/classify", json={"version": 1, "outcome": "invalid", "reason": "crashed"})
@@ -231,7 +231,7 @@ def test_unverified_safe_gains_quarantine_even_a_vehicle_that_landed(client: Tes
     task = lift_off(database)
     land(database, task, create_record())
     with database.write() as session:
-        flights.quarantine_vehicle(session, task.flight_id, "the safe gains did not read back")
+        queue.quarantine_vehicle(session, task.flight_id, "the safe gains did not read back")
     vehicle = get(client, f"/api/vehicles/{campaign['vehicle']['id']}")
     assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "the safe gains did not read back")
 
@@ -273,9 +273,9 @@ def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClie
     task = stage(database)
     assert client.post(f"/api/trials/{trial['id']}/cancel").status_code == 200
     with pytest.raises(ConflictError), database.write() as session:
-        flights.record_lift_off(session, task.flight_id)
+        queue.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        flights.record_failure(session, task.flight_id, "cancelled")
+        queue.record_failure(session, task.flight_id, "cancelled")
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "cancelled"
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
 

@@ -7,7 +7,7 @@ import pytest
 
 from app.common.errors import StorageError
 from app.core.trajectory import Trajectory
-from app.trials.spool import RESERVED_BYTES, Spool
+from app.flights.record_spool import RESERVED_BYTES, Spool
 from app.vehicles.base import FlightRecord
 
 

@@ -24,10 +24,11 @@ from app.core.errors import GainlineError
 from app.db.session import Database
 from app.fleet import acts
 from app.fleet.acts import ActTask, LinkedVehicle
-from app.fleet.seat import run_vehicle_process
-from app.fleet.session import CommandForwarded, ConnectionOpened, ConnectionRequest, VehicleConnection, VehicleResponse
+from app.flights.abort import AbortRegistry
+from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
+from app.flights.vehicle_connection import VehicleConnection
+from app.flights.vehicle_process import run_vehicle_process
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
-from app.trials.flying import AbortRegistry, Publish
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 T = TypeVar("T")

@@ -15,11 +15,11 @@ from app.common.settings import Settings
 from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow
 from app.db.session import Database
+from app.flights.abort import AbortRegistry
+from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
+from app.flights.queue import REQUEST_TIMEOUT
+from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
-from app.trials.crew import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
-from app.trials.flights import REQUEST_TIMEOUT
-from app.trials.flying import AbortRegistry
-from app.trials.tasks import FlightRunner
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
 from tests.clocks import SimulatedClock
 from tests.conftest import Listen
@@ -337,7 +337,7 @@ def test_the_record_of_a_lost_flight_is_recovered_from_the_spool(
 def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_gains_back(
     client: TestClient, database: Database, field: RunnerFixture, trial_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.trials.tasks.POLL_INTERVAL_S", 5.0)
+    monkeypatch.setattr("app.flights.runner.POLL_INTERVAL_S", 5.0)
     with database.write() as session:
         row = session.query(FlightRow).one()
         row.mode, row.take_off_at = "stage", None

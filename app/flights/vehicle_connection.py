@@ -1,6 +1,6 @@
 """Connection to a vehicle: a process of its own that keeps the link open between flights.
 
-This is the worker's side; the process itself is in `seat`. It never touches the database. When the worker dies, the
+This is the worker's side; the process itself is in `vehicle_process`. It never touches the database. When the worker dies, the
 pipe between them breaks. A flight is then aborted: the vehicle lands and is left with its safe gains. A land or motors
 off command outside a flight is repeated until the vehicle obeys, for at most 60 s. Then the process ends; the next
 worker's connection waits for that.
@@ -16,29 +16,34 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Final
 
 from app.common.states import ActKind
-from app.core.clock import REAL_TIME, Clock
-from app.live.messages import NO_LINK, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
-from app.processes import process_context
-from app.trials.crew import (
+from app.flights.process_messages import (
     CancelFlight,
     CancelTakeOff,
+    CommandForwarded,
+    ConnectionOpened,
+    ConnectionRequest,
     FlightFailure,
     FlightFinished,
     FlightLanded,
     FlightMessage,
     FlightRequest,
+    FromVehicleProcess,
     GainsStaged,
     SafeGainsRestored,
     TakeOffCommand,
+    ToVehicleProcess,
+    VehicleCommand,
+    VehicleRequest,
+    VehicleResponse,
     process_died_error,
 )
-from app.vehicles.base import CheckItem, Identity, OptionValue
+from app.live.messages import NO_LINK, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
+from app.processes import process_context
 from app.vehicles.errors import SafeGainsError, VehicleError
 
 _ENDED: Final = (
@@ -58,81 +63,6 @@ TAKE_OFF_TIMEOUT_S: Final = 2.0
 """A take-off later than this after the operator's request would surprise the operator."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConnectionRequest:
-    """What the process needs to connect to a vehicle.
-
-    `lock` is held as long as the process has the vehicle. `identity` is the pinned one, None before the first
-    connection. `trial_parameters` is the folder for parameters that a trial changes besides the gains. `keep_retrying`:
-    retry until the vehicle answers.
-    """
-
-    vehicle_id: int
-    name: str
-    kind: str
-    options: Mapping[str, OptionValue]
-    safe_gains: Mapping[str, float]
-    identity: Identity | None
-    lock: Path
-    trial_parameters: Path
-    keep_retrying: bool = False
-    clock: Clock = REAL_TIME
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConnectionOpened:
-    """From the process: the link is open; `concern` is why the vehicle may only be observed."""
-
-    identity: Identity
-    concern: str
-    held: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleRequest:
-    """To the process: carry out this act, for a vehicle with these safe gains."""
-
-    kind: ActKind
-    safe_gains: Mapping[str, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleResponse:
-    """From the process: outcome of an act; `problem` when it failed. `held` are the gains as last read back."""
-
-    problem: str = ""
-    concern: str = ""
-    held: dict[str, float] = field(default_factory=dict)
-    checks: tuple[CheckItem, ...] | None = None
-    parameters: dict[str, float] | None = None
-    identity: Identity | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class VehicleCommand:
-    """To the process, at any moment: land, or motors off.
-
-    Not to be carried out after `by_s` of this computer's monotonic clock, s. The answer carries the same `number`.
-    """
-
-    number: int
-    order: VehicleCommandKind
-    reason: str
-    by_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class CommandForwarded:
-    """From the process: a command was forwarded to the vehicle; `problem` when it could not be."""
-
-    number: int
-    order: VehicleCommandKind
-    reason: str
-    problem: str = ""
-
-
-FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | FlightMessage
-ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
 MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 
 

@@ -1,0 +1,71 @@
+"""Flights over HTTP: plan and fly, stage, take off, abort."""
+
+from fastapi import APIRouter, Depends, status
+from starlette.concurrency import run_in_threadpool
+
+from app.flights import requests
+from app.trials import service
+from app.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
+from app.web.dependencies import CurrentDatabase, Id, IdempotentPost, Live, RequestContextDep, json_only
+
+router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
+
+
+@router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
+def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: NewTrial) -> Trial:
+    """Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once."""
+    return act(
+        Trial,
+        lambda session: requests.plan_trial(session, campaign_id, body, asking),
+        ahead=lambda session: service.warm_gate_cache_for_new(session, campaign_id, body),
+    )
+
+
+@router.post("/trials/{trial_id}/fly", status_code=status.HTTP_202_ACCEPTED)
+def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: FlightOrder | None = None) -> Trial:
+    """Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
+    for a real vehicle, which has to be staged."""
+    return act(
+        Trial,
+        lambda session: requests.fly_trial(session, trial_id, body or FlightOrder(), asking),
+        ahead=lambda session: requests.warm_gate_cache(session, trial_id),
+    )
+
+
+@router.post("/trials/{trial_id}/stage", status_code=status.HTTP_202_ACCEPTED)
+def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
+    """Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator."""
+    return act(
+        Trial,
+        lambda session: requests.stage_trial(session, trial_id, asking),
+        ahead=lambda session: requests.warm_gate_cache(session, trial_id),
+    )
+
+
+@router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
+def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
+    """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
+    return act(Trial, lambda session: requests.unstage_trial(session, trial_id))
+
+
+@router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
+def take_off_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
+    """Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
+    own page on this computer, with the token of the operator in control."""
+    return act(Trial, lambda session: requests.take_off_trial(session, trial_id, asking))
+
+
+@router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)
+async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body: Abort | None = None) -> AbortAnswer:
+    """End a flight now. Goes straight to the worker without waiting for storage; may be repeated."""
+    reason = (body or Abort()).reason
+    if live.worker_running and (await live.abort(trial_id, reason)).accepted:
+        return AbortAnswer(
+            trial_id=trial_id, accepted=True, sentence="The worker ends the flight and restores the safe gains."
+        )
+    return await run_in_threadpool(_withdraw, database, trial_id, reason)
+
+
+def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAnswer:
+    with database.write() as session:
+        return requests.withdraw_flight(session, trial_id, reason)
