@@ -30,12 +30,20 @@ import httpx2
 from pydantic import BaseModel, ValidationError
 
 from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal
+from app.campaigns.trials.schemas import (
+    AbortAnswer,
+    AbortJudgement,
+    Classification,
+    FlightOrder,
+    NewTrial,
+    Trajectory,
+    Trial,
+)
 from app.common.schemas import OptionValue, Page
 from app.common.schemas import Problem as ProblemDetails
 from app.common.states import FlightState, TrialState
 from app.core.errors import GainlineError, Problem
 from app.fleet.schemas import VehicleChoice
-from app.trials.schemas import AbortAnswer, AbortJudgement, Classification, FlightOrder, NewTrial, Trajectory, Trial
 
 Record = Path | bytes | Mapping[str, Iterable[float]]
 """A flight's record: a log or CSV file, its content, or columns by name, including `time_s` and `altitude_m`."""

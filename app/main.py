@@ -15,6 +15,8 @@ from app.bundles.router import router as bundles
 from app.campaigns import catalogue
 from app.campaigns.router import figures_router, landscape_router, vehicles_router
 from app.campaigns.router import router as campaigns
+from app.campaigns.trials.router import router as trials
+from app.campaigns.trials.router import uploads
 from app.common.errors import NotFoundError
 from app.common.settings import Settings
 from app.compare.router import router as compare
@@ -28,8 +30,6 @@ from app.jobs.router import router as jobs
 from app.live.link import live_link
 from app.reports.router import router as reports
 from app.studies.router import router as reproductions
-from app.trials.router import records
-from app.trials.router import router as trials
 from app.web import errors, events, system
 from app.web.errors import describe
 from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware
@@ -78,7 +78,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         campaigns,
         trials,
         flights,
-        records,
+        uploads,
         fleet,
         jobs,
         reproductions,

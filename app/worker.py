@@ -24,7 +24,7 @@ import structlog
 from app import __version__
 from app.campaigns.computation import warm_up
 from app.campaigns.landscapes import LANDSCAPE_JOB
-from app.campaigns.proposing import PROPOSAL_JOB
+from app.campaigns.proposals import PROPOSAL_JOB
 from app.campaigns.tasks import LandscapeJob, ProposalJob
 from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import AlreadyRunningError, StorageError
@@ -37,7 +37,7 @@ from app.db.session import Database
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
-from app.jobs.tasks import JobRunner, recover
+from app.jobs.runner import JobRunner, recover
 from app.live.messages import PublishedMessage, WorkerHello, live_address
 from app.live.server import LiveServer
 from app.processes.locks import LockedError, exclusive

@@ -17,16 +17,16 @@ from typing import Final
 
 from app.campaigns import service as campaigns
 from app.campaigns.computation import warm_up
-from app.campaigns.proposing import PROPOSAL_JOB
+from app.campaigns.proposals import PROPOSAL_JOB
 from app.campaigns.schemas import Definition, NewCampaign, StopRule
 from app.campaigns.tasks import ProposalJob
+from app.campaigns.trials.schemas import FlightOrder, NewTrial
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
 from app.flights import queue, requests
-from app.jobs.tasks import JobRunner
+from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
-from app.trials.schemas import FlightOrder, NewTrial
 from app.vehicles.base import FlightOptions as Order
 from app.vehicles.open import open_vehicle
 

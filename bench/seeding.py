@@ -9,10 +9,12 @@ from typing import Final
 import numpy as np
 from sqlalchemy import insert, update
 
+from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of, frozen_digest
-from app.campaigns.proposing import gate_json
+from app.campaigns.proposals import gate_json
 from app.campaigns.schemas import NewCampaign
+from app.campaigns.trials.records import score
 from app.common.settings import Settings
 from app.common.states import CampaignState, JobState, TrialState
 from app.core.definition import Definition
@@ -26,8 +28,6 @@ from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, Trajecto
 from app.db.session import Database
 from app.db.trajectories import pack
 from app.fleet.schemas import VehicleChoice
-from app.trials import history
-from app.trials.scoring import score
 
 SAMPLES: Final = 16_700
 SEED: Final = 20261122

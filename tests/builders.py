@@ -7,7 +7,7 @@ import httpx2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.campaigns import computation, proposing
+from app.campaigns import computation, proposals
 from app.core.trajectory import Trajectory
 from app.db.session import Database
 from app.flights import queue
@@ -124,17 +124,17 @@ def run_jobs(database: Database) -> int:
     """Carry out every waiting proposal job as a worker does; how many there were."""
     for count in range(1000):
         with database.write() as session:
-            job = jobs.claim_job(session, worker=WORKER, kinds=(proposing.PROPOSAL_JOB,), lease_s=30.0)
+            job = jobs.claim_job(session, worker=WORKER, kinds=(proposals.PROPOSAL_JOB,), lease_s=30.0)
             if job is None:
                 return count
             job_id, campaign_id = job.id, job.campaign_id
         assert campaign_id is not None
         with database.read() as session:
-            past = proposing.read_history(session, campaign_id)
+            past = proposals.read_history(session, campaign_id)
         computed = computation.compute(past)
         with database.write() as session:
             if jobs.finish_job(session, job_id, worker=WORKER):
-                proposing.store_proposal(session, campaign_id, computed)
+                proposals.store_proposal(session, campaign_id, computed)
     raise AssertionError("jobs make jobs for ever")
 
 

@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 from app.accounts.keyring import Keyring
 from app.accounts.permissions import Key
 from app.campaigns.schemas import Definition, StopRule
+from app.campaigns.trials.schemas import Classification
 from app.client import (
     Client,
     ConflictError,
@@ -21,7 +22,6 @@ from app.client import (
 from app.common.settings import Settings
 from app.db.session import Database
 from app.flights import queue
-from app.trials.schemas import Classification
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
 from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.logs.recorded import TLOGS, recorded

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 from app.campaigns.schemas import Definition
+from app.campaigns.trials.schemas import Glitch
 from app.common.schemas import Gate, Interval, Name, OptionValue
 from app.common.states import AbortCause, CampaignState, Ending, Outcome, TrialKind, TrialState
 from app.core.advice import Advice
@@ -18,7 +19,6 @@ from app.core.spread import ParameterDistribution
 from app.core.stopping import StopVerdict
 from app.core.strategies.base import Explanation
 from app.core.strategies.base import Kind as ProposalKind
-from app.trials.schemas import Glitch
 
 FORMAT: Final = "gainline-campaign"
 VERSION: Final = 2

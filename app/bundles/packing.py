@@ -26,14 +26,14 @@ from app.bundles.contents import (
     Trial,
     Vehicle,
 )
+from app.campaigns import history
+from app.campaigns.trials.photos import ENDINGS, media_type_of
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, StorageError
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.trajectories import is_intact, refused_for
 from app.db.types import utc_now
-from app.fleet.elsewhere import origin_of
-from app.trials import history
-from app.trials.photos import ENDINGS, media_type_of
+from app.fleet.registration import origin_of
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """Time stamp of every part, so that the same campaign makes the same parts."""

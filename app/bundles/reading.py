@@ -19,11 +19,11 @@ import zstandard
 from pydantic import BaseModel, ValidationError
 
 from app.bundles.contents import CONTENTS, MANIFEST, VERSION, Campaign, Contents, Manifest, Photo, Record
+from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
+from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
 from app.core.experiments import EXPERIMENTS
 from app.db.trajectories import Packed, unpack
-from app.trials.photos import MAX_BYTES as PHOTO_BYTES
-from app.trials.photos import media_type_of
 
 MAX_PARTS: Final = 20_000
 MAX_DIRECTORY_BYTES: Final = 4 * 2**20

@@ -9,11 +9,11 @@ from app.bundles.contents import MAX_CAMPAIGNS
 from app.bundles.packing import Packer
 from app.bundles.reading import Bundle
 from app.bundles.storing import keep_telemetry, store
+from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.schemas import Campaign
 from app.common.errors import BusyError, ConflictError
 from app.db.models import CampaignRow
-from app.trials import history
 
 
 def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[bytes]) -> str:

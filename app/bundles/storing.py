@@ -10,8 +10,9 @@ from sqlalchemy.orm import Session
 
 from app.bundles.contents import CONTENTS, Campaign, Photo, Proposal, Record, Trial
 from app.bundles.reading import Bundle
+from app.campaigns import history
 from app.campaigns.definitions import core_definition
-from app.campaigns.proposing import is_stale, request_proposal
+from app.campaigns.proposals import is_stale, request_proposal
 from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
 from app.common.errors import InputError, Problem
@@ -19,9 +20,8 @@ from app.core.checking import problems_of
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.fleet.elsewhere import get_or_create_imported_vehicle
+from app.fleet.registration import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice
-from app.trials import history
 from app.vehicles.open import VEHICLE_KINDS, check_options
 
 JsonObject = dict[str, Any]

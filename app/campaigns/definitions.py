@@ -1,4 +1,7 @@
-"""Conversion of a campaign's definition: from a request to the core, into its row, and back."""
+"""Conversion of a campaign's definition: from a request to the core, into its row, and back.
+
+Donor of a warm start: a flight of another campaign, looked up when the campaign is defined.
+"""
 
 import hashlib
 import json
@@ -7,13 +10,18 @@ from dataclasses import asdict, replace
 from typing import Final
 
 from pydantic import TypeAdapter
+from sqlalchemy.orm import Session
 
+from app.campaigns import history, repository
 from app.campaigns.schemas import Definition as DefinitionIn
+from app.campaigns.schemas import Donor, Start
+from app.common.errors import NotFoundError
+from app.common.states import TrialState
 from app.core.checking import check_definition
 from app.core.definition import Definition
 from app.core.errors import InputError, Problem
 from app.core.experiments import get_experiment
-from app.db.models import CampaignRow, JsonObject
+from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue
 from app.vehicles.open import VEHICLE_KINDS, check_options
@@ -118,3 +126,49 @@ def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:
     except InputError as error:
         return [Problem(prefix + problem.field, problem.reason) for problem in error.problems]
     return []
+
+
+def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:
+    """Return the definition with the donor's trial number, checksum and gains filled in; unchanged without a donor.
+
+    The donor is the best valid flight of its campaign unless a trial is named. Its record and gains are fixed from then
+    on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs to another
+    experiment, or its record does not match the checksum in the definition.
+    """
+    named = asked.start.donor
+    if named is None or asked.start.kind != "campaign":
+        return asked
+    trial = _trial(session, asked, named)
+    assert trial.trajectory is not None
+    checksum = trial.trajectory.checksum
+    if named.checksum and named.checksum != checksum:
+        raise _refused("checksum", f"does not belong to the record of flight {trial.number}: leave it out")
+    donor = Donor(campaign_id=named.campaign_id, trial_number=trial.number, checksum=checksum)
+    return asked.model_copy(update={"start": Start(kind="campaign", gains=dict(trial.gains), donor=donor)})
+
+
+def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
+    try:
+        campaign = repository.get_campaign(session, named.campaign_id)
+    except NotFoundError as error:
+        raise _refused("campaign_id", f"there is no campaign {named.campaign_id}") from error
+    if campaign.experiment != asked.experiment:
+        reason = f"campaign {campaign.id} flies {campaign.experiment!r}, this one {asked.experiment!r}"
+        raise _refused("campaign_id", reason)
+    trials = history.trials_of(session, campaign.id)
+    if named.trial_number is None:
+        found = history.best_of(trials)
+    else:
+        found = next((row for row in trials if row.number == named.trial_number), None)
+    if found is None or found.trajectory is None or (not named.checksum and found.state != TrialState.VALID):
+        which = "flight" if named.trial_number is None else f"flight {named.trial_number}"
+        raise _refused("trial_number", f"campaign {campaign.id} has no valid {which}")
+    return found
+
+
+def _refused(field: str, reason: str) -> InputError:
+    return InputError(
+        "This campaign cannot start from the other one.",
+        problems=(Problem(f"definition.start.donor.{field}", reason),),
+        hint="Name a campaign of the same experiment with a valid flight, or choose another start.",
+    )

@@ -10,11 +10,11 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory
 from app.campaigns.definitions import definition_of
-from app.campaigns.drawing import history_of
-from app.campaigns.proposing import is_stale, read_history
+from app.campaigns.figure_data import history_of
+from app.campaigns.proposals import is_stale, read_history
 from app.common.errors import GainlineError
 from app.common.states import JobState
 from app.core.experiments import experiment_of
@@ -24,7 +24,6 @@ from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
-from app.trials import history
 
 LANDSCAPE_JOB: Final = "landscape"
 
@@ -43,7 +42,7 @@ class LandscapeAnswer:
 
 def landscape_card(session: Session, campaign_id: int, theme: ThemeName, *, stacked: bool) -> LandscapeAnswer:
     """The landscape of the latest proposal, or why there is none. Raises NotFoundError for an unknown campaign."""
-    campaign = repository.get_one(session, campaign_id)
+    campaign = repository.get_campaign(session, campaign_id)
     proposal = repository.latest_proposal(session, campaign_id)
     if (never := _impossible(campaign)) is not None:
         return _waiting(never)

@@ -6,15 +6,13 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import Rehearsal, RehearsalState
 from app.common.errors import ConflictError
 from app.common.states import Outcome, TrialState
 from app.db.models import CampaignRow
-from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.trials import history
 
 FLIGHTS: Final = 3
 """Number of valid flights that passes a rehearsal, unless the campaign's own rule ends it earlier."""
@@ -85,14 +83,3 @@ def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
             hint=f"Rehearse it {where} first: {FLIGHTS} valid flights, or the campaign to its stop, none of them "
             "aborted or invalid.",
         )
-
-
-def rehearsed_by(session: Session, rehearsal: CampaignRow) -> int | None:
-    """The campaign that this one rehearses; None if it is not a rehearsal."""
-    return repository.rehearsed_id(session, rehearsal.id)
-
-
-def notify_rehearsed_campaign(session: Session, rehearsal: CampaignRow) -> None:
-    """Mark the campaign that this one rehearses as updated, so that its clients load it again."""
-    if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
-        repository.get_one(session, campaign_id).updated_at = utc_now()

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, status
 
 from app.accounts.permissions import Permission, is_allowed
-from app.campaigns import drawing, landscapes, promoting, rehearsing, service, wear
+from app.campaigns import figure_data, landscapes, proposals, service, wear
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -31,7 +31,7 @@ from app.common.errors import InputError, Problem
 from app.common.schemas import FigureCard, Page, figure_card
 from app.common.states import CampaignState
 from app.figures.history import Range
-from app.fleet import registering
+from app.fleet import registration
 from app.fleet.schemas import Vehicle, VehicleEdit
 from app.web.dependencies import (
     CurrentDatabase,
@@ -113,14 +113,14 @@ def clone_campaign(act: IdempotentPost, campaign_id: Id, body: Clone | None = No
 def rehearse_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
     """The rehearsal of a campaign on a real vehicle: the same campaign on a simulation. Created unless there is one
     that is under way or passed."""
-    return act(Campaign, lambda session: rehearsing.rehearse(session, campaign_id))
+    return act(Campaign, lambda session: service.rehearse(session, campaign_id))
 
 
 @router.post("/{campaign_id}/promote")
 def promote_best(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Promotion) -> Vehicle:
     """Make the best gains the safe gains of the campaign's registered vehicle, once its flights have shown that they
     are better than the first ones."""
-    return act(Vehicle, lambda session: promoting.promote_best(session, campaign_id, body, asking))
+    return act(Vehicle, lambda session: service.promote_best(session, campaign_id, body, asking))
 
 
 @router.get("/{campaign_id}/statistics")
@@ -163,8 +163,8 @@ def get_campaign_figure(
     With more than 30 flights the takeoffs are drawn as an envelope; the first, the best, the latest and that `flight`
     are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
     """
-    view = drawing.FigureView(window=_window(from_s, to_s), chosen=flight)
-    return figure_card(drawing.campaign_figure(session, campaign_id, name, theme, view))
+    view = figure_data.FigureView(window=_window(from_s, to_s), chosen=flight)
+    return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view))
 
 
 def _window(from_s: float | None, to_s: float | None) -> Range | None:
@@ -183,7 +183,7 @@ def _window(from_s: float | None, to_s: float | None) -> Range | None:
 @figures_router.get("/trials/{trial_id}/figure")
 def get_flight_figure(session: Reader, trial_id: Id, theme: Theme = "light") -> FigureCard:
     """One flight, with its prediction and its commands."""
-    return figure_card(drawing.flight_figure(session, trial_id, theme))
+    return figure_card(figure_data.flight_figure(session, trial_id, theme))
 
 
 landscape_router = APIRouter(prefix="/api", tags=["figures"])
@@ -231,7 +231,7 @@ def get_vehicle_figure(
 @vehicles_router.patch("/{vehicle_id}", dependencies=[Depends(json_only)])
 def edit_vehicle(session: Writer, asking: RequestContextDep, vehicle_id: Id, body: VehicleEdit) -> Vehicle:
     """Change a registered vehicle's name, settings, battery or safe gains, while it is at rest."""
-    edited = registering.edit_vehicle(session, vehicle_id, body, asking)
+    edited = registration.edit_vehicle(session, vehicle_id, body, asking)
     if body.safe_gains is not None:
-        service.safe_gains_changed(session, vehicle_id)
+        proposals.safe_gains_changed(session, vehicle_id)
     return edited

@@ -1,15 +1,21 @@
-"""Operations on campaigns for clients: people and scripts. Proposals are in `proposing`, API views in `views`."""
+"""Operations on campaigns for clients: people and scripts. Proposals are in `proposing`, API views in `views`.
+
+Promotion of a campaign's best gains to its vehicle's safe gains, once flights have shown that they are better.
+
+Creation of rehearsals: the same campaign on a simulation, for a campaign on a real vehicle.
+"""
 
 from collections.abc import Collection
 from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
-from app.campaigns.definitions import check_campaign, frozen_digest, stored
-from app.campaigns.donors import fill_in_donor
-from app.campaigns.proposing import cancel_outdated, end_campaign, request_proposal, set_campaign_state
-from app.campaigns.rehearsals import notify_rehearsed_campaign
+from app.accounts.permissions import RequestContext
+from app.campaigns import history, repository
+from app.campaigns.definitions import check_campaign, fill_in_donor, stored
+from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
+from app.campaigns.proposals import end_campaign, request_proposal, safe_gains_changed
+from app.campaigns.rehearsals import rehearsal_of
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
@@ -19,22 +25,26 @@ from app.campaigns.schemas import (
     Donor,
     NewCampaign,
     NextFlight,
+    Promotion,
     Sort,
     Start,
 )
+from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.state_machine import check_action, check_version
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
+from app.core.confirming import ComparisonState
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
-from app.db.models import CampaignRow, VehicleRow
-from app.db.types import utc_now
+from app.core.strategies.history import format_gains
+from app.core.wording import percent
+from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet
-from app.fleet.schemas import VehicleChoice
-from app.trials import history
-from app.trials.lifecycle import cancel_unflown
+from app.fleet.registration import promote_gains
+from app.fleet.schemas import Vehicle, VehicleChoice
+from app.fleet.service import get_vehicle
 
 _DIGITS_OF_AN_ID: Final = 19
 
@@ -51,7 +61,7 @@ def list_campaigns(
 ) -> Page[CampaignSummary]:
     """One page of summaries. Raises InputError for a cursor of another list."""
     after = None if cursor is None else decode_cursor(sort, cursor, repository.cursor_kind(sort))
-    found, total = repository.page(
+    found, total = repository.campaign_page(
         session, search=search, states=states, vehicles=vehicles, sort=sort, after=after, limit=limit
     )
     following = encode_cursor(sort, found[limit - 1][1]) if len(found) > limit else None
@@ -60,7 +70,7 @@ def list_campaigns(
 
 def get_row(session: Session, campaign_id: int) -> CampaignRow:
     """The campaign's row, for other slices. Raises NotFoundError."""
-    return repository.get_one(session, campaign_id)
+    return repository.get_campaign(session, campaign_id)
 
 
 def find_by_id_or_name(session: Session, wanted: str) -> int:
@@ -84,7 +94,7 @@ def find_by_id_or_name(session: Session, wanted: str) -> int:
 
 def get_campaign(session: Session, campaign_id: int) -> Campaign:
     """The campaign with that id. Raises NotFoundError."""
-    return campaign_view(session, repository.get_one(session, campaign_id))
+    return campaign_view(session, repository.get_campaign(session, campaign_id))
 
 
 def create_campaign(session: Session, new: NewCampaign) -> Campaign:
@@ -128,7 +138,7 @@ def add_campaign(
 def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
     """Create a draft with the same definition, linked to its origin; with `warm_start` it starts from the origin's best
     flight."""
-    origin = repository.get_one(session, campaign_id)
+    origin = repository.get_campaign(session, campaign_id)
     vehicle = clone.vehicle or _choice_of(origin)
     name = clone.name or f"{origin.name[:110]} (again)"
     definition = Definition.model_validate(origin.definition)
@@ -141,7 +151,7 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
 def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Campaign:
     """Change a campaign. Raises ConflictError when another client changed it first, or when its definition is
     frozen."""
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     definition = None if edit.definition is None else edit.definition.model_dump(mode="json")
     check_version(
         edit.version,
@@ -172,7 +182,7 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
 
     Raises ConflictError when a flight was begun in it, or another client has changed it meanwhile.
     """
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     check_version(version, row.version, f"Campaign {row.id}", {})
     check_action(CAMPAIGN_ACTIONS, "delete", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
@@ -191,7 +201,7 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
 
 def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign:
     """Finish a campaign on the operator's decision. Raises ConflictError unless it is between flights."""
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     check_action(CAMPAIGN_ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     end_campaign(session, row, Outcome.STOPPED, reason)
@@ -200,7 +210,7 @@ def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign
 
 def archive_campaign(session: Session, campaign_id: int) -> Campaign:
     """Archive a campaign. Raises ConflictError unless it is finished."""
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     check_action(CAMPAIGN_ACTIONS, "archive", row.state, f"Campaign {row.id}")
     set_campaign_state(row, CampaignState.ARCHIVED)
     return campaign_view(session, row)
@@ -208,45 +218,15 @@ def archive_campaign(session: Session, campaign_id: int) -> Campaign:
 
 def next_flight(session: Session, campaign_id: int) -> NextFlight:
     """State of the next proposal. Raises NotFoundError."""
-    return next_flight_view(session, repository.get_one(session, campaign_id))
+    return next_flight_view(session, repository.get_campaign(session, campaign_id))
 
 
 def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
     """Request the proposal again. Raises ConflictError in states without proposals."""
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     check_action(CAMPAIGN_ACTIONS, "propose", row.state, f"Campaign {row.id}")
     request_proposal(session, row)
     return next_flight_view(session, row)
-
-
-def start_flying(row: CampaignRow) -> None:
-    """Enter state flying, at a lift-off or an imported record; at the first one the definition is frozen."""
-    if row.definition_digest is None:
-        row.safe_gains = row.safe_gains or dict(row.vehicle.safe_gains)
-        row.definition_digest = frozen_digest(row)
-    set_campaign_state(row, CampaignState.FLYING)
-
-
-def finish_flying(session: Session, row: CampaignRow) -> None:
-    """Leave state flying once the trial has ended, however it ended, and request the next proposal."""
-    if row.state == CampaignState.FLYING:
-        set_campaign_state(row, CampaignState.DECIDING)
-    history_changed(session, row)
-
-
-def history_changed(session: Session, row: CampaignRow) -> None:
-    """Update everything computed from the flights, after a change of which flights count."""
-    row.updated_at = utc_now()
-    notify_rehearsed_campaign(session, row)
-    cancel_outdated(session, row)
-    request_proposal(session, row)
-
-
-def safe_gains_changed(session: Session, vehicle_id: int) -> None:
-    """Request new proposals for the vehicle's unflown campaigns, which start from its safe gains."""
-    for row in repository.unflown_on(session, vehicle_id):
-        cancel_outdated(session, row)
-        request_proposal(session, row)
 
 
 def _choice_of(row: CampaignRow) -> VehicleChoice:
@@ -285,3 +265,80 @@ def _require_no_flight(session: Session, row: CampaignRow) -> None:
             f"Campaign {row.id} has a flight under way (trial {flight.trial_id}).",
             hint="Wait until it is over, or abort it.",
         )
+
+
+def promote_best(session: Session, campaign_id: int, asked: Promotion, context: RequestContext) -> Vehicle:
+    """Make the best gains the vehicle's safe gains; the act that records this names the flights.
+
+    Raises ConflictError while the best gains are not shown to be better than the first ones, and when the vehicle is
+    shared, not at rest, under another operator's control, or was changed meanwhile.
+    """
+    row = repository.get_campaign(session, campaign_id)
+    now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
+    if now is None or now.comparison is None:
+        raise _not_shown(row, "it has no gains that are better than its first ones")
+    said = now.comparison
+    if said.verdict != "better":
+        raise _not_shown(
+            row, f"whether {format_gains(now.winner.gains)} is better than its first gains is {said.verdict}"
+        )
+    gains = dict(now.winner.gains)
+    promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), context=context)
+    safe_gains_changed(session, row.vehicle_id)
+    session.flush()
+    return get_vehicle(session, row.vehicle_id)
+
+
+def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
+    assert now.comparison is not None
+    assert now.comparison.confidence is not None
+    flights = ", ".join(map(str, now.winner.numbers))
+    sure = percent(now.comparison.confidence)
+    return f"{asked.statement} (campaign {row.id}, flights {flights}: better, {sure} confidence)"
+
+
+def _not_shown(row: CampaignRow, why: str) -> ConflictError:
+    return ConflictError(
+        f"No gains of campaign {row.id} can be promoted: {why}.",
+        hint="Fly the best gains and the first ones again until the statistics say “better”.",
+    )
+
+
+_NAME_ROOM: Final = 100
+
+
+def rehearse(session: Session, campaign_id: int) -> Campaign:
+    """Return the rehearsal of this campaign: the one that is under way or passed, else a new draft on a simulation with
+    the same definition and safe gains.
+
+    Raises ConflictError where no rehearsal is needed, and where no simulation can fly the experiment.
+    """
+    row = repository.get_campaign(session, campaign_id)
+    said = rehearsal_of(session, row)
+    if said.state == "not needed":
+        why = f": {said.reason}" if said.reason else f", {row.vehicle.name} is not a real vehicle flown from here"
+        raise ConflictError(f"Campaign {row.id} needs no rehearsal{why}.", hint="Fly it.")
+    if said.campaign_id is not None and said.state != "failed":
+        return campaign_view(session, repository.get_campaign(session, said.campaign_id))
+    made = add_campaign(
+        session,
+        f"Rehearsal: {row.name[:_NAME_ROOM]}",
+        Definition.model_validate(row.definition),
+        _simulation_of(session, row),
+        parent_id=row.id,
+        safe_gains=dict(row.vehicle.safe_gains if row.safe_gains is None else row.safe_gains),
+    )
+    session.add(RehearsalRow(rehearsal_id=made.id, campaign_id=row.id))
+    session.flush()
+    notify_rehearsed_campaign(session, made)
+    return campaign_view(session, made)
+
+
+def _simulation_of(session: Session, row: CampaignRow) -> VehicleChoice:
+    if (found := fleet.simulation_for(session, row.experiment, row.vehicle.safe_gains)) is None:
+        raise ConflictError(
+            f"No simulation flies the experiment {row.experiment} of campaign {row.id}.",
+            hint="Start `gainline sim-drone` with the same autopilot, register it as a simulated vehicle and connect "
+            "it; then rehearse on it.",
+        )
+    return found

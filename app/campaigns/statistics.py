@@ -5,7 +5,7 @@ from typing import Final, Literal
 
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import (
     BestTrial,
@@ -26,7 +26,6 @@ from app.core.statistics import Group, drift_of, optimism, pool_scatter, trend_o
 from app.core.strategies.history import format_gains
 from app.core.wording import percent, plus_minus, short
 from app.db.models import CampaignRow, TrialRow
-from app.trials import history
 
 _SURE: Final = 0.9
 _NO_OPTIMISM: Final = 0.05
@@ -35,7 +34,7 @@ _NO_OPTIMISM: Final = 0.05
 
 def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistics:
     """Statistics of a campaign. Raises NotFoundError."""
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     trials = history.trials_of(session, campaign_id)
     definition, experiment = definition_of(row), get_experiment(row.experiment)
     flights = history.flown_gains(trials)

@@ -6,12 +6,12 @@ from typing import Final
 import numpy as np
 import structlog
 
-from app.campaigns import computation, landscapes, proposing
+from app.campaigns import computation, landscapes, proposals
 from app.common.errors import GainlineError
 from app.core.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.jobs.tasks import ClaimedJob
+from app.jobs.runner import ClaimedJob
 from app.processes.pool import ComputePool
 
 POINTS_PER_BATCH: Final = 48
@@ -37,11 +37,11 @@ class ProposalJob:
             raise GainlineError("It names no campaign.", hint="")
         started_s = monotonic()
         with self._database.read() as session:
-            past = proposing.read_history(session, job.campaign_id)
+            past = proposals.read_history(session, job.campaign_id)
         computed = self._pool.run(computation.compute, past)
         with self._database.write() as session:
             if jobs.finish_job(session, job.id, worker=self._worker):
-                proposing.store_proposal(session, job.campaign_id, computed)
+                proposals.store_proposal(session, job.campaign_id, computed)
         _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
 
 

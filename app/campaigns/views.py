@@ -7,9 +7,10 @@ from typing import Final
 from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
-from app.campaigns.proposing import PROPOSAL_JOB, is_stale
-from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of, rehearsed_by
+from app.campaigns import history, repository
+from app.campaigns.history import rehearsed_by
+from app.campaigns.proposals import PROPOSAL_JOB, is_stale
+from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.schemas import (
     Advice,
     Campaign,
@@ -34,7 +35,6 @@ from app.core.strategies.base import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs
-from app.trials import history
 
 SPARKS: Final = 7
 _EXPLANATION: Final = TypeAdapter(Explanation)

@@ -7,7 +7,7 @@ from typing import Final
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.core.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
@@ -15,7 +15,6 @@ from app.figures.batteries import BatteriesFigure, BatteryFlight
 from app.figures.drift import CalibrationFigure, Point
 from app.figures.theme import ThemeName
 from app.fleet import service as fleet
-from app.trials import history
 
 _STRATEGY: Final = "calibrated"
 

@@ -8,10 +8,16 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
+from app.campaigns.campaign_files import (
+    CampaignFile,
+    gains_by_hand,
+    override,
+    preset_names,
+    read_campaign_file,
+    read_preset,
+)
 from app.campaigns.definitions import check_campaign, stored
-from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
 from app.campaigns.headless import CampaignListener, HeadlessCampaign, HeadlessTrial, fly_campaign
-from app.campaigns.overrides import override
 from app.commands.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem

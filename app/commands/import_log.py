@@ -8,14 +8,14 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from app.campaigns.trials import records
+from app.campaigns.trials.schemas import Trial
 from app.commands.console import console, write_json
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.logs.takeoffs import Takeoff
-from app.trials import service
-from app.trials.schemas import Trial
 
 
 def import_log(
@@ -61,7 +61,7 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
             companion = (
                 files.enter_context(beside.open("rb")) if file.suffix.lower() == ".data" and beside.is_file() else None
             )
-            return service.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
+            return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
     except OSError as error:
         raise InputError(
             f"{file} could not be read: {error.strerror or error}.",
@@ -73,7 +73,7 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
     def attempt(confirmed: bool) -> Trial:
         with database.write() as session:
-            return service.import_into_campaign(session, campaign, flown, number=trial, confirmed=confirmed)
+            return records.import_into_campaign(session, campaign, flown, number=trial, confirmed=confirmed)
 
     try:
         return attempt(yes)

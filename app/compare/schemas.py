@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
+from app.campaigns.trials.schemas import GroupBrief
 from app.common.schemas import Gains, OptionValue
 from app.common.states import TrialState
 from app.core.statistics import Verdict
-from app.trials.schemas import GroupBrief
 
 Basis = Literal["gains", "repeats", "apart", "no error"]
 _BASIS = (

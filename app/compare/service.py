@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.campaigns.trials.schemas import GroupBrief
 from app.compare import repository
 from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
 from app.compare.settings import gain_differences, setting_differences, settings_of
@@ -20,7 +21,6 @@ from app.figures.base import Card, card_of
 from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure
 from app.figures.history import Curve
 from app.figures.theme import ThemeName
-from app.trials.schemas import GroupBrief
 
 GRID_STEP_S: Final = 0.02
 

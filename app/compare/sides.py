@@ -7,6 +7,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.campaigns import history
 from app.campaigns import service as campaigns_service
 from app.campaigns.definitions import definition_of
 from app.common.errors import InputError, Problem
@@ -17,7 +18,6 @@ from app.core.experiments.base import Experiment
 from app.core.statistics import Group, PooledScatter, groups_of, pool_scatter
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
-from app.trials import history
 
 LABELS: Final = "ABCDEFGHIJKLMNOPQRST"
 MAX_FLIGHTS: Final = len(LABELS)

@@ -8,6 +8,7 @@ vehicle and gains differ together; only the errors are reported.
 import math
 from collections.abc import Sequence
 
+from app.campaigns.trials.views import CONFIDENCE
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
 from app.compare.sides import ComparisonFlight
 from app.compare.words import capitalised, measured, named, percent
@@ -15,7 +16,6 @@ from app.core.confirming import SCATTER_NOT_KNOWN
 from app.core.statistics import Comparison, Group, Verdict, compare, drift_of
 from app.core.strategies.history import format_gains
 from app.fleet import service as fleet
-from app.trials.comparisons import CONFIDENCE
 
 
 def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidates: int = 1) -> FlightPair:

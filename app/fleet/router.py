@@ -9,7 +9,7 @@ from app.accounts import permissions
 from app.accounts.permissions import is_allowed
 from app.common.schemas import Page
 from app.common.states import ActKind
-from app.fleet import acts, control, registering, service, views
+from app.fleet import commands, control, registration, service, views
 from app.fleet.schemas import (
     GivenGains,
     Lease,
@@ -47,7 +47,7 @@ def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None)
 @router.post("", status_code=status.HTTP_201_CREATED)
 def register_vehicle(act: IdempotentPost, asking: RequestContextDep, body: NewVehicle) -> Vehicle:
     """Register a vehicle that the program keeps a link to. Whether it is REAL follows from its settings."""
-    return act(Vehicle, lambda session: registering.register_vehicle(session, body, asking))
+    return act(Vehicle, lambda session: registration.register_vehicle(session, body, asking))
 
 
 @router.get("/{vehicle_id}")
@@ -58,31 +58,31 @@ def get_vehicle(session: Reader, vehicle_id: Id) -> Vehicle:
 @router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)
 def connect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Open the link and keep it open; the vehicle's safe gains are written and read back, unless it is armed."""
-    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.CONNECT, asking))
+    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.CONNECT, asking))
 
 
 @router.post("/{vehicle_id}/disconnect", status_code=status.HTTP_202_ACCEPTED)
 def disconnect_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Close the link."""
-    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.DISCONNECT, asking))
+    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.DISCONNECT, asking))
 
 
 @router.post("/{vehicle_id}/check", status_code=status.HTTP_202_ACCEPTED)
 def check_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Run the preflight check."""
-    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.CHECK, asking))
+    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.CHECK, asking))
 
 
 @router.post("/{vehicle_id}/restore", status_code=status.HTTP_202_ACCEPTED)
 def restore_safe_gains(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Write the safe gains and read them back."""
-    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.RESTORE, asking))
+    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.RESTORE, asking))
 
 
 @router.post("/{vehicle_id}/parameters", status_code=status.HTTP_202_ACCEPTED)
 def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id) -> VehicleAct:
     """Read every parameter of the vehicle; they are in the act's result."""
-    return act(VehicleAct, lambda session: acts.request_act(session, vehicle_id, ActKind.PARAMETERS, asking))
+    return act(VehicleAct, lambda session: commands.request_act(session, vehicle_id, ActKind.PARAMETERS, asking))
 
 
 @router.get("/{vehicle_id}/acts")
@@ -116,7 +116,7 @@ async def stop_motors(
 
 def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: RequestContextDep) -> None:
     with database.read() as session:
-        acts.require_may_stop_motors(session, vehicle_id, asking)
+        commands.require_may_stop_motors(session, vehicle_id, asking)
 
 
 async def _order(
@@ -133,7 +133,7 @@ async def _order(
 def release_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id, body: Release) -> Vehicle:
     """Release a vehicle from quarantine, on the statement of a person who has looked at it. A vehicle with a link is
     released once the worker has verified that it is disarmed and holds its safe gains; the act reports the outcome."""
-    return act(Vehicle, lambda session: acts.release_vehicle(session, vehicle_id, body.statement, asking))
+    return act(Vehicle, lambda session: commands.release_vehicle(session, vehicle_id, body.statement, asking))
 
 
 @router.put("/{vehicle_id}/control")

@@ -17,9 +17,16 @@ from app.core.policy import Gains
 from app.db.models import VehicleRow
 from app.db.types import utc_now
 from app.fleet import repository
-from app.fleet.kinds import can_fly, experiments_of, is_registered_one_by_one, needs_staging
 from app.fleet.schemas import Vehicle, VehicleChoice
-from app.fleet.views import campaign_vehicle, options_of, vehicle_view
+from app.fleet.views import (
+    campaign_vehicle,
+    can_fly,
+    experiments_of,
+    is_registered_one_by_one,
+    needs_staging,
+    options_of,
+    vehicle_view,
+)
 from app.vehicles.open import VEHICLE_KINDS, get_kind
 
 __all__ = [

@@ -22,8 +22,8 @@ from app.common.states import GIVES_GAINS, ActKind
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.db.session import Database
-from app.fleet import acts
-from app.fleet.acts import ActTask, LinkedVehicle
+from app.fleet import commands
+from app.fleet.commands import ActTask, LinkedVehicle
 from app.flights.abort import AbortRegistry
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
 from app.flights.vehicle_connection import VehicleConnection
@@ -94,10 +94,10 @@ class VehicleConnectionManager:
         Raises StorageError.
         """
         with self._database.write() as transaction:
-            acts.withdraw_acts(transaction)
-            acts.forget_connections(transaction)
+            commands.withdraw_acts(transaction)
+            commands.forget_connections(transaction)
             if self._links:
-                acts.request_reconnections(transaction)
+                commands.request_reconnections(transaction)
 
     def close(self) -> None:
         """Close all connections once nothing is being carried out; every vehicle is left with its safe gains."""
@@ -136,7 +136,7 @@ class VehicleConnectionManager:
     def claim(self) -> ActTask | None:
         """Claim the oldest requested act for this worker; None when there is none. Raises StorageError."""
         with self._database.write() as transaction:
-            return acts.claim_act(transaction, self._worker)
+            return commands.claim_act(transaction, self._worker)
 
     def carry_out(self, task: ActTask) -> None:
         """Carry out an act and store its outcome. Raises nothing."""
@@ -158,7 +158,9 @@ class VehicleConnectionManager:
         except GainlineError as error:
             concern = str(error) if isinstance(error, SafeGainsError) else ""
             self._fail(
-                task, str(error), also=lambda t: acts.record_disconnected(t, task.vehicle.vehicle_id, concern=concern)
+                task,
+                str(error),
+                also=lambda t: commands.record_disconnected(t, task.vehicle.vehicle_id, concern=concern),
             )
             return
         self._store_with_retry(partial(_connected, task=task, said=said))
@@ -200,7 +202,7 @@ class VehicleConnectionManager:
         _log.warning("act failed", act=task.kind, why=problem)
 
         def store(transaction: Transaction) -> None:
-            acts.finish_act(transaction, task.act_id, problem=problem)
+            commands.finish_act(transaction, task.act_id, problem=problem)
             also(transaction)
 
         self._store_with_retry(store)
@@ -219,14 +221,14 @@ class VehicleConnectionManager:
             return
         self._look_due_s = self._clock.now_s() + RECONNECT_INTERVAL_S
         with self._database.read() as transaction:
-            wanted = acts.list_vehicles_to_reconnect(transaction)
+            wanted = commands.list_vehicles_to_reconnect(transaction)
         for vehicle in wanted:
             self._schedule_reconnect(vehicle)
 
     def _release_ended(self, vehicle_id: int, slot: VehicleSlot, gone: VehicleConnection) -> None:
         try:
             with self._database.write() as transaction:
-                acts.record_disconnected(transaction, vehicle_id)
+                commands.record_disconnected(transaction, vehicle_id)
         except ConflictError:
             return  # the database still has its flight: try again later
         _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
@@ -254,7 +256,7 @@ class VehicleConnectionManager:
         finally:
             slot.busy.release()
         kept = self._store_with_retry(
-            lambda t: acts.record_reconnected(
+            lambda t: commands.record_reconnected(
                 t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held
             )
         )
@@ -307,11 +309,13 @@ class VehicleConnectionManager:
             case VehicleStatus(concern=concern):
                 self._publish(news)
                 if concern and not slot.concern:
-                    self._record_in_background(lambda t: acts.quarantine_vehicle(t, vehicle_id, concern))
+                    self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern
             case CommandForwarded(order=order, reason=reason, problem=problem):
                 kind = ActKind.MOTORS_OFF if order == "motors off" else ActKind.LAND
-                self._record_in_background(lambda t: acts.record_command(t, vehicle_id, kind, reason, problem=problem))
+                self._record_in_background(
+                    lambda t: commands.record_command(t, vehicle_id, kind, reason, problem=problem)
+                )
 
     def _publish_state(self, vehicle_id: int, state: VehicleLinkState) -> None:
         now = dt.datetime.now(dt.UTC).isoformat()
@@ -341,33 +345,33 @@ class VehicleConnectionManager:
 
 
 def _connected(transaction: Transaction, task: ActTask, said: ConnectionOpened) -> None:
-    acts.record_connected(
+    commands.record_connected(
         transaction, task.vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held or None
     )
-    acts.finish_act(transaction, task.act_id, read_back=said.held or None)
+    commands.finish_act(transaction, task.act_id, read_back=said.held or None)
 
 
 def _disconnected(transaction: Transaction, task: ActTask) -> None:
-    acts.record_disconnected(transaction, task.vehicle.vehicle_id)
-    acts.finish_act(transaction, task.act_id)
+    commands.record_disconnected(transaction, task.vehicle.vehicle_id)
+    commands.finish_act(transaction, task.act_id)
 
 
 def _answered(transaction: Transaction, task: ActTask, answered: VehicleResponse) -> None:
     vehicle_id = task.vehicle.vehicle_id
     result: dict[str, object] | None = None
     if answered.checks is not None:
-        acts.record_checks(transaction, vehicle_id, answered.checks)
+        commands.record_checks(transaction, vehicle_id, answered.checks)
         result = {"checks": [{"name": item.name, "passed": item.passed} for item in answered.checks]}
     if answered.parameters is not None:
         result = {"parameters": answered.parameters}
     if task.kind == ActKind.RELEASE and not answered.problem:
-        acts.record_released(transaction, vehicle_id, identity=answered.identity)
+        commands.record_released(transaction, vehicle_id, identity=answered.identity)
     elif answered.concern:
-        acts.quarantine_vehicle(transaction, vehicle_id, answered.concern)
+        commands.quarantine_vehicle(transaction, vehicle_id, answered.concern)
     elif answered.identity is not None:
-        acts.pin_identity(transaction, vehicle_id, answered.identity)
+        commands.pin_identity(transaction, vehicle_id, answered.identity)
     read_back = answered.held if task.kind in GIVES_GAINS and answered.held else None
-    acts.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
+    commands.finish_act(transaction, task.act_id, read_back=read_back, result=result, problem=answered.problem)
 
 
 def _refused(problem: str) -> Future[str]:

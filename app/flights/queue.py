@@ -21,16 +21,17 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.campaigns import proposals
 from app.campaigns import service as campaigns
+from app.campaigns.history import set_flight_state, set_trial_state
+from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError
 from app.common.states import FlightMode, FlightState, TrialState, VehicleState
 from app.core.stopping import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.trials import history
-from app.trials.capture import capture
-from app.trials.lifecycle import set_flight_state, set_trial_state
+from app.flights import repository
 from app.vehicles.base import FlightRecord, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
@@ -66,7 +67,7 @@ def claim_flight(session: Session, worker: str) -> FlightTask | None:
 
     A flight must begin when its operator expects it: a request older than REQUEST_TIMEOUT is withdrawn.
     """
-    while (flight := history.first_requested_flight(session)) is not None:
+    while (flight := repository.first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
             return _claimed(session, flight, worker)
         _withdraw(flight, f"it could not be begun within {REQUEST_TIMEOUT.total_seconds():g} s")
@@ -77,7 +78,7 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
     """Withdraw all requested flights at a worker's start, because nothing may take off that was requested while no
     worker ran. Returns their ids."""
     withdrawn: list[int] = []
-    while (flight := history.first_requested_flight(session)) is not None:
+    while (flight := repository.first_requested(session)) is not None:
         _withdraw(flight, reason)
         withdrawn.append(flight.id)
     return withdrawn
@@ -124,7 +125,7 @@ def take_off_wanted(session: Session, flight_id: int) -> bool:
 
     Nothing takes off later than its operator expects. False also for a flight that is to stand down or is not running.
     """
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     return _may_take_off(flight) and stand_down_wanted(session, flight_id) is None
 
 
@@ -134,7 +135,7 @@ def stand_down_wanted(session: Session, flight_id: int) -> str | None:
     Reasons: it was unstaged, its trial was cancelled, or its take-off was requested and could not begin in time. The
     worker then restores the safe gains and calls `record_withdrawal` with this reason.
     """
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return f"the flight is {flight.state}"
     if flight.stand_down:
@@ -172,7 +173,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     set_trial_state(trial, TrialState.FLYING, reason="")
     trial.flown_at = utc_now()
     fleet.set_vehicle_state(flight.vehicle, VehicleState.FLYING)
-    campaigns.start_flying(campaigns.get_row(session, trial.campaign_id))
+    proposals.start_flying(campaigns.get_row(session, trial.campaign_id))
 
 
 def record_landing(session: Session, flight_id: int, record: FlightRecord) -> None:
@@ -180,25 +181,25 @@ def record_landing(session: Session, flight_id: int, record: FlightRecord) -> No
 
     Idempotent. Raises TrajectoryError when the record cannot be stored.
     """
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
     campaign = campaigns.get_row(session, flight.campaign_id)
     _capture(session, campaign, flight, record)
     aborted = record.ending == "aborted"
     _end(flight, FlightState.ABORTED if aborted else FlightState.LANDED, problem=record.reason)
-    campaigns.finish_flying(session, campaign)
+    proposals.finish_flying(session, campaign)
 
 
 def record_loss(session: Session, flight_id: int, problem: str) -> None:
     """Record that it is unknown how the flight ended. A real vehicle is quarantined; the operator decides about it."""
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
     set_trial_state(flight.trial, TrialState.LOST, reason=problem)
     _end(flight, FlightState.LOST, problem=problem)
     doubt_vehicle(session, flight_id)
-    campaigns.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
+    proposals.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
 def record_failure(session: Session, flight_id: int, problem: str) -> None:
@@ -217,7 +218,7 @@ def record_withdrawal(session: Session, flight_id: int, reason: str) -> None:
 def quarantine_vehicle(session: Session, flight_id: int, concern: str) -> None:
     """Quarantine the vehicle after a flight whose safe gains could not be verified; it stays grounded until a person
     releases it."""
-    fleet.set_state_after_flight(history.get_flight(session, flight_id).vehicle, concern=concern)
+    fleet.set_state_after_flight(repository.get_flight(session, flight_id).vehicle, concern=concern)
 
 
 def doubt_vehicle(session: Session, flight_id: int) -> None:
@@ -225,13 +226,13 @@ def doubt_vehicle(session: Session, flight_id: int) -> None:
 
     A simulated vehicle starts afresh with every flight.
     """
-    if history.get_flight(session, flight_id).vehicle.is_real:
+    if repository.get_flight(session, flight_id).vehicle.is_real:
         quarantine_vehicle(session, flight_id, _NOT_VERIFIED)
 
 
 def record_restored(session: Session, flight_id: int, held: Mapping[str, float]) -> None:
     """Record the safe gains that the vehicle read back after a flight, however the flight ended."""
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     flight.restored, flight.restored_at = dict(held), utc_now()
     fleet.hold_gains(flight.vehicle, held)
 
@@ -241,7 +242,7 @@ def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
 
     Returns whether it is lost.
     """
-    lifted_off = history.get_flight(session, flight_id).trial.state == TrialState.FLYING
+    lifted_off = repository.get_flight(session, flight_id).trial.state == TrialState.FLYING
     if lifted_off:
         record_loss(session, flight_id, problem)
     else:
@@ -257,7 +258,7 @@ def lose_running_flights(session: Session) -> list[int]:
     """
     return [
         flight.trial_id
-        for flight in history.running_flights(session)
+        for flight in repository.running(session)
         if give_up_flight(session, flight.id, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
     ]
 
@@ -267,12 +268,12 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
 
     Raises TrajectoryError when it cannot be stored.
     """
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     if flight.trial.state != TrialState.LOST:
         return
     campaign = campaigns.get_row(session, flight.campaign_id)
     _capture(session, campaign, flight, record)
-    campaigns.history_changed(session, campaign)
+    proposals.history_changed(session, campaign)
 
 
 def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
@@ -291,14 +292,14 @@ def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record:
 
 
 def _running(session: Session, flight_id: int) -> FlightRow:
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not go on.")
     return flight
 
 
 def _not_flown(session: Session, flight_id: int, state: FlightState, problem: str) -> None:
-    flight = history.get_flight(session, flight_id)
+    flight = repository.get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
     was_flying = flight.trial.state == TrialState.FLYING
@@ -307,7 +308,7 @@ def _not_flown(session: Session, flight_id: int, state: FlightState, problem: st
         flight.trial.flown_at = None
     _end(flight, state, problem=problem)
     if was_flying:
-        campaigns.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
+        proposals.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
 def _end(flight: FlightRow, state: FlightState, *, problem: str = "") -> None:

@@ -5,8 +5,13 @@ from contextlib import suppress
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, RequestContext
-from app.campaigns import rehearsals
+from app.campaigns import history, rehearsals
 from app.campaigns import service as campaigns
+from app.campaigns.history import set_flight_state
+from app.campaigns.trials import service as trials
+from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Trial
+from app.campaigns.trials.service import check_own_gains
+from app.campaigns.trials.views import trial_view
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.state_machine import check_action
 from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
@@ -15,12 +20,6 @@ from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_control, require_may_command, require_not_controlled_by_other
-from app.trials import history
-from app.trials import service as trials
-from app.trials.judging import check_own_gains
-from app.trials.lifecycle import set_flight_state
-from app.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Trial
-from app.trials.views import trial_view
 
 
 def warm_gate_cache(session: Session, trial_id: int) -> None:

@@ -3,9 +3,9 @@
 from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
 
+from app.campaigns.trials import service
+from app.campaigns.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
 from app.flights import requests
-from app.trials import service
-from app.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
 from app.web.dependencies import CurrentDatabase, Id, IdempotentPost, Live, RequestContextDep, json_only
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])

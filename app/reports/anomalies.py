@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from app.campaigns.schemas import Campaign
+from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
 from app.fleet.schemas import GivenGains, Vehicle, VehicleAct
 from app.reports.content import Anomaly
 from app.reports.wording import gains, number
-from app.trials.schemas import Trial
 
 _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
 _CAUSES: Final[Mapping[AbortCause, str]] = {

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from app.campaigns.schemas import Campaign, CampaignStatistics
+from app.campaigns.trials.schemas import Trial
 from app.core.policy import Gain
 from app.figures.base import Card
-from app.trials.schemas import Trial
 
 
 @dataclass(frozen=True, slots=True)

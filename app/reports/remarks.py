@@ -5,10 +5,10 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.campaigns.trials.schemas import Trial
 from app.db.models import TrialPhotoRow
 from app.reports import repository
 from app.reports.content import Photo, Remark
-from app.trials.schemas import Trial
 
 MAX_BYTES: Final = 24 * 2**20
 """Limit for all photos together, in original size; they take a third more in the file."""

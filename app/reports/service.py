@@ -6,11 +6,13 @@ from typing import Final, TypeVar
 from sqlalchemy.orm import Session
 
 from app import __version__
-from app.campaigns import drawing
+from app.campaigns import figure_data
 from app.campaigns import service as campaigns
 from app.campaigns.landscapes import landscape_card
 from app.campaigns.schemas import Campaign
 from app.campaigns.statistics import campaign_statistics
+from app.campaigns.trials import service as trials_service
+from app.campaigns.trials.schemas import Trial
 from app.common.schemas import Page
 from app.db.trajectories import damaged_trials
 from app.db.types import utc_now
@@ -21,8 +23,6 @@ from app.fleet.views import acts_view, ledger_view
 from app.reports import anomalies, remarks
 from app.reports.content import Anomaly, Report
 from app.reports.settings_in_words import describe_method, describe_vehicle, experiment_of
-from app.trials import service as trials_service
-from app.trials.schemas import Trial
 
 _PAGE: Final = 200
 T = TypeVar("T")
@@ -35,7 +35,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     trials = tuple(_all(lambda cursor: trials_service.list_trials(session, campaign_id, limit=_PAGE, cursor=cursor)))
     experiment = experiment_of(campaign)
     vehicle = fleet.get_vehicle(session, campaign.vehicle.id)
-    past = drawing.history_of(session, campaign_id, curves=True)
+    past = figure_data.history_of(session, campaign_id, curves=True)
     return Report(
         campaign=campaign,
         statistics=statistics,

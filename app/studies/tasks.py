@@ -10,7 +10,7 @@ import structlog
 from app.common.errors import GainlineError
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.jobs.tasks import ClaimedJob, internal_error
+from app.jobs.runner import ClaimedJob, internal_error
 from app.studies.process import InternalFailure, ProcessDiedError, Progress, StudyError, StudyMessage, StudyProcess
 from app.studies.results import Result
 from app.studies.service import read_order

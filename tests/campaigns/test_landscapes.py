@@ -10,7 +10,7 @@ from app.campaigns.tasks import LandscapeJob
 from app.core.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.jobs.tasks import JobRunner
+from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
 from tests.builders import WORKER, create_flown_trial, create_ready_campaign, get
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import pytest
 from fastapi.testclient import TestClient
 
-from app.campaigns import computation, proposing
+from app.campaigns import computation, proposals
 from app.common.settings import Settings
 from app.db.session import Database
 from tests.builders import create_ready_campaign, create_trial, get, land, lift_off, run_jobs
@@ -29,7 +29,7 @@ NOISE: Final = {"kind": "noise", "max_flights": 8}
 def told(database: Database, campaign_id: int) -> str:
     """Everything that a worker computes from a campaign's history, as text; curves as the bytes of their samples."""
     with database.read() as session:
-        past = proposing.read_history(session, campaign_id)
+        past = proposals.read_history(session, campaign_id)
     computed = computation.compute(past)
     assert computed.proposal.predicted is not None
     curves = {name: values.tobytes().hex() for name, values in computed.proposal.predicted.channels.items()}

@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from app.campaigns.definitions import definition_of
-from app.campaigns.proposing import read_history
+from app.campaigns.proposals import read_history
 from app.db.models import CampaignRow, FlightRow
 from app.db.session import Database
 from app.flights import queue
@@ -25,7 +25,7 @@ from tests.builders import (
     lift_off,
     run_jobs,
 )
-from tests.trials.test_service import PATIENT, classify
+from tests.campaigns.trials.test_service import PATIENT, classify
 
 
 def test_a_vehicles_ledger_outlives_the_wish_to_delete_a_campaign(client: TestClient, database: Database) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.campaigns.proposing import read_history
+from app.campaigns.proposals import read_history
 from app.core.policy import Gains
 from app.db.session import Database
 from app.vehicles.base import FlightRecord

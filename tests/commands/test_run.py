@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from app.campaigns.files import preset_names
+from app.campaigns.campaign_files import preset_names
 from app.cli import app
 
 RUN_ON_TWIN = ("run", "ardrone-takeoff", "--vehicle", "twin", "--set", "scatter=0")

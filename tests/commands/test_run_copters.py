@@ -14,7 +14,7 @@ from typing import IO, Final
 import pytest
 from typer.testing import CliRunner
 
-from app.campaigns.files import read_preset
+from app.campaigns.campaign_files import read_preset
 from app.cli import app
 from app.core.clock import ScaledClock
 from app.vehicles.base import Identity

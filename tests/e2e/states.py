@@ -16,26 +16,26 @@ from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI
-from app.campaigns import landscapes, proposing, rehearsing
+from app.campaigns import landscapes, proposals, service
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
+from app.campaigns.trials import photos, records, reviews
+from app.campaigns.trials import service as trials
+from app.campaigns.trials.schemas import Classification, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
 from app.core.landscape import plan_grid, predict_points
 from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
-from app.fleet import registering
+from app.fleet import registration
 from app.fleet.schemas import NewVehicle
 from app.flights import queue, requests
 from app.flights.process_messages import mark_if_requested
 from app.jobs import service as jobs
 from app.studies import service as studies
 from app.studies.reproductions import get_reproduction
-from app.trials import photos
-from app.trials import service as trials
-from app.trials.schemas import Classification, NewTrial
 from app.vehicles.base import FlightOptions, StopRequest
 from app.vehicles.open import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
@@ -113,8 +113,8 @@ class States:
         def upload(session: Session) -> int:
             proposal = _proposed(session, campaign_id)
             trial = trials.create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
-            flown = trials.read_record(io.BytesIO(csv(proposal.gains)), name="flight.csv")
-            trials.import_record(session, trial.id, flown)
+            flown = records.read_record(io.BytesIO(csv(proposal.gains)), name="flight.csv")
+            records.import_record(session, trial.id, flown)
             _propose(session, campaign_id)
             return trial.id
 
@@ -126,7 +126,7 @@ class States:
         def say(session: Session) -> None:
             trial = trials.get_trial(session, trial_id)
             said = Classification.model_validate({"version": trial.version, "outcome": outcome, "reason": reason})
-            trials.classify_trial(session, trial_id, said)
+            reviews.classify_trial(session, trial_id, said)
             _propose(session, trial.campaign_id)
 
         self._write(say)
@@ -161,7 +161,7 @@ class States:
     def vehicle(self, name: str, **fields: object) -> int:
         """A registered vehicle that nobody has connected yet."""
         new = NewVehicle.model_validate({"name": name, "kind": "mavlink", **fields})
-        return self._write(lambda session: registering.register_vehicle(session, new, LOCAL_CLI).id)
+        return self._write(lambda session: registration.register_vehicle(session, new, LOCAL_CLI).id)
 
     def vehicle_of(self, campaign_id: int) -> int:
         with self._database.read() as session:
@@ -228,14 +228,14 @@ class States:
 
 
 def _rehearsal(session: Session, campaign_id: int) -> int:
-    made = rehearsing.rehearse(session, campaign_id).id
+    made = service.rehearse(session, campaign_id).id
     _propose(session, made)
     return made
 
 
 def _proposed(session: Session, campaign_id: int) -> ProposalRow:
     """The proposal that holds now."""
-    return proposing.require_fresh_proposal(session, campaigns.get_row(session, campaign_id))
+    return proposals.require_fresh_proposal(session, campaigns.get_row(session, campaign_id))
 
 
 def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> None:
@@ -259,12 +259,12 @@ def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> Non
 
 def _propose(session: Session, campaign_id: int) -> None:
     """Carry out the campaign's waiting proposal job, if there is one, as a worker does."""
-    waiting = jobs.latest_job(session, campaign_id, proposing.PROPOSAL_JOB)
+    waiting = jobs.latest_job(session, campaign_id, proposals.PROPOSAL_JOB)
     if waiting is None or waiting.state != "queued":
         return
-    computed = compute(proposing.read_history(session, campaign_id))
-    _finish(session, proposing.PROPOSAL_JOB, campaign_id)
-    proposing.store_proposal(session, campaign_id, computed)
+    computed = compute(proposals.read_history(session, campaign_id))
+    _finish(session, proposals.PROPOSAL_JOB, campaign_id)
+    proposals.store_proposal(session, campaign_id, computed)
 
 
 def _finish(session: Session, kind: str, campaign_id: int | None, result: Json | None = None) -> None:

@@ -8,11 +8,11 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.campaigns.trials.test_photos import png
 from tests.e2e.conftest import Opener, Server, served
 from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Viewport, open_details
 from tests.e2e.states import States
 from tests.e2e.test_pages import SCREENSHOTS, violations
-from tests.trials.test_photos import png
 
 NAME = "<script>document.title = 'taken'</script> & <b>wing</b>"
 CHARTS = ("takeoffs", "errors", "gains", "landscape")

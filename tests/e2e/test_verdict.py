@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, expect
 
+from tests.campaigns.trials.test_photos import png
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, Dashboard
 from tests.e2e.states import States
-from tests.trials.test_photos import png
 
 Json = dict[str, Any]
 

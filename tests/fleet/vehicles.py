@@ -7,7 +7,7 @@ import httpx2
 from app.common.states import TrialState, VehicleState
 from app.db.models import TrialRow, VehicleRow
 from app.db.session import Database
-from app.fleet import acts
+from app.fleet import commands
 from app.vehicles.base import Identity
 from tests.builders import WORKER, Json, get, run_jobs
 from tests.unlocking import unlock
@@ -34,11 +34,11 @@ def connect(client: httpx2.Client, database: Database, vehicle: Json, *, concern
     answer = client.post(f"/api/vehicles/{vehicle['id']}/connect")
     assert answer.status_code == 202, answer.text
     with database.write() as session:
-        task = acts.claim_act(session, WORKER)
+        task = commands.claim_act(session, WORKER)
         assert task is not None
         held = None if concern else task.vehicle.safe_gains
-        acts.record_connected(session, vehicle["id"], IDENTITY, concern=concern)
-        acts.finish_act(session, task.act_id, read_back=held)
+        commands.record_connected(session, vehicle["id"], IDENTITY, concern=concern)
+        commands.finish_act(session, task.act_id, read_back=held)
     return seen(client, vehicle)
 
 
@@ -108,10 +108,10 @@ def control_header(client: httpx2.Client, vehicle: Json, operator: str = "Ada") 
     return {"X-Gainline-Control": answer.json()["token"]}
 
 
-def finish_act(database: Database, *, problem: str = "", read_back: dict[str, float] | None = None) -> acts.ActTask:
+def finish_act(database: Database, *, problem: str = "", read_back: dict[str, float] | None = None) -> commands.ActTask:
     """Carry out the act that waits, as the worker does."""
     with database.write() as session:
-        task = acts.claim_act(session, WORKER)
+        task = commands.claim_act(session, WORKER)
         assert task is not None
-        acts.finish_act(session, task.act_id, problem=problem, read_back=read_back)
+        commands.finish_act(session, task.act_id, problem=problem, read_back=read_back)
     return task

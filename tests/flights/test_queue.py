@@ -22,7 +22,7 @@ from tests.builders import (
     run_jobs,
     stage,
 )
-from tests.trials.states import csv_with_a_gap, make_vehicle_real
+from tests.campaigns.trials.states import csv_with_a_gap, make_vehicle_real
 
 DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
 

@@ -21,9 +21,9 @@ from app.flights.queue import REQUEST_TIMEOUT
 from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage
+from tests.campaigns.trials.states import make_vehicle_real
 from tests.clocks import SimulatedClock
 from tests.conftest import Listen
-from tests.trials.states import make_vehicle_real
 
 Watch = Callable[[PublishedMessage], None]
 

@@ -12,7 +12,7 @@ from app.core.trajectory import Trajectory
 from app.db.models import FlightRow
 from app.db.session import Database
 from app.db.types import utc_now
-from app.fleet import acts
+from app.fleet import commands
 from app.flights import queue
 from app.main import create_app
 from app.vehicles.base import FlightRecord
@@ -313,9 +313,9 @@ def test_the_ledger_lists_every_gain_set_that_was_given(
     assert client.patch(f"/api/vehicles/{real['id']}", json=change, headers=header).status_code == 200
     client.post(f"/api/vehicles/{real['id']}/restore", headers=header)
     with database.write() as session:
-        task = acts.claim_act(session, WORKER)
+        task = commands.claim_act(session, WORKER)
         assert task is not None
-        acts.finish_act(session, task.act_id, read_back=task.vehicle.safe_gains)
+        commands.finish_act(session, task.act_id, read_back=task.vehicle.safe_gains)
     client.post(f"/api/vehicles/{real['id']}/check", headers=header)
 
     path = f"/api/vehicles/{real['id']}/ledger"

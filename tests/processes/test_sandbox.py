@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
+from app.campaigns.trials import records
 from app.common.errors import InputError, TrajectoryError
 from app.core.errors import Problem
 from app.processes.sandbox import FILE, Limits, run_limited
-from app.trials import service
 
 LITTLE = Limits(processor_s=1, wall_s=20.0, memory_bytes=2**27)
 A3_95 = b"\xa3\x95"
@@ -73,7 +73,7 @@ def test_a_log_of_nothing_but_beginnings_is_read_elsewhere_and_refused() -> None
     """46 MiB of it kept the web process busy for 9 s."""
     begun_s = time.process_time()
     with pytest.raises(InputError):
-        service.read_upload(A3_95 + b"\x80" + A3_95 * 2**20, name="flight.bin", takeoff=None, companion=None)
+        records.read_upload(A3_95 + b"\x80" + A3_95 * 2**20, name="flight.bin", takeoff=None, companion=None)
     assert time.process_time() - begun_s < 1.0
 
 

@@ -20,8 +20,8 @@ from app.reports import printing, remarks, router
 from app.reports.wording import plus_minus
 from tests.builders import Json, create_ready_campaign, get
 from tests.campaigns.test_landscapes import card_of, run_landscapes
+from tests.campaigns.trials.test_photos import JPEG, add, png
 from tests.reports.conftest import NAME, REASON
-from tests.trials.test_photos import JPEG, add, png
 
 POLICY = "content-security-policy"
 

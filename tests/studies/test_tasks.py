@@ -14,8 +14,8 @@ import pytest
 from app.common.states import JobState
 from app.db.session import Database
 from app.jobs import service as jobs
+from app.jobs.runner import ClaimedJob, JobRunner
 from app.jobs.schemas import Job
-from app.jobs.tasks import ClaimedJob, JobRunner
 from app.studies import service
 from app.studies.service import REPRODUCTION_JOB
 from app.studies.tasks import ReproductionJob

@@ -6,7 +6,7 @@ from app.common.settings import Settings
 from app.common.states import VehicleState
 from app.db.models import VehicleRow
 from app.db.session import Database
-from app.fleet import acts
+from app.fleet import commands
 from app.main import create_app
 from tests.builders import create_campaign, get, problems_of
 from tests.fleet.vehicles import (
@@ -43,7 +43,7 @@ def test_a_vehicle_that_an_earlier_version_stored_has_the_later_settings_at_thei
         row.options = {**kept, "given_up": 3.0}
     assert seen(client, vehicle)["options"] == vehicle["options"]
     with database.read() as session:
-        assert acts.linked_vehicle(session, vehicle["id"]).options == vehicle["options"]
+        assert commands.linked_vehicle(session, vehicle["id"]).options == vehicle["options"]
 
 
 def test_a_vehicle_is_real_unless_it_is_registered_as_simulated_on_this_computer_or_a_named_host(
@@ -172,7 +172,7 @@ def test_the_link_changes_only_while_it_is_closed_and_pins_the_identity_anew(
     assert (edited["options"]["system_id"], edited["identity"], edited["version"]) == (5, None, 3)
     assert edited["options"]["simulated"] is True
     with database.write() as session:
-        acts.record_connected(session, vehicle["id"], IDENTITY)
+        commands.record_connected(session, vehicle["id"], IDENTITY)
     assert seen(client, vehicle)["identity"]["system_id"] == 1
 
 

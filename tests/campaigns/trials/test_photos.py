@@ -7,8 +7,8 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from app.campaigns.trials import photos
 from app.db.session import Database
-from app.trials import photos
 from tests.builders import Json, create_ready_campaign, create_trial, get, problems_of
 
 

@@ -11,7 +11,7 @@ from app.common.states import TRIAL_TRANSITIONS, TrialState
 from app.db.session import Database
 from app.flights import queue
 from tests.builders import Json, create_csv, create_record, get, upload
-from tests.trials.states import create_trial_in
+from tests.campaigns.trials.states import create_trial_in
 
 Act = Callable[[TestClient, Json], int]
 

@@ -9,9 +9,10 @@ from typing import Final, Literal, TypedDict, cast
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
-from app.campaigns.proposing import is_stale
+from app.campaigns.proposals import is_stale
+from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
@@ -26,8 +27,6 @@ from app.figures.crowd import select_individual_flights
 from app.figures.flight import FlightFigure, FlightRecordData
 from app.figures.history import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
 from app.figures.theme import ThemeName
-from app.trials import history
-from app.trials import service as trials_service
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
@@ -83,7 +82,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     Without `curves` no record is read. With them, full records are read only for the flights that are drawn
     individually; the others have their coarse curves.
     """
-    campaign = repository.get_one(session, campaign_id)
+    campaign = repository.get_campaign(session, campaign_id)
     definition = definition_of(campaign)
     experiment = experiment_of(definition)
     rows = history.trials_of(session, campaign_id)
@@ -235,7 +234,7 @@ def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _
 
 
 def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
-    campaign = repository.get_one(session, row.campaign_id)
+    campaign = repository.get_campaign(session, row.campaign_id)
     experiment = get_experiment(campaign.experiment)
     set_point, reference = _goal(experiment.name)
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)

@@ -5,9 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 
+from app.campaigns.trials import photos, records, reviews, service
+from app.campaigns.trials.schemas import AbortJudgement, Classification, Trajectory, Trial, TrialEdit, TrialPhoto
 from app.common.schemas import Page
-from app.trials import photos, service
-from app.trials.schemas import AbortJudgement, Classification, Trajectory, Trial, TrialEdit, TrialPhoto
 from app.web.dependencies import (
     FILE_BODY,
     REQUEST_BODY,
@@ -52,20 +52,20 @@ def cancel_trial(act: IdempotentPost, trial_id: Id) -> Trial:
 @router.post("/trials/{trial_id}/classify")
 def classify_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: Classification) -> Trial:
     """Classify a finished flight as valid, aborted or invalid; whatever was computed from it is recomputed."""
-    return act(Trial, lambda session: service.classify_trial(session, trial_id, body, asking))
+    return act(Trial, lambda session: reviews.classify_trial(session, trial_id, body, asking))
 
 
 @router.post("/trials/{trial_id}/judge-abort")
 def judge_abort(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body: AbortJudgement) -> Trial:
     """Record why the operator aborted a flight. It counts against its gains only if the vehicle behaved badly; whatever
     was computed from it is recomputed."""
-    return act(Trial, lambda session: service.judge_abort(session, trial_id, body, asking))
+    return act(Trial, lambda session: reviews.judge_abort(session, trial_id, body, asking))
 
 
 @router.get("/trials/{trial_id}/trajectory")
 def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(ge=10, le=20_000)] = 1000) -> Trajectory:
     """The record, thinned to at most `points` samples with peaks kept."""
-    return service.get_trajectory(session, trial_id, points)
+    return records.get_trajectory(session, trial_id, points)
 
 
 @router.get(
@@ -82,7 +82,7 @@ def get_trajectory(session: Reader, trial_id: Id, points: Annotated[int, Query(g
 )
 def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
     """The full record as CSV, every number exactly as stored (single precision, nine digits)."""
-    export = service.export_trajectory(session, trial_id)
+    export = records.export_trajectory(session, trial_id)
     return Response(
         export.csv,
         media_type="text/csv",
@@ -101,7 +101,7 @@ def get_trajectory_csv(session: Reader, trial_id: Id) -> Response:
 def get_telemetry_log(session: Reader, settings: CurrentSettings, trial_id: Id) -> FileResponse:
     """The .tlog of the trial's last flight: all messages over the link in both directions, in the format of ground
     stations."""
-    log = service.find_telemetry_log(session, trial_id, settings.data_dir)
+    log = records.find_telemetry_log(session, trial_id, settings.data_dir)
     return FileResponse(log.file, media_type="application/octet-stream", filename=log.name)
 
 
@@ -135,11 +135,11 @@ def delete_photo(session: Writer, trial_id: Id, photo_id: Id) -> None:
     photos.delete_photo(session, trial_id, photo_id)
 
 
-records = APIRouter(prefix="/api", tags=["trials"])
+uploads = APIRouter(prefix="/api", tags=["trials"])
 """A router of its own, because the request bodies are not JSON."""
 
 
-@records.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
+@uploads.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
 def upload_trajectory(
     record: Record,
     asking: RequestContextDep,
@@ -155,13 +155,13 @@ def upload_trajectory(
     which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),
     and optionally the other channels, at most 200 000 rows. It is scored and classified at once.
     """
-    flown = service.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
+    flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(
-        Trial, lambda session: service.import_record(session, trial_id, flown, asking, confirmed=confirm)
+        Trial, lambda session: records.import_record(session, trial_id, flown, asking, confirmed=confirm)
     )
 
 
-@records.post("/trials/{trial_id}/photos", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)
+@uploads.post("/trials/{trial_id}/photos", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)
 def add_photo(upload: Record, trial_id: Id) -> TrialPhoto:
     """Add a photo (JPEG, PNG or WebP, detected by its content; at most 10 MiB) to a flight, as the form field
     `file`."""

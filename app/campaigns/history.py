@@ -1,22 +1,38 @@
-"""Queries on a campaign's trials: the flights that a proposal is computed from, the best trial, the stored records."""
+"""Queries on a campaign's trials: the flights that a proposal is computed from, the best trial, the stored records.
+
+State changes of trials and flights; only those in the transition tables are possible.
+"""
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.campaigns import repository
 from app.common.errors import NotFoundError, StorageError
-from app.common.states import HISTORY_TRIAL_STATES, NOT_AGAINST_GAINS, TrialState
+from app.common.state_machine import check_transition
+from app.common.states import (
+    ACTIVE_FLIGHT_STATES,
+    CAMPAIGN_TRANSITIONS,
+    FLIGHT_TRANSITIONS,
+    HISTORY_TRIAL_STATES,
+    NOT_AGAINST_GAINS,
+    TRIAL_TRANSITIONS,
+    UNFLOWN_TRIAL_STATES,
+    CampaignState,
+    FlightState,
+    TrialState,
+)
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.trajectory import Trajectory
 from app.db import trajectories
-from app.db.models import FlightRow, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpacked
-from app.trials import repository
+from app.db.types import utc_now
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
 
@@ -24,10 +40,6 @@ FLOWN: Final = frozenset(
     {TrialState.CAPTURED, TrialState.VALID, TrialState.ABORTED, TrialState.INVALID, TrialState.LOST}
 )
 """States of trials that have left the ground."""
-
-
-BEST_ERROR: Final = repository.BEST_ERROR
-"""Lowest error of a campaign's valid trials, as an SQL expression on the campaign's row; for the list of campaigns."""
 
 
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
@@ -134,22 +146,7 @@ def any_flight_under_way(session: Session) -> FlightRow | None:
 
 def trial_row(session: Session, trial_id: int) -> TrialRow:
     """Raises NotFoundError."""
-    return repository.get_one(session, trial_id)
-
-
-def get_flight(session: Session, flight_id: int) -> FlightRow:
-    """Raises NotFoundError."""
-    return repository.get_flight(session, flight_id)
-
-
-def first_requested_flight(session: Session) -> FlightRow | None:
-    """The oldest request that no worker has claimed."""
-    return repository.first_requested(session)
-
-
-def running_flights(session: Session) -> Sequence[FlightRow]:
-    """Flights that a worker has claimed and not ended."""
-    return repository.running(session)
+    return repository.get_trial(session, trial_id)
 
 
 def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int, FlightRow]:
@@ -219,3 +216,49 @@ def _predicted(row: TrialRow) -> Prediction | None:
         return None
     interval = row.predicted_interval or {}
     return Prediction(error=row.predicted_error, lower=interval.get("lower"), upper=interval.get("upper"))
+
+
+def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:
+    """Change a campaign's state. Raises ConflictError when the transition is not in the table."""
+    row.state = check_transition(CAMPAIGN_TRANSITIONS, row.state, to, f"Campaign {row.id}")
+
+
+def rehearsed_by(session: Session, rehearsal: CampaignRow) -> int | None:
+    """The campaign that this one rehearses; None if it is not a rehearsal."""
+    return repository.rehearsed_id(session, rehearsal.id)
+
+
+def notify_rehearsed_campaign(session: Session, rehearsal: CampaignRow) -> None:
+    """Mark the campaign that this one rehearses as updated, so that its clients load it again."""
+    if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
+        repository.get_campaign(session, campaign_id).updated_at = utc_now()
+
+
+def set_trial_state(row: TrialRow, to: TrialState, *, reason: str | None = None) -> None:
+    """Change a trial's state; a given reason replaces the previous one.
+
+    Raises ConflictError when the transition is not in the table.
+    """
+    row.state = check_transition(TRIAL_TRANSITIONS, row.state, to, f"Trial {row.number}")
+    if reason is not None:
+        row.reason = reason
+
+
+def set_flight_state(row: FlightRow, to: FlightState, *, problem: str = "") -> None:
+    """Change a flight's state. Raises ConflictError when the transition is not in the table."""
+    row.state = check_transition(FLIGHT_TRANSITIONS, row.state, to, f"Flight {row.id}")
+    row.problem = problem
+    if to not in ACTIVE_FLIGHT_STATES:
+        row.finished_at = utc_now()
+
+
+def cancel_unflown(trials: Iterable[TrialRow], flight: FlightRow | None, reason: str) -> None:
+    """Cancel all trials that have not flown, and `flight` if it belongs to one of them and is not claimed yet.
+
+    A worker that has claimed the flight finds its trial cancelled before lift-off and stands down.
+    """
+    for row in trials:
+        if row.state in UNFLOWN_TRIAL_STATES:
+            set_trial_state(row, TrialState.CANCELLED, reason=reason)
+            if flight is not None and flight.trial_id == row.id and flight.state == FlightState.REQUESTED:
+                set_flight_state(flight, FlightState.CANCELLED, problem=reason)

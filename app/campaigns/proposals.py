@@ -10,13 +10,12 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.campaigns import repository
+from app.campaigns import history, repository
 from app.campaigns.computation import CampaignHistory, ProposalComputation
-from app.campaigns.definitions import definition_of
-from app.campaigns.rehearsals import notify_rehearsed_campaign
+from app.campaigns.definitions import definition_of, frozen_digest
+from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
 from app.common.errors import ConflictError, NotFoundError
-from app.common.state_machine import check_transition
-from app.common.states import CAMPAIGN_TRANSITIONS, UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
+from app.common.states import UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
 from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
@@ -27,9 +26,8 @@ from app.core.spread import ParameterDistribution, prior_distribution
 from app.core.stopping import Reason, StopVerdict
 from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.types import utc_now
 from app.jobs import service as jobs
-from app.trials import history
-from app.trials.lifecycle import cancel_unflown
 
 PROPOSAL_JOB: Final = "proposal"
 _COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
@@ -45,7 +43,7 @@ _UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no 
 
 def read_history(session: Session, campaign_id: int) -> CampaignHistory:
     """The campaign's definition and its flights, with trajectories as stored. Raises NotFoundError."""
-    row = repository.get_one(session, campaign_id)
+    row = repository.get_campaign(session, campaign_id)
     definition, trials = definition_of(row), history.trials_of(session, campaign_id)
     return CampaignHistory(
         campaign_id=campaign_id,
@@ -78,7 +76,7 @@ def store_proposal(session: Session, campaign_id: int, computed: ProposalComputa
     A proposal from an outdated history is stored as stale and does not update the campaign. Raises NotFoundError when
     the campaign has been deleted.
     """
-    campaign = repository.get_one(session, campaign_id)
+    campaign = repository.get_campaign(session, campaign_id)
     proposal = computed.proposal
     predicted = None if proposal.predicted is None else trajectories.store_trajectory(session, proposal.predicted)
     row = ProposalRow(
@@ -211,11 +209,6 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
     cancel_unflown(history.trials_of(session, campaign.id), flight, "the campaign was finished")
 
 
-def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:
-    """Change a campaign's state. Raises ConflictError when the transition is not in the table."""
-    row.state = check_transition(CAMPAIGN_TRANSITIONS, row.state, to, f"Campaign {row.id}")
-
-
 def space_of(definition: Definition) -> PolicySpace:
     """Gain space of a campaign, within its bounds."""
     return experiment_of(definition).space.narrowed(definition.bounds)
@@ -235,3 +228,33 @@ def gate_of(stored: JsonObject) -> GateResult:
             for check in stored["checks"]
         )
     )
+
+
+def start_flying(row: CampaignRow) -> None:
+    """Enter state flying, at a lift-off or an imported record; at the first one the definition is frozen."""
+    if row.definition_digest is None:
+        row.safe_gains = row.safe_gains or dict(row.vehicle.safe_gains)
+        row.definition_digest = frozen_digest(row)
+    set_campaign_state(row, CampaignState.FLYING)
+
+
+def finish_flying(session: Session, row: CampaignRow) -> None:
+    """Leave state flying once the trial has ended, however it ended, and request the next proposal."""
+    if row.state == CampaignState.FLYING:
+        set_campaign_state(row, CampaignState.DECIDING)
+    history_changed(session, row)
+
+
+def history_changed(session: Session, row: CampaignRow) -> None:
+    """Update everything computed from the flights, after a change of which flights count."""
+    row.updated_at = utc_now()
+    notify_rehearsed_campaign(session, row)
+    cancel_outdated(session, row)
+    request_proposal(session, row)
+
+
+def safe_gains_changed(session: Session, vehicle_id: int) -> None:
+    """Request new proposals for the vehicle's unflown campaigns, which start from its safe gains."""
+    for row in repository.unflown_on(session, vehicle_id):
+        cancel_outdated(session, row)
+        request_proposal(session, row)

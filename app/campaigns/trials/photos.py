@@ -5,10 +5,10 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.campaigns import repository
+from app.campaigns.trials.schemas import TrialPhoto
 from app.common.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
 from app.db.models import TrialPhotoRow
-from app.trials import repository
-from app.trials.schemas import TrialPhoto
 
 MAX_BYTES: Final = 10 * 2**20
 MAX_PER_TRIAL: Final = 20
@@ -45,7 +45,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
     Raises NotFoundError; TooLargeError, MediaTypeError or InputError when the content is not an acceptable photo;
     ConflictError when the trial has the maximum number of photos.
     """
-    trial = repository.get_one(session, trial_id)
+    trial = repository.get_trial(session, trial_id)
     if len(content) > MAX_BYTES:
         size = f"{MAX_BYTES / 2**20:g} MiB"
         raise TooLargeError(
@@ -61,7 +61,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
             hint="Set the camera to JPEG (iPhone: Settings, Camera, Formats, Most Compatible), or send a screenshot.",
             problems=(Problem("file", "is no JPEG, PNG or WebP picture"),),
         )
-    if len(repository.photos(session, trial_id)) >= MAX_PER_TRIAL:
+    if len(repository.photos_of_trial(session, trial_id)) >= MAX_PER_TRIAL:
         raise ConflictError(
             f"Flight {trial.number} has {MAX_PER_TRIAL} photos, which is as many as are kept.",
             hint="Delete one that says little, then add this one.",
@@ -74,7 +74,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
 
 def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:
     """Photos of a trial in the order in which they were added. Raises NotFoundError."""
-    return [_view(row) for row in repository.photos(session, repository.get_one(session, trial_id).id)]
+    return [_view(row) for row in repository.photos_of_trial(session, repository.get_trial(session, trial_id).id)]
 
 
 def get_picture(session: Session, trial_id: int, photo_id: int) -> Picture:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.campaigns import computation, proposing
+from app.campaigns import computation, proposals
 from app.core.experiments import get_experiment
 from app.core.glitches import find_glitches
 from app.core.spread import prior_distribution
@@ -135,13 +135,13 @@ def test_own_gains_are_judged_over_what_the_flights_have_shown(client: TestClien
     create_flown_trial(client, database, campaign["id"])
     with database.write() as session:
         row = session.get_one(CampaignRow, campaign["id"])
-        spread = proposing.stored_distribution(session, row, experiment)
-        assert spread == computation.compute(proposing.read_history(session, campaign["id"])).spread
+        spread = proposals.stored_distribution(session, row, experiment)
+        assert spread == computation.compute(proposals.read_history(session, campaign["id"])).spread
         assert spread.origin != prior_distribution(experiment).origin
         for proposal in session.query(ProposalRow):
             proposal.spread = None  # as those of the release before
         session.flush()
-        assert proposing.stored_distribution(session, row, experiment) == prior_distribution(experiment)
+        assert proposals.stored_distribution(session, row, experiment) == prior_distribution(experiment)
 
 
 def test_what_was_stored_without_the_flights_that_showed_it_is_computed_anew(
@@ -153,16 +153,16 @@ def test_what_was_stored_without_the_flights_that_showed_it_is_computed_anew(
     experiment = get_experiment("takeoff")
     with database.write() as session:
         row = session.get_one(CampaignRow, campaign["id"])
-        spread = proposing.stored_distribution(session, row, experiment)
+        spread = proposals.stored_distribution(session, row, experiment)
         for proposal in session.query(ProposalRow):
             assert proposal.spread is not None
             proposal.spread = {name: value for name, value in proposal.spread.items() if name != "flights"}
         session.flush()
-        assert proposing.stored_distribution(session, row, experiment) == prior_distribution(experiment)
+        assert proposals.stored_distribution(session, row, experiment) == prior_distribution(experiment)
     assert run_jobs(database) == 1
     with database.read() as session:
         row = session.get_one(CampaignRow, campaign["id"])
-        assert proposing.stored_distribution(session, row, experiment) == spread
+        assert proposals.stored_distribution(session, row, experiment) == spread
 
 
 def test_what_a_flight_showed_that_no_longer_counts_is_not_judged_by(client: TestClient, database: Database) -> None:
@@ -174,7 +174,7 @@ def test_what_a_flight_showed_that_no_longer_counts_is_not_judged_by(client: Tes
     experiment = get_experiment("takeoff")
     with database.read() as session:
         row = session.get_one(CampaignRow, campaign["id"])
-        assert proposing.stored_distribution(session, row, experiment) == prior_distribution(experiment)
+        assert proposals.stored_distribution(session, row, experiment) == prior_distribution(experiment)
 
 
 def spiky(climb: Trajectory) -> Trajectory:

@@ -11,7 +11,7 @@ from app.common.states import ActKind, VehicleState
 from app.db.models import VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
-from app.fleet import acts
+from app.fleet import commands
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.process_messages import ConnectionOpened
@@ -104,7 +104,7 @@ def test_a_connection_pins_the_identity_and_tells_the_gains(client: TestClient, 
         DEFAULT_GAINS,
     )
     with database.write() as session:
-        acts.record_connected(session, vehicle["id"], Identity(system_id=9, autopilot="px4", version=""))
+        commands.record_connected(session, vehicle["id"], Identity(system_id=9, autopilot="px4", version=""))
     assert seen(client, vehicle)["identity"]["system_id"] == 1
 
 
@@ -144,7 +144,7 @@ def test_what_nobody_begins_in_time_is_given_up(client: TestClient, database: Da
         row = session.get_one(VehicleActRow, newest(client, vehicle)["id"])
         row.requested_at = utc_now() - timedelta(seconds=11)
     with database.write() as session:
-        assert acts.claim_act(session, WORKER) is None
+        assert commands.claim_act(session, WORKER) is None
     act = newest(client, vehicle)
     assert (act["state"], act["problem"]) == ("failed", "It could not be begun within 10 s. Ask again.")
 
@@ -154,11 +154,11 @@ def test_a_check_keeps_every_item_it_found(client: TestClient, database: Databas
     ask(client, vehicle, "check")
     item = CheckItem(name="rate", title="Positions a second", passed=False, found="12 Hz", needed="40 Hz", hint="Look")
     with database.write() as session:
-        task = acts.claim_act(session, WORKER)
+        task = commands.claim_act(session, WORKER)
         assert task is not None
-        acts.record_checks(session, vehicle["id"], [item])
-        acts.finish_act(session, task.act_id, result={"passed": False})
-        acts.finish_act(session, task.act_id, problem="twice is harmless")
+        commands.record_checks(session, vehicle["id"], [item])
+        commands.finish_act(session, task.act_id, result={"passed": False})
+        commands.finish_act(session, task.act_id, problem="twice is harmless")
     (check,) = seen(client, vehicle)["checks"]
     assert check == {
         "name": "rate",
@@ -183,11 +183,11 @@ def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: T
     assert client.post(path, json=statement, headers=header).json()["state"] == "quarantined"
     accepted = Identity(system_id=1, autopilot="paparazzi", version="6.0")
     with database.write() as session:
-        task = acts.claim_act(session, WORKER)
+        task = commands.claim_act(session, WORKER)
         assert task is not None
         assert (task.kind, task.vehicle.identity) == (ActKind.RELEASE, None), "nobody has decided about it yet"
-        acts.finish_act(session, task.act_id, read_back=DEFAULT_GAINS)
-        acts.record_released(session, vehicle["id"], identity=accepted)
+        commands.finish_act(session, task.act_id, read_back=DEFAULT_GAINS)
+        commands.record_released(session, vehicle["id"], identity=accepted)
     free = seen(client, vehicle)
     assert (free["state"], free["concern"], free["identity"]["version"]) == ("ready", "", "6.0")
     act = newest(client, vehicle)
@@ -197,11 +197,11 @@ def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: T
 def test_a_quarantine_outlives_the_link(client: TestClient, database: Database) -> None:
     vehicle = create_connected(client, database)
     with database.write() as session:
-        acts.quarantine_vehicle(session, vehicle["id"], "its gains are not verified")
+        commands.quarantine_vehicle(session, vehicle["id"], "its gains are not verified")
     ask(client, vehicle, "disconnect")
     finish_act(database)
     with database.write() as session:
-        acts.record_disconnected(session, vehicle["id"])
+        commands.record_disconnected(session, vehicle["id"])
     assert seen(client, vehicle)["state"] == "disconnected"
     again = connect(client, database, vehicle)
     assert (again["state"], again["concern"]) == ("quarantined", "its gains are not verified")
@@ -231,20 +231,20 @@ def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else
     ask(client, closed, "disconnect")
     finish_act(database)
     with database.write() as session:
-        acts.quarantine_vehicle(session, doubted["id"], "not verified")
+        commands.quarantine_vehicle(session, doubted["id"], "not verified")
     ask(client, wanted, "restore")
     with database.write() as session:
-        assert len(acts.withdraw_acts(session)) == 1
-        acts.forget_connections(session)
-        acts.request_reconnections(session)
+        assert len(commands.withdraw_acts(session)) == 1
+        commands.forget_connections(session)
+        commands.request_reconnections(session)
     states = [seen(client, vehicle)["state"] for vehicle in (wanted, closed, doubted)]
     assert states == ["disconnected", "disconnected", "quarantined"]
     tasks = [finish_act(database, problem="nobody answers") for _ in range(2)]
     assert [(task.kind, task.vehicle.name) for task in tasks] == [("connect", "A"), ("connect", "C")]
     assert newest(client, wanted)["by"] == "the worker"
     with database.write() as session:
-        assert acts.claim_act(session, WORKER) is None
-        assert len(acts.request_reconnections(session)) == 2  # wanted still: a person asked for it
+        assert commands.claim_act(session, WORKER) is None
+        assert len(commands.request_reconnections(session)) == 2  # wanted still: a person asked for it
 
 
 def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a_person_has_decided(
@@ -257,7 +257,7 @@ def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a
         assert ask(client, vehicle, "check") == 202
         assert finish_act(database).vehicle.identity is None, "whoever connects it compares, and writes nothing"
         with database.write() as session:
-            acts.record_disconnected(session, vehicle["id"])
+            commands.record_disconnected(session, vehicle["id"])
     connect(client, database, vehicle)
     assert ask(client, vehicle, "check") == 202
     assert finish_act(database).vehicle.identity is not None
@@ -270,22 +270,22 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     ask(client, known, "disconnect")
     finish_act(database)
     with database.write() as session:
-        acts.record_disconnected(session, known["id"])
+        commands.record_disconnected(session, known["id"])
     assert "disconnect" not in seen(client, known)["actions"]
     for vehicle in (known, new):
         ask(client, vehicle, "connect")
         finish_act(database, problem="the port is in use by another vehicle")
     with database.read() as session:
-        assert [each.name for each in acts.list_vehicles_to_reconnect(session)] == ["A"]
+        assert [each.name for each in commands.list_vehicles_to_reconnect(session)] == ["A"]
     assert "disconnect" in seen(client, known)["actions"]
     assert "disconnect" not in seen(client, new)["actions"]
     ask(client, known, "disconnect")
     finish_act(database)
     with database.write() as session:  # found in the very moment in which it was not wanted any more
         identity = Identity(system_id=9, autopilot="paparazzi", version="")
-        assert not acts.record_reconnected(session, known["id"], identity, concern="", held=known["safe_gains"])
+        assert not commands.record_reconnected(session, known["id"], identity, concern="", held=known["safe_gains"])
     with database.read() as session:
-        assert acts.list_vehicles_to_reconnect(session) == []
+        assert commands.list_vehicles_to_reconnect(session) == []
     assert seen(client, known)["state"] == "disconnected"
 
 
@@ -294,12 +294,12 @@ def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent
 ) -> None:
     vehicle = create_connected(client, database)
     with database.write() as session:
-        acts.record_disconnected(session, vehicle["id"])
+        commands.record_disconnected(session, vehicle["id"])
     ask(client, vehicle, "connect")
     finish_act(database, problem="nobody answers")
     with database.write() as session:
         identity = Identity(system_id=1, autopilot="paparazzi", version="")
-        assert acts.record_reconnected(session, vehicle["id"], identity, concern="It is armed.", held={})
+        assert commands.record_reconnected(session, vehicle["id"], identity, concern="It is armed.", held={})
     given = client.get(f"/api/vehicles/{vehicle['id']}/ledger").json()["items"]
     assert [(line["purpose"], line["asked"], line["read_back"]) for line in given] == [
         ("connect", DEFAULT_GAINS, DEFAULT_GAINS)
@@ -320,7 +320,7 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
         def wait_until_open(self) -> ConnectionOpened:
             ask(client, vehicle, "disconnect")
             with database.write() as session:
-                acts.withdraw_acts(session)
+                commands.withdraw_acts(session)
             events.append("found")
             return ConnectionOpened(identity=IDENTITY, concern="", held=dict(DEFAULT_GAINS))
 
@@ -332,7 +332,7 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
 
     monkeypatch.setattr("app.flights.connection_manager.VehicleConnection", Found)
     with database.write() as session:
-        acts.record_disconnected(session, vehicle["id"])
+        commands.record_disconnected(session, vehicle["id"])
     manager = VehicleConnectionManager(
         database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
     )
@@ -347,10 +347,10 @@ def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: 
     begun, waiting = (create_connected(client, database, name) for name in ("A", "B"))
     ask(client, begun, "restore")
     with database.write() as session:
-        acts.claim_act(session, WORKER)
+        commands.claim_act(session, WORKER)
     ask(client, waiting, "restore")
     with database.write() as session:
-        acts.withdraw_acts(session)
+        commands.withdraw_acts(session)
     assert [(newest(client, vehicle)["state"], newest(client, vehicle)["problem"]) for vehicle in (begun, waiting)] == [
         ("failed", "It was not finished: the worker ended. Ask again if it is still wanted."),
         (
@@ -368,7 +368,7 @@ def test_a_connection_that_a_person_asked_for_and_that_failed_is_not_tried_again
     finish_act(database, problem="nobody answered within 5 s")
     assert newest(client, vehicle)["problem"] == "nobody answered within 5 s"
     with database.write() as session:
-        assert acts.request_reconnections(session) == []
+        assert commands.request_reconnections(session) == []
 
 
 def test_a_vehicle_with_a_link_is_asked_nothing_but_to_be_let_go_over_a_server_that_others_reach(
@@ -425,8 +425,8 @@ def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
     def connected_as(version: str, concern: str = "") -> str:
         with database.write() as session:
             identity = Identity(system_id=1, autopilot="paparazzi", version=version)
-            acts.record_connected(session, vehicle["id"], identity, concern=concern)
-            acts.record_disconnected(session, vehicle["id"])
+            commands.record_connected(session, vehicle["id"], identity, concern=concern)
+            commands.record_disconnected(session, vehicle["id"])
         return str(seen(client, vehicle)["identity"]["version"])
 
     assert [connected_as(version) for version in ("", "5.18", "", "5.20")] == ["", "5.18", "5.18", "5.18"]
@@ -440,14 +440,14 @@ def test_the_hardware_id_is_pinned_when_it_is_told_and_changed_by_a_release_alon
     def connected_as(uid: str) -> str:
         with database.write() as session:
             identity = Identity(system_id=1, autopilot="px4", version="1.16.0", uid=uid)
-            acts.record_connected(session, vehicle["id"], identity)
-            acts.record_disconnected(session, vehicle["id"])
+            commands.record_connected(session, vehicle["id"], identity)
+            commands.record_disconnected(session, vehicle["id"])
         return str(seen(client, vehicle)["identity"]["uid"])
 
     assert [connected_as(uid) for uid in ("", "0a", "", "0b")] == ["", "0a", "0a", "0a"]
     with database.write() as session:
         accepted = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0b")
-        acts.record_released(session, vehicle["id"], identity=accepted)
+        commands.record_released(session, vehicle["id"], identity=accepted)
     assert seen(client, vehicle)["identity"]["uid"] == "0b"
 
 
@@ -461,8 +461,10 @@ def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(
         row.identity = {"system_id": 1, "autopilot": "paparazzi", "version": "5.18"}
     assert seen(client, vehicle)["identity"]["uid"] == ""
     with database.write() as session:
-        assert acts.linked_vehicle(session, vehicle["id"]).identity == IDENTITY
-        acts.pin_identity(session, vehicle["id"], Identity(system_id=1, autopilot="paparazzi", version="", uid="0a"))
+        assert commands.linked_vehicle(session, vehicle["id"]).identity == IDENTITY
+        commands.pin_identity(
+            session, vehicle["id"], Identity(system_id=1, autopilot="paparazzi", version="", uid="0a")
+        )
     pinned = {"system_id": 1, "autopilot": "paparazzi", "version": "5.18", "uid": "0a"}
     assert seen(client, vehicle)["identity"] == pinned
 
@@ -470,8 +472,8 @@ def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(
 def test_an_order_past_the_database_is_written_down_afterwards(client: TestClient, database: Database) -> None:
     vehicle = create_connected(client, database)
     with database.write() as session:
-        acts.record_command(session, vehicle["id"], ActKind.LAND, "it drifts")
-        acts.record_command(session, vehicle["id"], ActKind.MOTORS_OFF, "fire", problem="the link was closed")
+        commands.record_command(session, vehicle["id"], ActKind.LAND, "it drifts")
+        commands.record_command(session, vehicle["id"], ActKind.MOTORS_OFF, "fire", problem="the link was closed")
     stopped, landed = get(client, f"/api/vehicles/{vehicle['id']}/acts?limit=2")["items"]
     assert (landed["kind"], landed["state"], landed["reason"]) == ("land", "done", "it drifts")
     assert (stopped["kind"], stopped["state"], stopped["problem"]) == ("motors off", "failed", "the link was closed")

@@ -25,10 +25,9 @@ from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import repository
 from app.fleet.control import record_act, require_may, require_may_command, require_not_controlled_by_other
-from app.fleet.kinds import settings_of
 from app.fleet.schemas import Vehicle, VehicleAct
 from app.fleet.service import hold_gains, require_idle, set_vehicle_state
-from app.fleet.views import act_view, is_linked_or_wanted, vehicle_view
+from app.fleet.views import act_view, is_linked_or_wanted, settings_of, vehicle_view
 from app.vehicles.base import CheckItem, Identity, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)

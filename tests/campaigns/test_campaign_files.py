@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from app.campaigns.campaign_files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
 from app.campaigns.definitions import check_campaign
-from app.campaigns.files import CampaignFile, gains_by_hand, preset_names, read_campaign_file, read_preset
 from app.common.errors import InputError, NotFoundError
 from app.core.definition import Definition
 

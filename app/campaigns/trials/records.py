@@ -1,0 +1,330 @@
+"""Gains in an imported log, compared with those of its trial.
+
+Score of a flight's record: its error, its overshoot, a coarse curve.
+
+Capture of a flight: store its record, score it as stored, and classify it where the program may.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import BinaryIO, Final
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
+from app.campaigns import history, proposals, repository
+from app.campaigns import service as campaigns
+from app.campaigns.history import set_trial_state
+from app.campaigns.trials.schemas import NewTrial, Trial
+from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
+from app.campaigns.trials.service import check_flown_gains, create_trial, require_open
+from app.campaigns.trials.views import trajectory_view, trial_view
+from app.common.data_folder import log_of_trial, telemetry_log
+from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
+from app.common.state_machine import check_action
+from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, Ending, TrialState
+from app.core.errors import TrajectoryError
+from app.core.experiments import get_experiment
+from app.core.experiments.base import Experiment
+from app.core.glitches import find_glitches, repaired
+from app.core.policy import Gains
+from app.core.stopping import landing_battery_v
+from app.core.thinning import select_samples
+from app.core.trajectory import Trajectory
+from app.db import trajectories
+from app.db.models import CampaignRow, TrialRow
+from app.db.types import utc_now
+from app.fleet import service as fleet
+from app.fleet.control import require_may
+from app.logs.takeoffs import Takeoff
+from app.processes.sandbox import FILE, run_limited
+
+_SINGLE_PRECISION: Final = 1e-6
+"""Logs store gains as single-precision numbers."""
+
+
+def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
+    """Set the trial's gains to what the log says.
+
+    A log without gains leaves them as planned. Where the sets differ and that is `confirmed`, the trial takes the gains
+    that were flown and loses the prediction for the planned ones; gains under other names are stored as read back only.
+    Raises UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
+    """
+    if not flown.gains:
+        return
+    if _same(row.gains, flown.gains):
+        row.read_back = row.read_back or dict(row.gains)
+        return
+    if not confirmed:
+        raise UnconfirmedError(
+            f"The log was flown with {_format_gains(flown.gains)}; trial {row.number} was planned with "
+            f"{_format_gains(row.gains)}.",
+            hint=f"Choose the log of this trial, or confirm that {_consequence(row.gains, flown.gains)}.",
+            problems=(Problem("confirm", f"the gains in the log, {_format_gains(flown.gains)}, are not the trial's"),),
+        )
+    row.read_back = dict(flown.gains)
+    if _alike(row.gains, flown.gains):
+        judged = check_flown_gains(session, campaign, flown.gains)
+        row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
+        row.predicted_error = row.predicted_interval = None
+
+
+def _alike(planned: Gains, flown: Gains) -> bool:
+    """Whether both sets have the same gain names."""
+    return planned.keys() == flown.keys()
+
+
+def _same(planned: Gains, flown: Gains) -> bool:
+    return _alike(planned, flown) and all(
+        math.isclose(value, flown[name], rel_tol=_SINGLE_PRECISION, abs_tol=_SINGLE_PRECISION)
+        for name, value in planned.items()
+    )
+
+
+def _consequence(planned: Gains, flown: Gains) -> str:
+    if _alike(planned, flown):
+        return "the trial shall stand for the gains in the log"
+    return "the flight shall count for the planned gains, which this log does not name"
+
+
+def _format_gains(gains: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
+
+
+CURVE_POINTS: Final = 48
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """Score of a record. `error` is in the experiment's unit, or None with the reason in `refusal`."""
+
+    error: float | None
+    refusal: str
+    overshoot: float | None
+    curve: list[list[float]]
+
+
+def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool = False) -> Score:
+    """Score a record as stored. `accept_gaps`: a person has decided that its gaps are harmless."""
+    error, refusal = None, ""
+    try:
+        error = experiment.error(trajectory, accept_gaps=accept_gaps)
+    except TrajectoryError as found:
+        refusal = "; ".join(f"{problem.field} {problem.reason}" for problem in found.problems) or found.message
+    return Score(
+        error=error, refusal=refusal, overshoot=_overshoot(experiment, trajectory), curve=_curve(experiment, trajectory)
+    )
+
+
+def _overshoot(experiment: Experiment, trajectory: Trajectory) -> float | None:
+    """Overshoot of the output over its last set point; zero when it stayed below.
+
+    None without samples, and where the set point is zero, because there is no rise.
+    """
+    if experiment.output not in trajectory.channels:
+        return None
+    flown = trajectory[experiment.output][trajectory.time_s >= 0.0]
+    if not flown.size:
+        return None
+    target = float(experiment.set_point(trajectory.time_s[-1:])[0])
+    return max(float(flown.max()) - target, 0.0) if target > 0.0 else None
+
+
+def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:
+    if experiment.output not in trajectory.channels:
+        return []
+    flown = trajectory.time_s >= 0.0
+    time_s, values = trajectory.time_s[flown], trajectory[experiment.output][flown]
+    return [
+        [round(float(time_s[index]), 3), round(float(values[index]), 4)]
+        for index in select_samples(time_s, values, CURVE_POINTS)
+    ]
+
+
+def capture(
+    session: Session,
+    campaign: CampaignRow,
+    row: TrialRow,
+    trajectory: Trajectory,
+    *,
+    ending: Ending = "completed",
+    reason: str = "",
+    on_request: bool = False,
+) -> None:
+    """Store a flight's record and classify the flight.
+
+    An `aborted` flight is classified as that, with its `reason`; others are classified by the program where it may. A
+    flight of a real vehicle stays captured until a person classifies it, with the reason as a suggestion where the
+    measurement is `invalid`. A flight that can be scored but has glitches in its record stays captured too. A flight
+    that was aborted `on_request` counts against its gains only once a person says that the vehicle behaved badly.
+    Raises TrajectoryError when the record cannot be stored.
+    """
+    stored = trajectories.store_trajectory(session, trajectory)
+    row.trajectory = stored
+    recorded = trajectories.trajectory_of(session, stored.id)
+    experiment = get_experiment(campaign.experiment)
+    judged = score(experiment, recorded)
+    glitches = find_glitches(experiment, recorded)
+    row.glitches = [asdict(glitch) for glitch in glitches]
+    row.repaired_error = (
+        score(experiment, repaired(experiment, recorded, glitches), accept_gaps=True).error if glitches else None
+    )
+    row.overshoot_m, row.curve = judged.overshoot, judged.curve
+    row.landing_battery_v = landing_battery_v(recorded)
+    row.ending = ending
+    if ending == "aborted":
+        row.abort_cause = "operator" if on_request else "limit"
+    if ending == "aborted" and row.state == TrialState.FLYING:
+        set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
+        return
+    set_trial_state(row, TrialState.CAPTURED, reason=reason if ending == "invalid" else "")
+    if ending == "aborted":
+        set_trial_state(row, TrialState.ABORTED, reason=reason or "aborted")
+        return
+    row.error = judged.error  # shown before a person classifies the flight, which scores it again
+    if fleet.is_classed_automatically(campaign.vehicle):
+        _classify(row, reason or "the measurement is no good" if ending == "invalid" else judged.refusal)
+
+
+def _classify(row: TrialRow, refusal: str) -> None:
+    if row.error is None or row.ending == "invalid":
+        row.error = None
+        set_trial_state(row, TrialState.INVALID, reason=refusal)
+    elif not row.glitches:
+        set_trial_state(row, TrialState.VALID)
+
+
+def read_record(
+    stream: BinaryIO, *, name: str = "", takeoff: int | None = None, companion: BinaryIO | None = None
+) -> Takeoff:
+    """Read a takeoff from a log of any format.
+
+    Raises TrajectoryError; where the log holds several takeoffs, it names them.
+    """
+    from app.logs.readers import read_takeoff  # noqa: PLC0415 - imports every reader
+
+    return read_takeoff(stream, name=name, number=takeoff, companion=companion)
+
+
+def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: bytes | None) -> Takeoff:
+    """Read a takeoff from an uploaded file, in a process with limits. Raises InputError when it exceeds them."""
+    from app.logs.readers import read_content  # noqa: PLC0415 - imports every reader
+
+    return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
+
+
+def import_record(
+    session: Session, trial_id: int, flown: Takeoff, context: RequestContext = LOCAL_CLI, *, confirmed: bool = False
+) -> Trial:
+    """Import the record of a flight made elsewhere, or the recovered record of a lost flight; score and classify it.
+
+    Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
+    that is not `confirmed`, TrajectoryError when the record cannot be stored, NotAllowedError when the client may not
+    command a real vehicle.
+    """
+    row = repository.get_trial(session, trial_id)
+    campaign = campaigns.get_row(session, row.campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
+    check_action(TRIAL_ACTIONS, "upload", row.state, f"Trial {row.number}")
+    if row.state == TrialState.LOST:
+        check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
+        settle_gains(session, campaign, row, flown, confirmed=confirmed)
+        capture(session, campaign, row, flown.trajectory)
+        proposals.history_changed(session, campaign)
+        return trial_view(session, campaign, row)
+    if fleet.can_fly(campaign.vehicle):
+        raise ConflictError(
+            f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
+            hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
+        )
+    require_open(session, campaign, HISTORY_TRIAL_STATES)
+    settle_gains(session, campaign, row, flown, confirmed=confirmed)
+    proposals.start_flying(campaign)
+    row.flown_at = utc_now()
+    capture(session, campaign, row, flown.trajectory)
+    proposals.finish_flying(session, campaign)
+    return trial_view(session, campaign, row)
+
+
+def import_into_campaign(
+    session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool
+) -> Trial:
+    """Import a record for the trial of the given number, else for the one that waits for a record.
+
+    If no trial waits, one is planned from the proposal first. `campaign` is an id or a name. Raises NotFoundError,
+    InputError when several campaigns or trials match, and what `import_record` raises.
+    """
+    campaign_id = campaigns.find_by_id_or_name(session, campaign)
+    row = campaigns.get_row(session, campaign_id)
+    trials = history.trials_of(session, campaign_id)
+    if number is not None:
+        chosen = [trial for trial in trials if trial.number == number]
+        if not chosen:
+            raise NotFoundError("trial", number, hint=f"Campaign {campaign_id} has {len(trials)} trials.")
+    else:
+        waits = {TrialState.LOST} if fleet.can_fly(row.vehicle) else TRIAL_ACTIONS["upload"]
+        chosen = [trial for trial in trials if trial.state in waits]
+    if len(chosen) > 1:
+        raise InputError(
+            f"{len(chosen)} trials of campaign {campaign_id} wait for a record.",
+            hint="Say which one is meant, by its number: --trial.",
+            problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
+        )
+    if chosen:
+        return import_record(session, chosen[0].id, flown, confirmed=confirmed)
+    proposal = proposals.require_fresh_proposal(session, row)
+    planned = create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
+    return import_record(session, planned.id, flown, confirmed=confirmed)
+
+
+def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:
+    """Thinned record of a trial. Raises NotFoundError when there is none, StorageError when it is damaged."""
+    row = repository.get_trial(session, trial_id)
+    return trajectory_view(campaigns.get_row(session, row.campaign_id), row, history.record_of(session, row), points)
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """A full record as CSV."""
+
+    file_name: str
+    csv: str
+    checksum: str
+
+
+def export_trajectory(session: Session, trial_id: int) -> Export:
+    """Export every sample with nine digits, which restore the stored single-precision number exactly."""
+    row = repository.get_trial(session, trial_id)
+    record = history.record_of(session, row)
+    assert row.trajectory is not None
+    table = np.column_stack([record.time_s, *record.channels.values()])
+    lines = [",".join(["time_s", *record.channels]), *(",".join(f"{number:.9g}" for number in line) for line in table)]
+    return Export(
+        f"campaign-{row.campaign_id}-trial-{row.number}.csv", "\n".join(lines) + "\n", row.trajectory.checksum
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class TelemetryLog:
+    """A flight's .tlog and its file name for download."""
+
+    file: Path
+    name: str
+
+
+def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> TelemetryLog:
+    """Telemetry log of the trial's last flight that has one, else the one imported with the trial.
+
+    Raises NotFoundError when there is none.
+    """
+    row = repository.get_trial(session, trial_id)
+    flown = [telemetry_log(data_dir, flight_id) for flight_id in repository.flight_ids(session, trial_id)]
+    for file in (*flown, log_of_trial(data_dir, trial_id)):
+        if file.is_file():
+            return TelemetryLog(file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog")
+    raise NotFoundError(
+        "telemetry log of trial", trial_id, hint="Only flights of vehicles that are flown over a link leave one."
+    )

@@ -1,0 +1,90 @@
+"""A person's decision on a flight: valid or not, and whether an abort counts against its gains."""
+
+from sqlalchemy.orm import Session
+
+from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
+from app.campaigns import history, proposals, repository
+from app.campaigns import service as campaigns
+from app.campaigns.history import set_trial_state
+from app.campaigns.trials.records import score
+from app.campaigns.trials.schemas import AbortJudgement, Classification, Trial
+from app.campaigns.trials.views import trial_view
+from app.common.errors import ConflictError, InputError, Problem
+from app.common.state_machine import check_action, check_transition, check_version
+from app.common.states import CAMPAIGN_ACTIONS, TRIAL_ACTIONS, TRIAL_TRANSITIONS, TrialState
+from app.core.experiments import get_experiment
+from app.db.models import CampaignRow, TrialRow
+from app.fleet.control import require_may
+
+
+def classify_trial(session: Session, trial_id: int, said: Classification, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Classify a flight by a person's decision; the next gains are computed again from what counts now.
+
+    Raises ConflictError when the transition is not in the table or another client changed the trial first, InputError
+    when a flight without a usable record is to count, NotAllowedError when the client may not command a real vehicle.
+    """
+    row = repository.get_trial(session, trial_id)
+    campaign = campaigns.get_row(session, row.campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
+    outcome = TrialState(said.outcome)
+    check_version(
+        said.version,
+        row.version,
+        f"Trial {row.number}",
+        {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)},
+    )
+    check_action(TRIAL_ACTIONS, "classify", row.state, f"Trial {row.number}")
+    check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Trial {row.number}")
+    check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
+    row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
+    set_trial_state(row, outcome, reason=said.reason)
+    row.version += 1
+    proposals.history_changed(session, campaign)
+    return trial_view(session, campaign, row)
+
+
+def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Record why the operator aborted a flight; the next gains are computed again from what counts now.
+
+    Raises ConflictError when the trial is not aborted, when the program aborted it for a limit, or when another client
+    changed the trial first; NotAllowedError when the client may not command a real vehicle.
+    """
+    row = repository.get_trial(session, trial_id)
+    campaign = campaigns.get_row(session, row.campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
+    check_version(said.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", said.cause)})
+    check_action(TRIAL_ACTIONS, "judge abort", row.state, f"Trial {row.number}")
+    check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
+    if row.abort_cause == "limit":
+        raise ConflictError(
+            f"Trial {row.number} was broken off by the program, for a limit: it counts against its gains.",
+            hint="If the measurement is no good, mark it invalid.",
+        )
+    row.abort_cause = said.cause
+    row.version += 1
+    proposals.history_changed(session, campaign)
+    return trial_view(session, campaign, row)
+
+
+def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:
+    """Error of a flight that a person counts in spite of its gaps. Raises InputError for an aborted or unscorable
+    flight."""
+    if row.ending == "aborted":
+        raise InputError(
+            f"Trial {row.number} cannot count: its record ends where the flight was broken off.",
+            hint="Class it as aborted or leave it invalid, and fly the gains again.",
+            problems=(Problem("outcome", "cannot be valid: the flight was broken off"),),
+        )
+    judged = (
+        None
+        if row.trajectory_id is None
+        else score(get_experiment(campaign.experiment), history.record_of(session, row), accept_gaps=True)
+    )
+    if judged is None or judged.error is None:
+        reason = judged.refusal if judged is not None else "it left no record"
+        raise InputError(
+            f"Trial {row.number} cannot count: it cannot be scored.",
+            hint="Leave it invalid and fly the gains again.",
+            problems=(Problem("outcome", reason),),
+        )
+    return judged.error

@@ -1,0 +1,252 @@
+"""Operations on trials for clients: people and scripts. The worker's side of a flight is in `flights`.
+
+The gate before a trial, for a person's own gains and for proposals, and refusals that an operator overrules.
+
+Gains relative to the flights so far: a smaller step, the best again, the first again.
+"""
+
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
+from app.campaigns import history, proposals, repository
+from app.campaigns import service as campaigns
+from app.campaigns.definitions import definition_of
+from app.campaigns.history import set_flight_state, set_trial_state
+from app.campaigns.statistics import standing_within_bounds_of
+from app.campaigns.trials.schemas import NewTrial, Trial, TrialEdit, Variant
+from app.campaigns.trials.views import trial_view, trial_views
+from app.common.errors import ConflictError, GainlineError, InputError, Problem
+from app.common.schemas import Page, decode_cursor, encode_cursor
+from app.common.state_machine import check_action, check_version
+from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
+from app.core.definition import flight_seed
+from app.core.experiments import experiment_of
+from app.core.gate import GateResult, check_policy, require_flyable
+from app.core.policy import Gains
+from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.fleet import service as fleet
+from app.fleet.control import require_may
+from app.vehicles.open import get_kind
+
+
+@dataclass(frozen=True, slots=True)
+class GateDecision:
+    """Gains that may fly, complete and in order.
+
+    `gate` is the gate's result as stored; `overrule_reason` is why a refusal was overruled, empty if the gate passed.
+    """
+
+    gains: dict[str, float]
+    gate: JsonObject
+    overrule_reason: str
+
+
+def check_own_gains(
+    session: Session, campaign: CampaignRow, asked: Gains, *, overrule: str | None = None
+) -> GateDecision:
+    """Check a person's own gains, given what was known of the vehicle when the latest proposal was computed.
+
+    Takes about 0.1 s. Raises GainsError that names what is refused and what would pass.
+    """
+    gains, gate = _asked(session, campaign, asked)
+    return _judged(campaign, gains, gate, overrule)
+
+
+def check_flown_gains(session: Session, campaign: CampaignRow, flown: Gains) -> GateDecision:
+    """Check gains that were flown elsewhere; returns the gate's result whether or not they pass.
+
+    Raises GainsError when they are not the campaign's gains.
+    """
+    gains, gate = _asked(session, campaign, flown)
+    return GateDecision(gains, proposals.gate_json(gate), "")
+
+
+def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
+    """The gains, complete and in order, and the gate's result."""
+    definition = definition_of(campaign)
+    experiment, space = experiment_of(definition), proposals.space_of(definition)
+    gains = space.complete(asked)
+    flown = history.flown_gains(history.trials_of(session, campaign.id))
+    searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
+    gate = check_policy(
+        definition,
+        experiment,
+        space,
+        gains,
+        flown,
+        start=proposals.stored_start(session, campaign) if searched else None,
+        spread=proposals.stored_distribution(session, campaign, experiment),
+    )
+    return gains, gate
+
+
+def check_proposal(campaign: CampaignRow, proposal: ProposalRow, *, overrule: str | None = None) -> GateDecision:
+    """Decide on a fresh proposal by its stored gate result, which was computed on the same history.
+
+    Raises GainsError as `check_own_gains` does.
+    """
+    return _judged(campaign, proposal.gains, proposals.gate_of(proposal.gate), overrule)
+
+
+def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, overrule: str | None) -> GateDecision:
+    reason = require_flyable(gate, overrule=overrule or "", is_real=campaign.vehicle.is_real)
+    if reason:
+        get_kind(campaign.vehicle.kind).check_gains(fleet.options_of(campaign), gains)
+    return GateDecision(gains, proposals.gate_json(gate), reason)
+
+
+KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repeat": "repeat", "baseline": "baseline"}
+
+
+def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[str, float]:
+    """Gains of a variant.
+
+    `repeat`: the best gains by all their flights; `baseline`: the first flight's; `smaller step`: half way from the
+    best to the present proposal. Like the advice, it ignores flights outside the campaign's bounds. Raises
+    ConflictError before the first valid flight inside the bounds, and where half a step rounds to none.
+    """
+    now = standing_within_bounds_of(campaign, history.trials_of(session, campaign.id))
+    if now is None:
+        raise ConflictError(
+            f"Campaign {campaign.id} has no valid flight inside its bounds yet for a {variant} to be measured from.",
+            hint="Fly the first proposal.",
+        )
+    if variant == "baseline":
+        return dict(now.baseline.gains)
+    best = dict(now.winner.gains)
+    if variant == "repeat":
+        return best
+    space = proposals.space_of(definition_of(campaign))
+    proposed = space.vector(proposals.require_fresh_proposal(session, campaign).gains)
+    half = space.mapping(space.nearest((space.vector(best) + proposed) / 2.0))
+    if half == best or np.array_equal(space.vector(half), proposed):
+        raise ConflictError(
+            "The proposed step cannot be made smaller: half of it is no whole count.",
+            hint="Fly the proposal, or repeat the best gains.",
+        )
+    return half
+
+
+def cancel_trial(session: Session, trial_id: int) -> Trial:
+    """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
+    row = repository.get_trial(session, trial_id)
+    check_action(TRIAL_ACTIONS, "cancel", row.state, f"Trial {row.number}")
+    flight = repository.latest_flights(session, [trial_id]).get(trial_id)
+    if flight is not None and flight.state == FlightState.REQUESTED:
+        set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")
+    set_trial_state(row, TrialState.CANCELLED, reason="cancelled by the operator")
+    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+
+
+def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[TrialState]) -> None:
+    """Raise ConflictError unless the campaign can take another trial now; trials in `spent_by` use up its budget."""
+    check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
+    trials = history.trials_of(session, campaign.id)
+    budget = definition_of(campaign).stop.max_flights
+    if sum(row.state in spent_by for row in trials) >= budget:
+        raise ConflictError(
+            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
+            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
+        )
+    if (waiting := history.find_unreviewed(trials)) is not None:
+        raise ConflictError(
+            f"Flight {waiting.number} waits for its class.",
+            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
+        )
+
+
+def list_trials(session: Session, campaign_id: int, *, limit: int, cursor: str | None) -> Page[Trial]:
+    """List trials by number. Raises NotFoundError, or InputError for a cursor of another list."""
+    campaign = campaigns.get_row(session, campaign_id)
+    after = 0 if cursor is None else decode_cursor("number", cursor, float)[1]
+    rows, total = repository.trial_page(session, campaign_id, after_number=after, limit=limit)
+    following = encode_cursor("number", (0, rows[limit - 1].number)) if len(rows) > limit else None
+    return Page(items=trial_views(session, campaign, rows[:limit]), total=total, next_cursor=following)
+
+
+def get_trial(session: Session, trial_id: int) -> Trial:
+    """Raises NotFoundError."""
+    return _seen(session, repository.get_trial(session, trial_id))
+
+
+def create_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Plan a trial; `fly` is not read here.
+
+    Raises ConflictError for a stale proposal, an unclassified flight, a spent budget, a campaign that is over or not
+    ready; GainsError that names what the gate refuses, unless that is overruled; and NotAllowedError when the client
+    may not command a real vehicle.
+    """
+    campaign = campaigns.get_row(session, campaign_id)
+    require_may(Permission.REVIEW, campaign.vehicle, context)
+    require_open(session, campaign, BUDGETED_TRIAL_STATES)
+    judged, proposal = _chosen(session, campaign, new)
+    gains = judged.gains
+    number = repository.next_number(session, campaign_id)
+    row = TrialRow(
+        campaign_id=campaign_id,
+        number=number,
+        state=TrialState.PLANNED,
+        gains=gains,
+        kind=_kind(session, campaign, gains, proposal) if new.variant is None else KINDS[new.variant],
+        proposal_id=None if proposal is None else proposal.id,
+        predicted_error=None if proposal is None else proposal.predicted_error,
+        predicted_interval=None if proposal is None else proposal.interval,
+        gate=judged.gate,
+        overrule_reason=judged.overrule_reason,
+        note=new.note,
+        seed=flight_seed(definition_of(campaign).seed, number),
+    )
+    session.add(row)
+    session.flush()
+    return trial_view(session, campaign, row)
+
+
+def warm_gate_cache_for_new(session: Session, campaign_id: int, new: NewTrial) -> None:
+    """Run the gate's simulations before the transaction of `create_trial` needs the results, which are cached.
+
+    Problems with the trial are reported by `create_trial`.
+    """
+    with suppress(GainlineError):
+        _chosen(session, campaigns.get_row(session, campaign_id), new)
+
+
+def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
+    """Change a trial's note. Raises ConflictError when another client changed the trial first."""
+    row = repository.get_trial(session, trial_id)
+    check_version(edit.version, row.version, f"Trial {row.number}", {"note": (row.note, edit.note)})
+    row.note = edit.note
+    row.version += 1
+    return _seen(session, row)
+
+
+def _seen(session: Session, row: TrialRow) -> Trial:
+    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+
+
+def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[GateDecision, ProposalRow | None]:
+    """The gains that may fly, and the proposal that they come from, if any."""
+    if sum(given is not None for given in (new.proposal_id, new.gains, new.variant)) != 1:
+        raise InputError(
+            "A trial flies a proposal, gains of one's own, or a variant.",
+            hint="Send exactly one of the three.",
+            problems=(Problem("proposal_id", "or gains or variant, exactly one of the three, must be given"),),
+        )
+    if new.proposal_id is None:
+        asked = new.gains if new.variant is None else gains_of(session, campaign, new.variant)
+        assert asked is not None
+        return check_own_gains(session, campaign, asked, overrule=new.overrule), None
+    proposal = proposals.fresh_proposal(session, campaign, new.proposal_id)
+    return check_proposal(campaign, proposal, overrule=new.overrule), proposal
+
+
+def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None) -> TrialKind:
+    if proposal is not None and proposal.kind != "none":
+        return proposal.kind
+    flown = history.in_history(history.trials_of(session, campaign.id))
+    return "repeat" if any(row.gains == gains for row in flown) else "manual"
