@@ -12,7 +12,7 @@ from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.forkserver import ensure_running
 from typing import Final
 
-PRELOADED: Final = ("__main__", "app.preload")
+PRELOADED: Final = ("__main__", "app.runtime.preload")
 
 
 @cache

@@ -11,7 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from app.cli import app
+from app.cli.commands import app
 from app.core.control.replay import OUTPUTS
 from app.db.models import ControllerCheckRow
 from app.db.session import Database

@@ -11,7 +11,7 @@ from typing import Final
 import httpx2
 import pytest
 
-from app.connections import RESERVED_FOR_ABORTS, room_for_connections
+from app.runtime.http_connections import RESERVED_FOR_ABORTS, room_for_connections
 from tests.runtime.processes import Serving
 
 FILES: Final = 256

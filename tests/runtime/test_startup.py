@@ -27,7 +27,7 @@ with TestClient(create_app(Settings(data_dir=data_dir, ui_dir=ui_dir)), base_url
 
 HELP = """
 import sys
-from app.__main__ import main
+from app.cli.__main__ import main
 sys.argv = ["gainline", "--help"]
 try:
     main()
@@ -69,11 +69,11 @@ def test_processes_that_compute_and_fly_do_not_import_the_database(module: str) 
 
 
 def test_the_worker_starts_without_what_only_its_processes_need() -> None:
-    assert not imported("import app.worker").intersection((*NUMERICS, "alembic", "fastapi"))
+    assert not imported("import app.runtime.worker").intersection((*NUMERICS, "alembic", "fastapi"))
 
 
 def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
-    assert not imported("import app.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
+    assert not imported("import app.runtime.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
 
 
 def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:

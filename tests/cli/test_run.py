@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.campaigns.campaign_files import preset_names
-from app.cli import app
+from app.cli.commands import app
 
 RUN_ON_TWIN = ("run", "ardrone-takeoff", "--vehicle", "twin", "--set", "scatter=0")
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from app.connections import (
+from app.runtime.http_connections import (
     BODY_SILENCE_S,
     BODY_WITHIN_S,
     HEAD_WITHIN_S,

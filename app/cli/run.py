@@ -18,7 +18,7 @@ from app.campaigns.campaign_files import (
 )
 from app.campaigns.definitions import check_campaign, stored
 from app.campaigns.headless import CampaignListener, HeadlessCampaign, HeadlessTrial, fly_campaign
-from app.commands.console import console, table, write_json
+from app.cli.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
 from app.core.definition import Definition

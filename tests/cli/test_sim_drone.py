@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v10 import paparazzi as mavlink
 from typer.testing import CliRunner, Result
 
-from app.cli import app
+from app.cli.commands import app
 from app.vehicles.simdrone.autopilots.registry import AUTOPILOTS
 from app.vehicles.simdrone.faults import FAULTS
 

@@ -86,7 +86,7 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
         try:
             command(*args, **kwargs)
         except GainlineError as error:
-            from app.commands.console import show_error
+            from app.cli.console import show_error
 
             show_error(error)
             raise typer.Exit(1) from error
@@ -113,7 +113,7 @@ def serve(
     worker: Annotated[bool, typer.Option(help="Start the worker that flies and computes beside the server.")] = True,
 ) -> None:
     """Serve the dashboard and its API until it is stopped."""
-    from app.serve import serve as run
+    from app.runtime.serve import serve as run
 
     run(_settings(host=host, port=port, data_dir=data_dir), with_worker=worker)
 
@@ -127,7 +127,7 @@ def unlock(
     data_dir: DataDir = None,
 ) -> None:
     """Print a link that lets one browser command the real vehicles of the running server."""
-    from app.commands.unlock import unlock as run
+    from app.cli.unlock import unlock as run
 
     run(_settings(data_dir=data_dir), script=script)
 
@@ -136,7 +136,7 @@ def unlock(
 @report_errors
 def worker(data_dir: DataDir = None) -> None:
     """Fly and compute for a server that was started with --no-worker."""
-    from app.worker import run_worker
+    from app.runtime.worker import run_worker
 
     run_worker(_settings(data_dir=data_dir))
 
@@ -162,7 +162,7 @@ def run(
     data_dir: DataDir = None,
 ) -> None:
     """Fly a whole campaign on a simulation, without the dashboard, and print its table."""
-    from app.commands.campaign import run_campaign
+    from app.cli.run import run_campaign
 
     run_campaign(
         campaign,
@@ -193,7 +193,7 @@ def reproduce(
     json_out: JsonOut = None,
 ) -> None:
     """Run the paper's experiments here and print measured, published and their ratio."""
-    from app.commands.reproductions import reproduce as run
+    from app.cli.reproduce import reproduce as run
 
     run(what.value, full=full, trace=trace, json_out=json_out)
 
@@ -247,7 +247,7 @@ def sim_drone(
     ] = False,
 ) -> None:
     """Serve a simulated drone that speaks MAVLink, until it is stopped."""
-    from app.commands.sim_drone import run_sim_drone
+    from app.cli.sim_drone import run_sim_drone
 
     run_sim_drone(
         autopilot,
@@ -290,7 +290,7 @@ def import_log(
     json_out: JsonOut = None,
 ) -> None:
     """Hand in the log of a flight made elsewhere: takeoff and gains are found in it."""
-    from app.commands.import_log import import_log as run
+    from app.cli.files import import_log as run
 
     settings = _settings(data_dir=data_dir)
     run(file, settings, campaign=campaign, trial=trial, takeoff=takeoff, yes=yes, json_out=json_out)
@@ -311,7 +311,7 @@ def report(
     data_dir: DataDir = None,
 ) -> None:
     """Write a campaign's report as one file that needs neither this program nor a network; PDF needs a Chromium."""
-    from app.commands.report import report as run
+    from app.cli.files import report as run
 
     run(campaign, _settings(data_dir=data_dir), out=out, kind=kind)
 
@@ -327,7 +327,7 @@ def bundle(
     data_dir: DataDir = None,
 ) -> None:
     """Write a whole campaign, records, photos and logs included, as one file for another installation."""
-    from app.commands.bundles import bundle as run
+    from app.cli.files import bundle as run
 
     run(campaign, _settings(data_dir=data_dir), out=out)
 
@@ -339,7 +339,7 @@ def unbundle(
     data_dir: DataDir = None,
 ) -> None:
     """Bring in a campaign from another installation, every number as it was."""
-    from app.commands.bundles import unbundle as run
+    from app.cli.files import unbundle as run
 
     run(file, _settings(data_dir=data_dir))
 
@@ -351,7 +351,7 @@ def replay(
     json_out: JsonOut = None,
 ) -> None:
     """Replay recorded runs through the replica; exit code 1 on any difference or malformed file."""
-    from app.commands.controller import replay_files
+    from app.cli.reproduce import replay_files
 
     if not replay_files(files, json_out):
         raise typer.Exit(1)
@@ -369,7 +369,7 @@ def check(
     json_out: JsonOut = None,
 ) -> None:
     """Hold the loop's own flight logs against the replica; exit code 1 where they differ or cannot be read."""
-    from app.commands.controller import check_files
+    from app.cli.reproduce import check_files
 
     if not check_files(files, gains, json_out):
         raise typer.Exit(1)

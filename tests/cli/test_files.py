@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner, Result
 
-from app.cli import app
+from app.cli.commands import app
 from app.common.settings import Settings
 from app.db.session import Database
 from tests.builders import Json, create_imported_trial, create_ready_campaign, get

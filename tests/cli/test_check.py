@@ -5,7 +5,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner, Result
 
-from app.cli import app
+from app.cli.commands import app
 from tests.logs.paparazzi_flights import Flight, data_of, write
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}

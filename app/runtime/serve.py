@@ -1,6 +1,8 @@
 """`gainline serve`: the web process, with a worker beside it.
 
 The worker is started before the web application is imported, so that both start in parallel.
+
+Entry point of the worker as a child of the web process, which so need not import the worker.
 """
 
 import errno
@@ -17,10 +19,20 @@ from app.common.errors import AddressError, AlreadyRunningError, Problem
 from app.common.logging import configure_logs
 from app.common.settings import Settings
 from app.db.revision import is_current
+from app.processes import start_loading
 from app.processes.locks import LockedError, exclusive
 from app.processes.supervisor import Supervisor
 from app.web.addresses import exposure, web_address
-from app.worker_process import run_worker_process
+
+
+def run_worker_process(settings: Settings) -> None:
+    """Import the worker, and run it until the parent stops it or ends. Ctrl-C is left to the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    start_loading()
+    from app.runtime.worker import run_supervised_worker  # noqa: PLC0415
+
+    run_supervised_worker(settings)
+
 
 THREAD_SWITCH_INTERVAL_S: Final = 0.001
 """Maximum time for which a thread that draws figures keeps the event loop waiting for the interpreter lock."""
@@ -60,7 +72,7 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
             stack.enter_context(Supervisor(run_worker_process, settings, name="worker"))
         if (exposed := exposure(settings.host)) is not None:
             announce(exposed)
-        from app.web_server import run  # noqa: PLC0415 - imported while the worker does its own imports
+        from app.runtime.web_server import run  # noqa: PLC0415 - imported while the worker does its own imports
 
         run(settings, listener, announce)
 

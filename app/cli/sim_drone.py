@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from types import FrameType
 
-from app.commands.console import console
+from app.cli.console import console
 from app.common.errors import InputError, Problem
 from app.core.clock import ScaledClock
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from app.cli import app
+from app.cli.commands import app
 
 TRACES = sorted((Path(__file__).parents[1] / "data" / "vertical_loop").glob("*.csv.gz"))
 

@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner, Result
 
-from app.cli import app
+from app.cli.commands import app
 from app.common.settings import Settings
 from app.db.session import Database
 from tests.builders import Json, create_ready_campaign, create_trial, get
@@ -67,7 +67,7 @@ def test_a_question_can_be_answered(
     client: TestClient, settings: Settings, campaign: Json, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = write(tmp_path, Flight({"kp": 290, "ki": 40, "kd": 80}, setting=True))
-    monkeypatch.setattr("app.commands.import_log.can_ask", lambda: True)
+    monkeypatch.setattr("app.cli.files.can_ask", lambda: True)
     asked = ["import", str(data), "--campaign", "Garage", "--data-dir", str(settings.data_dir)]
     declined = CliRunner().invoke(app, asked, input="n\n")
     assert declined.exit_code == 1

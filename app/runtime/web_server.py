@@ -16,11 +16,10 @@ import uvicorn
 
 from app.accounts.keyring import Keyring
 from app.common.settings import Settings, is_loopback
-from app.connections import Connections, room_for_connections
 from app.core.clock import REAL_TIME
 from app.db.outbox import latest_event_id
-from app.http_protocol import LimitedProtocol
 from app.main import create_app
+from app.runtime.http_connections import Connections, LimitedProtocol, room_for_connections
 from app.web.addresses import addresses_elsewhere, qr_text, unlock_link, web_address
 
 STREAMS_END_WITHIN_S: Final = 3

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from app.cli import Reproducible, app
+from app.cli.commands import Reproducible, app
 from app.studies.reproductions import REPRODUCTIONS
 
 TRACES = Path(__file__).parents[1] / "data" / "vertical_loop"

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.campaigns.campaign_files import read_preset
-from app.cli import app
+from app.cli.commands import app
 from app.core.clock import ScaledClock
 from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse

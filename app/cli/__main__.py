@@ -4,7 +4,7 @@ again."""
 
 def main() -> None:
     """Run the command line."""
-    from app.cli import app  # noqa: PLC0415
+    from app.cli.commands import app  # noqa: PLC0415
 
     app()
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from app.cli import app
+from app.cli.commands import app
 from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

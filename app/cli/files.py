@@ -1,0 +1,186 @@
+"""`gainline import`, `report`, `bundle`, `unbundle`: flight logs in, reports out, and whole campaigns in and out."""
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Literal
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from app.bundles.reading import Bundle
+from app.bundles.service import store_bundle, write_bundle
+from app.campaigns import service as campaigns
+from app.campaigns.trials import records
+from app.campaigns.trials.schemas import Trial
+from app.cli.console import console, write_json
+from app.common.errors import InputError, Problem, UnconfirmedError
+from app.common.settings import Settings
+from app.db.migrate import require_current
+from app.db.session import Database
+from app.logs.takeoffs import Takeoff
+from app.reports.printing import print_pdf
+from app.reports.rendering import chart_library, file_name, render
+from app.reports.service import report_of
+from app.reports.wording import count
+
+
+def import_log(
+    file: Path,
+    settings: Settings,
+    *,
+    campaign: str,
+    trial: int | None,
+    takeoff: int | None,
+    yes: bool,
+    json_out: Path | None,
+) -> None:
+    """Import the flight and print the trial's result; asks before it accepts gains that were not planned.
+
+    Raises InputError for a log that cannot be used, UnconfirmedError when the command is not interactive and cannot
+    ask.
+    """
+    flown = _read(file, takeoff)
+    out = console(json_out)
+    out.print(f"{escape(file.name)}: {escape(flown.summary)}.")
+    for note in flown.notes:
+        out.print(f"  {escape(note)}", style="dim")
+    require_current(settings.database_file)
+    database = Database(settings.database_file)
+    try:
+        stored = _store(database, campaign, trial, flown, yes=yes)
+    finally:
+        database.close()
+    _print(out, stored)
+    write_json(json_out, stored.model_dump(mode="json"))
+
+
+def can_ask() -> bool:
+    """Whether standard input is a terminal, so that a person can be asked."""
+    return sys.stdin.isatty()
+
+
+def _read(file: Path, takeoff: int | None) -> Takeoff:
+    try:
+        with ExitStack() as files:
+            stream = files.enter_context(file.open("rb"))
+            beside = file.with_suffix(".log")
+            companion = (
+                files.enter_context(beside.open("rb")) if file.suffix.lower() == ".data" and beside.is_file() else None
+            )
+            return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
+    except OSError as error:
+        raise InputError(
+            f"{file} could not be read: {error.strerror or error}.",
+            problems=(Problem("FILE", "cannot be read"),),
+            hint="Give a log that this user may read.",
+        ) from error
+
+
+def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
+    def attempt(confirmed: bool) -> Trial:
+        with database.write() as session:
+            return records.import_into_campaign(session, campaign, flown, number=trial, confirmed=confirmed)
+
+    try:
+        return attempt(yes)
+    except UnconfirmedError as needed:
+        if not can_ask():
+            raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
+        Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
+        if not typer.confirm("Take it?"):
+            raise
+        return attempt(True)
+
+
+def _print(out: Console, trial: Trial) -> None:
+    gains = ", ".join(f"{name} {value:g}" for name, value in trial.gains.items())
+    error = "no error" if trial.error is None else f"error {trial.error:.4f}"
+    out.print(f"Trial {trial.number} of campaign {trial.campaign_id}, {gains}: {trial.state}, {error}.")
+    if trial.reason:
+        out.print(escape(trial.reason))
+    for glitch in trial.glitches:
+        out.print(escape(glitch.sentence))
+
+
+def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
+    """Write the campaign's bundle; a server may run meanwhile. Raises InputError when the file cannot be written."""
+    require_current(settings.database_file)
+    database = Database(settings.database_file)
+    try:
+        with database.read() as session:
+            campaign_id = campaigns.find_by_id_or_name(session, campaign)
+            target = out or Path(f"campaign-{campaign_id}.gainline.zip")
+            arriving = target.with_name(f".{target.name}.part")
+            try:
+                with arriving.open("w+b") as file:
+                    write_bundle(session, campaign_id, settings.data_dir, file)
+                arriving.replace(target)
+            except OSError as error:
+                raise InputError(
+                    f"{target} could not be written: {error.strerror or error}.",
+                    problems=(Problem("--out", "cannot be written"),),
+                    hint="Name a file in a folder that exists and has room.",
+                ) from error
+            finally:
+                arriving.unlink(missing_ok=True)
+    finally:
+        database.close()
+    console().print(f"Campaign {campaign_id} is in {escape(str(target))}, {target.stat().st_size / 1e6:.1f} MB.")
+
+
+def unbundle(file: Path, settings: Settings) -> None:
+    """Import the campaign and print a summary. Raises InputError that names what is wrong with the file."""
+    require_current(settings.database_file)
+    database = Database(settings.database_file)
+    try:
+        with file.open("rb") as stream, Bundle(stream) as opened:
+            opened.check()
+            with database.write() as session:
+                made = store_bundle(session, opened, settings.data_dir)
+    except OSError as error:
+        raise InputError(
+            f"{file} could not be read: {error.strerror or error}.",
+            problems=(Problem("FILE", "cannot be read"),),
+            hint="Give a bundle that this user may read.",
+        ) from error
+    finally:
+        database.close()
+    out = console()
+    out.print(
+        f"Campaign {made.id}, {escape(made.name)}: {count(made.trials.flown, 'flight')} on {escape(made.vehicle.name)}."
+    )
+    if not made.vehicle.can_fly:
+        out.print("It is history here: it can be read, compared and cloned to a vehicle that flies.")
+
+
+Format = Literal["html", "pdf"]
+
+
+def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format | None) -> None:
+    """Write the report; a server may run meanwhile. Without `kind` the format follows from the file's extension, else
+    HTML.
+
+    Raises InputError when the file cannot be written, UnavailableError when no program to print a PDF is installed.
+    """
+    chosen: Format = kind or ("pdf" if out is not None and out.suffix.lower() == ".pdf" else "html")
+    require_current(settings.database_file)
+    database = Database(settings.database_file)
+    try:
+        with database.read() as session:
+            found = report_of(session, campaigns.find_by_id_or_name(session, campaign))
+    finally:
+        database.close()
+    html = render(found, chart_library(settings.ui_dir)).html
+    content = print_pdf(lambda: html) if chosen == "pdf" else html.encode()
+    target = out or Path(file_name(found.campaign.id, chosen))
+    try:
+        target.write_bytes(content)
+    except OSError as error:
+        raise InputError(
+            f"{target} could not be written: {error.strerror or error}.",
+            problems=(Problem("--out", "cannot be written"),),
+            hint="Name a file in a folder that exists and has room.",
+        ) from error
+    console().print(f"The report of campaign {found.campaign.id} is in {escape(str(target))}.")

@@ -1,0 +1,1 @@
+"""The two programs, web process and worker, and what starts and serves them."""
