@@ -1,5 +1,5 @@
-"""`gainline reproduce` and `gainline controller`: the paper's experiments, tables and figures beside the published ones,
-and the replica of the autopilot's vertical loop beside recordings of the real one.
+"""`gainline reproduce` and `gainline controller`: the paper's experiments, tables and figures beside the published
+ones, and the replica of the autopilot's vertical loop beside recordings of the real one.
 """
 
 from collections.abc import Mapping, Sequence
