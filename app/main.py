@@ -29,7 +29,7 @@ from app.flights.router import router as flights
 from app.jobs.router import router as jobs
 from app.live.link import live_link
 from app.reports.router import router as reports
-from app.studies.router import router as reproductions
+from app.reproductions.router import router as reproductions
 from app.web import errors, events, system
 from app.web.errors import describe
 from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware

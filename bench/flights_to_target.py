@@ -17,11 +17,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from app.studies.vehicles import SampledVehicle, population
 from bench.targets.methods import DISTRIBUTIONS, METHODS
 from bench.targets.pages import TITLES, draw, page, safety, summary
 from bench.targets.report import Outcome, outcomes
 from bench.targets.results import OPTIMUM, Results, Task, work
+from bench.targets.vehicles import SampledVehicle, population
 
 SEED: Final = 20261121
 QUICK_VEHICLES: Final = 12

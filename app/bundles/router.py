@@ -7,8 +7,9 @@ from fastapi import APIRouter, status
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from app.bundles.reading import Bundle
-from app.bundles.service import store_bundle, write_bundle
+from app.bundles.export import write_bundle
+from app.bundles.importer import store_bundle
+from app.bundles.reader import Bundle
 from app.campaigns.schemas import Campaign
 from app.web.dependencies import FILE_BODY, CurrentDatabase, CurrentSettings, Id, Record
 

@@ -9,8 +9,9 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from app.bundles.reading import Bundle
-from app.bundles.service import store_bundle, write_bundle
+from app.bundles.export import write_bundle
+from app.bundles.importer import store_bundle
+from app.bundles.reader import Bundle
 from app.campaigns import service as campaigns
 from app.campaigns.trials import records
 from app.campaigns.trials.schemas import Trial
@@ -20,10 +21,10 @@ from app.common.settings import Settings
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.logs.takeoffs import Takeoff
-from app.reports.printing import print_pdf
-from app.reports.rendering import chart_library, file_name, render
+from app.reports.formatting import count
+from app.reports.html import chart_library, file_name, render
+from app.reports.pdf import print_pdf
 from app.reports.service import report_of
-from app.reports.wording import count
 
 
 def import_log(

@@ -15,13 +15,13 @@ from rich.table import Table
 
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
-from app.controller_checks.checking import LogCheck, check_log, check_trace, parse_gains
+from app.controller_checks.check import LogCheck, check_log, check_trace, parse_gains
 from app.core.control.replay import OUTPUTS, Replay
 from app.core.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
 from app.logs.loop_trace import read_loop_trace
-from app.studies.controller import run_controller
-from app.studies.reproductions import REPRODUCTIONS, Reproduction, get_reproduction
-from app.studies.results import Result, Row
+from app.reproductions.controller import run_controller
+from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction
+from app.reproductions.results import Result, Row
 
 ALL: Final = "all"
 

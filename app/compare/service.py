@@ -10,11 +10,16 @@ from sqlalchemy.orm import Session
 
 from app.campaigns.trials.schemas import GroupBrief
 from app.compare import repository
+from app.compare.compared_flights import (
+    ComparisonFlight,
+    file_stem,
+    gain_differences,
+    setting_differences,
+    settings_of,
+    sides_of,
+)
 from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
-from app.compare.settings import gain_differences, setting_differences, settings_of
-from app.compare.sides import ComparisonFlight, sides_of
 from app.compare.verdicts import compare_pair, list_notes, overall_verdict
-from app.compare.words import file_stem
 from app.core.trajectory import CHANNEL_UNITS, Samples
 from app.db import trajectories
 from app.figures.base import Card, card_of

@@ -9,9 +9,8 @@ import math
 from collections.abc import Sequence
 
 from app.campaigns.trials.views import CONFIDENCE
+from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named, percent
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.compare.sides import ComparisonFlight
-from app.compare.words import capitalised, measured, named, percent
 from app.core.confirming import SCATTER_NOT_KNOWN
 from app.core.statistics import Comparison, Group, Verdict, compare, drift_of
 from app.core.strategies.history import format_gains

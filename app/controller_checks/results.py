@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.controller_checks.checking import LogCheck, TraceCheck, check_recording
+from app.controller_checks.check import LogCheck, TraceCheck, check_recording
 from app.core.control.replay import INPUTS, OUTPUTS
 from app.core.control.vertical_loop import RATE_HZ
 from app.core.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.common.errors import NotFoundError, StorageError
 from app.common.schemas import Page, decode_cursor, encode_cursor, without_control_characters
 from app.controller_checks import repository, schemas
-from app.controller_checks.checking import check_trace, parse_gains
+from app.controller_checks.check import check_trace, parse_gains
 from app.controller_checks.results import FIGURES, Result, examine_content, result_of
 from app.db.models import ControllerCheckRow
 from app.figures.base import Card, card_of
@@ -17,7 +17,7 @@ from app.figures.controller import ControllerFigure
 from app.figures.theme import ThemeName
 from app.logs.loop_trace import read_loop_trace
 from app.processes.sandbox import FILE, run_limited
-from app.studies.controller import RECORDED_TAKEOFF
+from app.reproductions.controller import RECORDED_TAKEOFF
 
 _NAME_LENGTH: Final = 120
 _UNNAMED: Final = "recording"

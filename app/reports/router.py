@@ -5,8 +5,8 @@ from fastapi import APIRouter, Response
 from app.campaigns.service import get_row
 from app.common.settings import Settings
 from app.db.session import Database
-from app.reports.printing import print_pdf
-from app.reports.rendering import Document, chart_library, file_name, render
+from app.reports.html import Document, chart_library, file_name, render
+from app.reports.pdf import print_pdf
 from app.reports.service import report_of
 from app.web.dependencies import CurrentDatabase, CurrentSettings, Id
 

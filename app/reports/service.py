@@ -20,9 +20,8 @@ from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.fleet import service as fleet
 from app.fleet.views import acts_view, ledger_view
-from app.reports import anomalies, remarks
-from app.reports.content import Anomaly, Report
-from app.reports.settings_in_words import describe_method, describe_vehicle, experiment_of
+from app.reports import sections
+from app.reports.sections import Anomaly, Report, describe_method, describe_vehicle, experiment_of
 
 _PAGE: Final = 200
 T = TypeVar("T")
@@ -47,8 +46,8 @@ def report_of(session: Session, campaign_id: int) -> Report:
             *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
             *_landscape(session, campaign),
         ),
-        remarks=tuple(remarks.remarks_on(session, campaign_id, trials)),
-        photo_bytes=remarks.MAX_BYTES,
+        remarks=tuple(sections.remarks_on(session, campaign_id, trials)),
+        photo_bytes=sections.MAX_BYTES,
         anomalies=tuple(_anomalies(session, campaign, trials, statistics.error_unit)),
         version=__version__,
         made_at=utc_now(),
@@ -63,12 +62,12 @@ def _landscape(session: Session, campaign: Campaign) -> Iterator[Card]:
 
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:
-    yield from anomalies.of_flights(trials, unit)
-    yield from anomalies.of_records(row.number for row in damaged_trials(session, campaign.id))
+    yield from sections.of_flights(trials, unit)
+    yield from sections.of_records(row.number for row in damaged_trials(session, campaign.id))
     if not campaign.vehicle.registered:
         return
     vehicle_id = campaign.vehicle.id
-    yield from anomalies.of_vehicle(
+    yield from sections.of_vehicle(
         campaign,
         fleet.get_vehicle(session, vehicle_id),
         _all(lambda cursor: acts_view(session, vehicle_id, limit=_PAGE, cursor=cursor)),

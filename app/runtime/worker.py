@@ -42,8 +42,8 @@ from app.live.messages import PublishedMessage, WorkerHello, live_address
 from app.live.server import LiveServer
 from app.processes.locks import LockedError, exclusive
 from app.processes.pool import ComputePool
-from app.studies.service import REPRODUCTION_JOB
-from app.studies.tasks import ReproductionJob
+from app.reproductions.service import REPRODUCTION_JOB
+from app.reproductions.tasks import ReproductionJob
 
 FLIGHTS_AT_ONCE: Final = 8
 ACTS_AT_ONCE: Final = 8

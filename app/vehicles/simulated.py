@@ -99,7 +99,7 @@ class SimulatedVehicle:
         finally:
             self._restore()
         return FlightRecord(
-            trajectory=self._trajectory(rows),
+            trajectory=trajectory_of(np.concatenate(rows), self.kind),
             ending="completed" if stop is None else "aborted",
             reason="" if stop is None else stop.reason,
             settings=self._settings,
@@ -143,15 +143,31 @@ class SimulatedVehicle:
             yield last
 
     def _command(self, mode: int, target: int) -> Integers:
-        command = np.empty(COMMAND_SIZE, dtype=np.int64)
-        command[[MODE, TARGET, KP, KI, KD]] = (mode, target, *(self._held[name] for name in GAIN_NAMES))
-        return command
+        return _command(mode, target, self._held)
 
-    def _trajectory(self, rows: list[Rows]) -> Trajectory:
-        record = np.concatenate(rows)
-        time_s = np.arange(len(record), dtype=np.float64) * STEP_S
-        channels = {name: np.ascontiguousarray(record[:, i]) for i, name in enumerate(CHANNELS)}
-        return Trajectory(time_s, channels, self.kind, "simulation")
+
+def simulate_takeoff(simulation: Simulation, gains: Gains) -> Rows:
+    """Simulate one takeoff in one call, with the same result as through the vehicle interface; shape (`STEPS`, 8).
+
+    For the twin this takes 1.5 ms instead of 30. Gains are 32-bit integers and are not checked. A flight that diverges
+    numerically has non-finite altitudes.
+    """
+    rows = simulation.advance(STEPS, _command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS), gains))
+    rows[:, SET_POINT] = TAKEOFF_ALTITUDE_M
+    return rows
+
+
+def trajectory_of(rows: Rows, kind: str) -> Trajectory:
+    """The record of a simulated flight: one row of `CHANNELS` every 1/512 s."""
+    time_s = np.arange(len(rows), dtype=np.float64) * STEP_S
+    channels = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(CHANNELS)}
+    return Trajectory(time_s, channels, kind, "simulation")
+
+
+def _command(mode: int, target: int, gains: Gains) -> Integers:
+    command = np.empty(COMMAND_SIZE, dtype=np.int64)
+    command[[MODE, TARGET, KP, KI, KD]] = (mode, target, *(int(gains[name]) for name in GAIN_NAMES))
+    return command
 
 
 def _slices() -> Iterator[tuple[int, int]]:

@@ -11,7 +11,7 @@ from app.core.definition import Flight, flight_seed
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import PolicySpace, Vector
 from app.core.strategies.base import Interval
-from app.studies.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error
+from bench.targets.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error
 
 EXPERIMENT: Final = Takeoff()
 SPACE: Final[PolicySpace] = EXPERIMENT.space

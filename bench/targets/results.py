@@ -11,9 +11,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-from app.studies.vehicles import SampledVehicle, own_optimum
 from bench.targets.flying import Tuning, tune
 from bench.targets.methods import DISTRIBUTIONS, METHODS
+from bench.targets.vehicles import SampledVehicle, own_optimum
 
 OPTIMUM: Final = "optimum"
 """The task that finds a vehicle's own best gains."""

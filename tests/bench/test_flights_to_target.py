@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.studies.vehicles import noise_free_error, population
 from bench.flights_to_target import chosen_methods, is_within_limits, tasks
 from bench.targets.flying import DEFAULT, SPACE, BudgetSpentError, Tuning, tune
 from bench.targets.methods import METHODS
 from bench.targets.pages import page, summary
 from bench.targets.report import Course, Outcome, Share, course_of, outcomes
 from bench.targets.results import OPTIMUM, Results, Task, carry_out, work
+from bench.targets.vehicles import noise_free_error, population
 
 TASK = Task(population="four-parameter", number=1, seed=9, what="nelder-mead")
 

@@ -13,7 +13,7 @@ import pytest
 import zstandard
 from fastapi.testclient import TestClient
 
-from app.bundles import reading
+from app.bundles import reader
 from app.db.models import CampaignRow, TrajectoryRow
 from app.db.session import Database
 from tests.builders import create_flown_trial, create_ready_campaign, problems_of
@@ -124,10 +124,10 @@ def test_a_changed_sample_is_found(client: TestClient, database: Database, parts
 def test_a_bomb_in_the_zip_is_refused_before_it_goes_off(
     client: TestClient, database: Database, parts: Parts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reading, "MAX_JSON_BYTES", 2**20)
+    monkeypatch.setattr(reader, "MAX_JSON_BYTES", 2**20)
     found = refused(client, database, sealed({**parts, "contents.json": b" " * 2**22}))
     assert found["contents.json"] == "is larger than 1 MiB"
-    monkeypatch.setattr(reading, "MAX_TOTAL_BYTES", 2**21)
+    monkeypatch.setattr(reader, "MAX_TOTAL_BYTES", 2**21)
     assert "unpack" in refused(client, database, sealed({**parts, "contents.json": b" " * 2**22}))["file"]
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from app.bundles.reading import Bundle
-from app.bundles.service import store_bundle
+from app.bundles.importer import store_bundle
+from app.bundles.reader import Bundle
 from app.common.data_folder import telemetry_log
 from app.common.settings import Settings
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
@@ -257,8 +257,8 @@ def test_nothing_is_left_of_a_bundle_whose_storing_fails(
     client: TestClient, database: Database, campaign: Json, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bundle = download_bundle(client, campaign["id"])
-    monkeypatch.setattr("app.bundles.storing.request_proposal", lambda *_: (_ for _ in ()).throw(OSError("disk")))
-    monkeypatch.setattr("app.bundles.storing.is_stale", lambda *_: True)
+    monkeypatch.setattr("app.bundles.importer.request_proposal", lambda *_: (_ for _ in ()).throw(OSError("disk")))
+    monkeypatch.setattr("app.bundles.importer.is_stale", lambda *_: True)
     assert import_bundle(client, bundle).status_code >= 500
     with database.read() as session:
         assert session.query(CampaignRow).count() == 1

@@ -4,7 +4,7 @@ import pytest
 
 from app.campaigns.headless import CampaignListener, HeadlessTrial, fly_campaign
 from app.core.definition import Definition, StopRule
-from app.studies.vehicles import noise_free_error, population
+from bench.targets.vehicles import noise_free_error, population
 from tests.core.flying import compiled_only
 
 pytestmark = compiled_only

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import Reproducible, app
-from app.studies.reproductions import REPRODUCTIONS
+from app.reproductions.registry import REPRODUCTIONS
 
 TRACES = Path(__file__).parents[1] / "data" / "vertical_loop"
 

@@ -34,8 +34,8 @@ from app.fleet.schemas import NewVehicle
 from app.flights import queue, requests
 from app.flights.process_messages import mark_if_requested
 from app.jobs import service as jobs
-from app.studies import service as studies
-from app.studies.reproductions import get_reproduction
+from app.reproductions import service as reproductions
+from app.reproductions.registry import get_reproduction
 from app.vehicles.base import FlightOptions, StopRequest
 from app.vehicles.open import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
@@ -177,8 +177,8 @@ class States:
         result = get_reproduction(name).run(lambda _share, _doing: None, False).as_json()
 
         def store(session: Session) -> None:
-            studies.request_run(session, name, full=False)
-            _finish(session, studies.REPRODUCTION_JOB, None, result)
+            reproductions.request_run(session, name, full=False)
+            _finish(session, reproductions.REPRODUCTION_JOB, None, result)
 
         self._write(store)
 

@@ -16,8 +16,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
-from app.reports import printing, remarks, router
-from app.reports.wording import plus_minus
+from app.reports import pdf, router, sections
+from app.reports.formatting import plus_minus
 from tests.builders import Json, create_ready_campaign, get
 from tests.campaigns.test_landscapes import card_of, run_landscapes
 from tests.campaigns.trials.test_photos import JPEG, add, png
@@ -138,7 +138,7 @@ def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_e
     first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     for trial in (first, first, first, third):
         add(client, trial, png())
-    monkeypatch.setattr(remarks, "MAX_BYTES", 3 * len(png()) - 1)
+    monkeypatch.setattr(sections, "MAX_BYTES", 3 * len(png()) - 1)
     page = read(client, campaign)
     assert [found["alt"] for tag, found in page.tags if tag == "img"] == [
         "Photo 1 of flight 1",
@@ -179,7 +179,7 @@ def test_the_report_of_no_campaign_is_not_found(client: TestClient) -> None:
     assert client.get("/api/campaigns/77/report.pdf").status_code == 404
 
 
-@pytest.mark.skipif(not any(map(shutil.which, printing.PRINTERS)), reason="no Chromium to print with")
+@pytest.mark.skipif(not any(map(shutil.which, pdf.PRINTERS)), reason="no Chromium to print with")
 def test_the_pdf_is_one_and_its_text_can_be_read(client: TestClient, campaign: Json, tmp_path: Path) -> None:
     answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
     assert answer.status_code == 200, answer.text
@@ -237,7 +237,7 @@ def test_a_browser_that_takes_too_long_is_ended_with_its_children(
     os.mkfifo(heard)
     line = os.open(heard, os.O_RDONLY | os.O_NONBLOCK)  # it ends when the last process that holds the other side does
     in_path(f"{{ echo up; exec /bin/sleep 60; }} > {heard} & wait", monkeypatch, tmp_path)
-    monkeypatch.setattr(printing, "TIMEOUT_S", 1.0)
+    monkeypatch.setattr(pdf, "TIMEOUT_S", 1.0)
     answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
     assert answer.status_code == 503
     assert "within 1 s" in answer.json()["detail"]
@@ -259,7 +259,7 @@ def test_prints_beyond_a_few_at_once_are_refused_before_any_work_is_done(
 ) -> None:
     in_path("exit 0", monkeypatch, tmp_path)
     monkeypatch.setattr(router, "render", lambda *_: pytest.fail("the page was made for nothing"))
-    taken = [printing._places.acquire(blocking=False) for _ in range(printing.MAX_CONCURRENT)]
+    taken = [pdf._places.acquire(blocking=False) for _ in range(pdf.MAX_CONCURRENT)]
     try:
         assert all(taken)
         answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")
@@ -267,4 +267,4 @@ def test_prints_beyond_a_few_at_once_are_refused_before_any_work_is_done(
         assert "already" in answer.json()["detail"]
     finally:
         for _ in taken:
-            printing._places.release()
+            pdf._places.release()

@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from app.studies.results import OVERRULE
-from app.studies.variability import POLICIES, REPEATS, pooled_sigma, repeated_errors, run_variability, share_with_trend
+from app.reproductions.results import OVERRULE
+from app.reproductions.variability import (
+    POLICIES,
+    REPEATS,
+    pooled_sigma,
+    repeated_errors,
+    run_variability,
+    share_with_trend,
+)
 
 DEFAULT, TUNED = (policy.gains for policy in POLICIES)
 

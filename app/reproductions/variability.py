@@ -5,7 +5,7 @@ scatter of σ between batteries from σ itself: σ is pooled over the groups, �
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,9 +16,11 @@ from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Vector
 from app.core.statistics import Group, pool_scatter, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
-from app.studies.gate import overruled_for
-from app.studies.results import OVERRULE, Progress, Result, Row, marks, ratio
-from app.studies.vehicles import fly, population
+from app.reproductions.results import OVERRULE, Progress, Result, Row, marks, ratio
+from app.reproductions.tables import overruled_for
+from app.vehicles.open import check_options
+from app.vehicles.simulated import simulate_takeoff, trajectory_of
+from app.vehicles.twin import TwinFlight
 
 GROUPS: Final = 200
 REPEATS: Final = 10
@@ -101,14 +103,15 @@ def repeated_errors(gains: tuple[int, int, int], *, seed: int, group: int, fade:
     The flights differ by the twin's scatter and, with `fade`, by the thrust, which falls by that share over the ten
     flights.
     """
-    (twin,) = population("twin", 1, seed)
-    hover = float(twin.options["hover_throttle"])
+    options = {name: float(value) for name, value in check_options("twin", {}).items()}
+    hover = options["hover_throttle"]
     errors = np.empty(REPEATS)
     for flight in range(REPEATS):
         weaker = 1.0 - fade * flight / (REPEATS - 1)
-        flown = replace(twin, options={**twin.options, "hover_throttle": hover / weaker})
-        record = fly(flown, _named(gains), flight_seed(seed, group * REPEATS + flight + 1))
-        errors[flight] = get_experiment("takeoff").error(record)
+        flown = TwinFlight(
+            {**options, "hover_throttle": hover / weaker}, flight_seed(seed, group * REPEATS + flight + 1)
+        )
+        errors[flight] = get_experiment("takeoff").error(trajectory_of(simulate_takeoff(flown, _named(gains)), "twin"))
     return errors
 
 

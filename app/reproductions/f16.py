@@ -11,7 +11,7 @@ from app.core.policy import Vector
 from app.core.strategies.simplex import model_optimum
 from app.core.trajectory import Trajectory
 from app.figures.panels import Line, Panel, Plot, Style
-from app.studies.f16 import (
+from app.reproductions.f16_campaigns import (
     BEST_ERROR,
     MAX_FLIGHTS,
     METHODS,
@@ -25,7 +25,7 @@ from app.studies.f16 import (
     study,
     truth,
 )
-from app.studies.results import Progress, Result, Row, curve, marks, ratio
+from app.reproductions.results import Progress, Result, Row, curve, marks, ratio
 
 PERTURBATION: Final = 0.45
 SEEDS: Final = 50

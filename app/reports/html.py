@@ -14,8 +14,8 @@ from markupsafe import Markup
 
 from app.campaigns.schemas import Campaign
 from app.figures.base import Card, Cell, Column
-from app.reports import wording
-from app.reports.content import Photo, Report
+from app.reports import formatting
+from app.reports.sections import Photo, Report
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -132,14 +132,14 @@ def _environment(zone: tzinfo | None) -> "Environment":
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
     environment.filters |= {
-        "instant": lambda at: wording.instant(at, zone or _here(at)),
-        "plus_minus": wording.plus_minus,
-        "number": wording.number,
-        "interval": wording.interval,
-        "gain": wording.gain,
-        "gains": wording.gains,
+        "instant": lambda at: formatting.instant(at, zone or _here(at)),
+        "plus_minus": formatting.plus_minus,
+        "number": formatting.number,
+        "interval": formatting.interval,
+        "gain": formatting.gain,
+        "gains": formatting.gains,
         "signed_gain": _signed_gain,
-        "count": wording.count,
+        "count": formatting.count,
         "flights": _flights,
         "cell": _cell,
         "panels": _panels,
@@ -157,7 +157,7 @@ def _here(at: datetime) -> tzinfo:
 
 
 def _signed_gain(change: float) -> str:
-    return f"+{wording.gain(change)}" if change > 0 else wording.gain(change)
+    return f"+{formatting.gain(change)}" if change > 0 else formatting.gain(change)
 
 
 def _flights(numbers: list[int]) -> str:
@@ -176,7 +176,7 @@ def _data_uri(photo: Photo) -> Markup:
 
 def _cell(value: Cell, column: Column) -> str:
     if value is None:
-        return wording.NOTHING
+        return formatting.NOTHING
     if isinstance(value, str):
         return value
-    return wording.gain(value) if column.digits is None else wording.number(value, column.digits)
+    return formatting.gain(value) if column.digits is None else formatting.number(value, column.digits)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.core.errors import InputError
-from app.studies.controller import RECORDED_TAKEOFF, run_controller
+from app.reproductions.controller import RECORDED_TAKEOFF, run_controller
 
 TRACES = Path(__file__).parents[1] / "data" / "vertical_loop"
 

@@ -3,6 +3,8 @@
 Each table lists the gains of the paper's successive flights with the published error and a reference error, which was
 measured once on the vehicle that represents the table's: the original vertical loop closed around JSBSim for Table 1,
 the noise-free twin for Table 2.
+
+The gate of a campaign, applied to the flights of reproductions.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,13 +12,34 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from app.core.definition import Definition
 from app.core.experiments import get_experiment
+from app.core.gate import GateResult, check_policy, require_flyable
+from app.core.policy import Gains
+from app.core.spread import prior_distribution
 from app.core.trajectory import Samples, Trajectory
 from app.figures.panels import Line, Panel, Plot, Style
-from app.studies.gate import overruled_for
-from app.studies.results import OVERRULE, Progress, Result, Row, curve
+from app.reproductions.results import OVERRULE, Progress, Result, Row, curve
 from app.vehicles.base import FlightOptions, OptionValue
-from app.vehicles.open import open_vehicle
+from app.vehicles.open import get_kind, open_vehicle
+
+_CAMPAIGN: Final = Definition(experiment="takeoff", first_step_fraction=1.0)
+"""The default campaign, without a step limit inside its bounds."""
+
+
+def judge_takeoff(gains: Gains) -> GateResult:
+    """Check a takeoff's gains as before the first flight. Takes a tenth of a second."""
+    experiment = get_experiment(_CAMPAIGN.experiment)
+    return check_policy(_CAMPAIGN, experiment, experiment.space, gains, (), spread=prior_distribution(experiment))
+
+
+def overruled_for(gains: Gains, vehicle: str) -> str:
+    """The reason for flying these gains on this kind of vehicle despite the gate's refusal; empty without a refusal.
+
+    Raises GainsError if the refusal cannot be overruled.
+    """
+    return require_flyable(judge_takeoff(gains), overrule=OVERRULE, is_real=get_kind(vehicle).is_real)
+
 
 VEHICLES: Final[Mapping[str, Mapping[str, OptionValue]]] = MappingProxyType({"jsbsim": {}, "twin": {"scatter": 0.0}})
 """Vehicles used by reproductions, with options for flights without noise."""

@@ -11,9 +11,16 @@ from app.common.errors import GainlineError
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob, internal_error
-from app.studies.process import InternalFailure, ProcessDiedError, Progress, StudyError, StudyMessage, StudyProcess
-from app.studies.results import Result
-from app.studies.service import read_order
+from app.reproductions.process import (
+    InternalFailure,
+    ProcessDiedError,
+    Progress,
+    StudyError,
+    StudyMessage,
+    StudyProcess,
+)
+from app.reproductions.results import Result
+from app.reproductions.service import read_order
 
 LOOK_S: Final = 0.5
 """Smallest interval, s, between stored progress reports, and largest delay until a cancelled job is noticed."""

@@ -10,7 +10,7 @@ from app.core.control.replay import OUTPUTS, LoopTrace, compared, replayed
 from app.core.control.vertical_loop import RATE_HZ
 from app.figures.panels import Panel, Plot
 from app.logs.loop_trace import read_loop_trace
-from app.studies.results import Progress, Result, Row, curve
+from app.reproductions.results import Progress, Result, Row, curve
 
 RECORDED_TAKEOFF: Final = Path(__file__).parent / "data" / "takeoff_default.csv.gz"
 """A takeoff at the default gains, computed by the autopilot's own code."""

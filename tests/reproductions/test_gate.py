@@ -4,10 +4,9 @@ import pytest
 
 from app.core.errors import GainsError
 from app.core.policy import Gains
-from app.studies.gate import judge_takeoff, overruled_for
-from app.studies.results import OVERRULE
-from app.studies.tables import TABLES
-from app.studies.variability import POLICIES
+from app.reproductions.results import OVERRULE
+from app.reproductions.tables import TABLES, judge_takeoff, overruled_for
+from app.reproductions.variability import POLICIES
 
 PUBLISHED = [
     *(

@@ -14,9 +14,9 @@ from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
 from app.jobs.schemas import Job
-from app.studies import schemas
-from app.studies.reproductions import REPRODUCTIONS, Reproduction
-from app.studies.results import Result, result_from_json
+from app.reproductions import schemas
+from app.reproductions.registry import REPRODUCTIONS, Reproduction
+from app.reproductions.results import Result, result_from_json
 
 REPRODUCTION_JOB: Final = "reproduction"
 ACTIVE_STATES: Final = (JobState.QUEUED, JobState.RUNNING)

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from app.studies.f16 import BEST_ERROR, showcase, study
+from app.reproductions.f16_campaigns import BEST_ERROR, showcase, study
 from tests.core.flying import compiled_only
 
 pytestmark = compiled_only

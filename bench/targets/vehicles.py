@@ -6,9 +6,8 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+from scipy.stats import qmc
 
-from app.core.control.fixed_point import fix
-from app.core.control.vertical_loop import ALT, POSITION_BITS
 from app.core.descent import minimise_in_box
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Matrix
@@ -17,9 +16,9 @@ from app.core.policy import Gains, Vector
 from app.core.trajectory import Samples, Trajectory
 from app.vehicles.base import OptionValue
 from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, JsbsimFlight
-from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, SET_POINT, TARGET, Integers, Rows
+from app.vehicles.kernels import ALTITUDE, Rows
 from app.vehicles.open import check_options
-from app.vehicles.simulated import GAIN_NAMES, STEPS, TAKEOFF_ALTITUDE_M, Simulation
+from app.vehicles.simulated import Simulation, simulate_takeoff, trajectory_of
 from app.vehicles.twin import TwinFlight
 
 HIGHEST_M: Final = 3.75
@@ -127,16 +126,8 @@ _DRAWS: Final[Mapping[str, Callable[[int, np.random.Generator], SampledVehicle]]
 
 
 def fly(vehicle: SampledVehicle, gains: Gains, seed: int) -> Trajectory:
-    """Fly one takeoff in one call, with the same result as through the vehicle interface.
-
-    For the twin this takes 1.5 ms instead of 30. Gains are 32-bit integers. A flight that diverges numerically has
-    non-finite altitudes.
-    """
-    rows = _rows(vehicle, gains, seed)
-    rows[:, SET_POINT] = TAKEOFF_ALTITUDE_M
-    time_s = np.arange(len(rows), dtype=np.float64) / 512
-    channels = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(CHANNELS)}
-    return Trajectory(time_s, channels, vehicle.kind, "simulation")
+    """Fly one takeoff. A flight that diverges numerically has non-finite altitudes."""
+    return trajectory_of(_rows(vehicle, gains, seed), vehicle.kind)
 
 
 def noise_free_error(vehicle: SampledVehicle, gains: Gains) -> float:
@@ -198,8 +189,6 @@ def _model_of(vehicle: SampledVehicle) -> Vector:
 
 def _model_optimum(model: Vector) -> Vector:
     """The model's best gains: Nelder–Mead from two known local optima and the best six of 128 Sobol points."""
-    from scipy.stats import qmc
-
     space = _TAKEOFF.space
 
     def errors(gains: Matrix) -> Vector:
@@ -242,11 +231,4 @@ def _polish(error: Callable[[Vector], float], start: Vector, coarsest: float, fi
 
 def _rows(vehicle: SampledVehicle, gains: Gains, seed: int) -> Rows:
     simulation = _SIMULATIONS[vehicle.kind]({name: float(value) for name, value in vehicle.options.items()}, seed)
-    return simulation.advance(STEPS, _command(gains))
-
-
-def _command(gains: Gains) -> Integers:
-    command = np.empty(COMMAND_SIZE, dtype=np.int64)
-    altitude = fix(TAKEOFF_ALTITUDE_M, POSITION_BITS)
-    command[[MODE, TARGET, KP, KI, KD]] = (ALT, altitude, *(int(gains[name]) for name in GAIN_NAMES))
-    return command
+    return simulate_takeoff(simulation, gains)

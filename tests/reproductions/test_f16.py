@@ -4,8 +4,8 @@ import pytest
 
 from app.figures.base import card_of
 from app.figures.panels import PanelsFigure
-from app.studies.f16 import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase
-from app.studies.tracking import _BRIEF, _FULL, EXPECTED, _definition, _figures, _method, _methods, _showcase, run_f16
+from app.reproductions.f16 import _BRIEF, _FULL, EXPECTED, _definition, _figures, _method, _methods, _showcase, run_f16
+from app.reproductions.f16_campaigns import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase
 
 
 @pytest.fixture(scope="module")

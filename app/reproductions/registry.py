@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.core.errors import InputError, Problem
-from app.studies.results import Progress, Result
+from app.reproductions.results import Progress, Result
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,31 +31,31 @@ class Reproduction:
 
 
 def _f16(on_progress: Progress, full: bool) -> Result:
-    from app.studies.tracking import run_f16  # noqa: PLC0415
+    from app.reproductions.f16 import run_f16  # noqa: PLC0415
 
     return run_f16(on_progress, full)
 
 
 def _table1(on_progress: Progress, _full: bool) -> Result:
-    from app.studies.tables import run_table  # noqa: PLC0415
+    from app.reproductions.tables import run_table  # noqa: PLC0415
 
     return run_table("table1", "figure7", on_progress)
 
 
 def _table2(on_progress: Progress, _full: bool) -> Result:
-    from app.studies.tables import run_table  # noqa: PLC0415
+    from app.reproductions.tables import run_table  # noqa: PLC0415
 
     return run_table("table2", "figure11", on_progress)
 
 
 def _controller(on_progress: Progress, _full: bool) -> Result:
-    from app.studies.controller import run_controller  # noqa: PLC0415
+    from app.reproductions.controller import run_controller  # noqa: PLC0415
 
     return run_controller(on_progress)
 
 
 def _variability(on_progress: Progress, _full: bool) -> Result:
-    from app.studies.variability import run_variability  # noqa: PLC0415
+    from app.reproductions.variability import run_variability  # noqa: PLC0415
 
     return run_variability(on_progress)
 

@@ -16,9 +16,9 @@ from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob, JobRunner
 from app.jobs.schemas import Job
-from app.studies import service
-from app.studies.service import REPRODUCTION_JOB
-from app.studies.tasks import ReproductionJob
+from app.reproductions import service
+from app.reproductions.service import REPRODUCTION_JOB
+from app.reproductions.tasks import ReproductionJob
 from tests.builders import WORKER
 
 LONG = "variability"

@@ -1,7 +1,7 @@
 import pytest
 
-from app.studies.results import OVERRULE, Result, Row
-from app.studies.tables import TABLES, run_table
+from app.reproductions.results import OVERRULE, Result, Row
+from app.reproductions.tables import TABLES, run_table
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Depends, Path, status
 
 from app.common.schemas import FigureCard, Page, figure_card
 from app.jobs.schemas import Job
-from app.studies import service
-from app.studies.schemas import Reproduction, ReproductionSummary, Run
+from app.reproductions import service
+from app.reproductions.schemas import Reproduction, ReproductionSummary, Run
 from app.web.dependencies import IdempotentPost, Reader, Theme, json_only
 
 router = APIRouter(prefix="/api/reproductions", tags=["reproductions"], dependencies=[Depends(json_only)])

@@ -10,9 +10,9 @@ from fastapi.testclient import TestClient
 from app.core.errors import InputError
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.studies.controller import run_controller
-from app.studies.reproductions import REPRODUCTIONS
-from app.studies.service import REPRODUCTION_JOB
+from app.reproductions.controller import run_controller
+from app.reproductions.registry import REPRODUCTIONS
+from app.reproductions.service import REPRODUCTION_JOB
 from tests.builders import WORKER, get
 
 Json = dict[str, Any]

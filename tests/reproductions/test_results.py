@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.figures.panels import Panel, Plot
-from app.studies.results import OVERRULE, Result, Row, curve, marks, ratio, result_from_json
+from app.reproductions.results import OVERRULE, Result, Row, curve, marks, ratio, result_from_json
 
 LINE = curve("Model", "model", np.arange(3.0), np.array([1, 2, 4]), note="a note")
 RESULT = Result(

@@ -16,8 +16,8 @@ from typing import Final, Self
 
 from app.core.errors import GainlineError, Problem
 from app.processes import process_context
-from app.studies.reproductions import get_reproduction
-from app.studies.results import Result
+from app.reproductions.registry import get_reproduction
+from app.reproductions.results import Result
 
 NICENESS: Final = 10
 SHUTDOWN_TIMEOUT_S: Final = 5.0

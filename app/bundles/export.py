@@ -1,4 +1,7 @@
-"""Export of a campaign: writes rows as the parts of a zip."""
+"""Export of a campaign: writes rows as the parts of a zip.
+
+Export of a campaign as one file, and import with new ids and every number unchanged.
+"""
 
 import hashlib
 import json
@@ -16,6 +19,7 @@ from app.bundles.contents import (
     CONTENTS,
     FORMAT,
     MANIFEST,
+    MAX_CAMPAIGNS,
     VERSION,
     Campaign,
     Contents,
@@ -27,9 +31,10 @@ from app.bundles.contents import (
     Vehicle,
 )
 from app.campaigns import history
+from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of
 from app.common.data_folder import log_of_trial, telemetry_log
-from app.common.errors import ConflictError, StorageError
+from app.common.errors import BusyError, ConflictError, StorageError
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.trajectories import is_intact, refused_for
 from app.db.types import utc_now
@@ -203,3 +208,41 @@ def _not_written(why: str) -> StorageError:
 
 def _json(document: object) -> bytes:
     return json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+
+
+def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[bytes]) -> str:
+    """Write the campaign, after those that it starts from; returns the file name.
+
+    Raises NotFoundError, BusyError while one of them has a flight under way, and ConflictError for more than a bundle
+    holds.
+    """
+    row = campaigns.get_row(session, campaign_id)
+    chain = _chain(session, row)
+    for each in chain:
+        if history.flight_under_way(session, each.id) is not None:
+            raise BusyError(
+                f"Campaign {each.id} has a flight under way.", hint="Wait until it is over, then take the bundle."
+            )
+    Packer(session, data_dir, out).pack(chain)
+    return f"campaign-{row.id}.gainline.zip"
+
+
+def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
+    """The campaign and those that it starts from, the first of them first.
+
+    None can be left out, because the campaign's first gains could not be computed again without it.
+    """
+    chain = [row]
+    while (donor := (chain[0].definition.get("start") or {}).get("donor")) is not None:
+        found = campaigns.get_row(session, donor["campaign_id"])
+        if any(found is known for known in chain):
+            break
+        chain.insert(0, found)
+    if len(chain) > MAX_CAMPAIGNS:
+        raise ConflictError(
+            f"Campaign {row.id} goes back over {len(chain) - 1} warm starts, and a bundle holds {MAX_CAMPAIGNS} "
+            "campaigns: without the first of them its gains could not be computed again.",
+            hint=f"Take the bundle of an earlier one of them (campaign {chain[MAX_CAMPAIGNS - 1].id} is the last that "
+            "fits), or the report and the records of this one.",
+        )
+    return chain

@@ -9,13 +9,15 @@ from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
 from app.bundles.contents import CONTENTS, Campaign, Photo, Proposal, Record, Trial
-from app.bundles.reading import Bundle
+from app.bundles.reader import Bundle
 from app.campaigns import history
+from app.campaigns import service as campaigns
 from app.campaigns.definitions import core_definition
 from app.campaigns.proposals import is_stale, request_proposal
+from app.campaigns.schemas import Campaign as CampaignView
 from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
-from app.common.errors import InputError, Problem
+from app.common.errors import ConflictError, InputError, Problem
 from app.core.checking import problems_of
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.types import utc_now
@@ -190,3 +192,20 @@ def _refused(field: str, reason: str) -> InputError:
     return InputError(
         "This bundle cannot be brought in; nothing was stored.", problems=(Problem(field, reason),), hint=_HINT
     )
+
+
+def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignView:
+    """Import a checked bundle: a new campaign, and those that it starts from.
+
+    Raises InputError for what this version cannot hold, and ConflictError while any flight is active, because a large
+    bundle holds the write lock for longer than a flight may wait.
+    """
+    if (flight := history.any_flight_under_way(session)) is not None:
+        raise ConflictError(
+            f"Campaign {flight.campaign_id} has a flight asked for, staged or under way, and storing a bundle would "
+            "keep its commands and its record waiting.",
+            hint="Bring the bundle in once it has landed, or unstage it.",
+        )
+    arrived = store(session, bundle)
+    keep_telemetry(bundle, arrived, data_dir)
+    return campaigns.get_campaign(session, arrived.rows[-1].id)

@@ -1,0 +1,273 @@
+"""The compared flights, each with its gain group, scatter and vehicle.
+
+Formatting of numbers and flights in sentences.
+
+Settings of a flight, and the differences between several flights.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import history
+from app.campaigns import service as campaigns_service
+from app.campaigns.definitions import definition_of
+from app.common.errors import InputError, Problem
+from app.common.schemas import OptionValue
+from app.compare import repository
+from app.compare.schemas import FlightDifference, FlightSetting
+from app.core.experiments import experiment_of, get_experiment
+from app.core.experiments.base import Experiment
+from app.core.options import Option
+from app.core.statistics import Group, PooledScatter, groups_of, pool_scatter
+from app.core.strategies import STRATEGIES
+from app.core.strategies.history import format_gains
+from app.core.wording import plus_minus
+from app.db.models import CampaignRow, TrialRow
+from app.fleet import service as fleet
+from app.vehicles.base import VehicleOption
+from app.vehicles.open import VEHICLE_KINDS
+
+
+def measured(value: float, standard_error: float | None, unit: str) -> str:
+    """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; the value alone if it has none."""
+    return plus_minus(value, standard_error, unit) if standard_error else f"{value:.3f} {unit}"
+
+
+def percent(confidence: float) -> str:
+    """A confidence as a percentage; `more than 99 %` instead of a value that rounds to certainty."""
+    return "more than 99 %" if confidence > 0.995 else f"{100.0 * confidence:.0f} %"
+
+
+def flights(count: int) -> str:
+    return "1 flight" if count == 1 else f"{count} flights"
+
+
+def named(group: Group, name: str) -> str:
+    """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains and their number of flights."""
+    return f"{name} ({format_gains(group.gains)}; {flights(group.size)})"
+
+
+def capitalised(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
+def names_of(rows: Sequence[TrialRow], campaigns: Mapping[int, CampaignRow]) -> list[str]:
+    """`flight 3`; with the campaign's name if there are several, and with its id if two have the same name."""
+    used = {row.campaign_id: campaigns[row.campaign_id].name for row in rows}
+    if len(used) == 1:
+        return [f"flight {row.number}" for row in rows]
+    alike = Counter(used.values())
+    return [
+        f"flight {row.number} of {(name := used[row.campaign_id])}"
+        + (f" (campaign {row.campaign_id})" if alike[name] > 1 else "")
+        for row in rows
+    ]
+
+
+def file_stem(rows: Sequence[TrialRow]) -> str:
+    """`compare-campaign-3-flights-1-4-campaign-5-flight-2`; only the number of flights if that would be too long."""
+    numbers: dict[int, list[int]] = {}
+    for row in rows:
+        numbers.setdefault(row.campaign_id, []).append(row.number)
+    parts = [
+        f"campaign-{campaign_id}-flight{'s' if len(flown) > 1 else ''}-{'-'.join(map(str, flown))}"
+        for campaign_id, flown in numbers.items()
+    ]
+    stem = "-".join(["compare", *parts])
+    return stem if len(stem) <= 80 else f"compare-{len(rows)}-flights"
+
+
+LABELS: Final = "ABCDEFGHIJKLMNOPQRST"
+MAX_FLIGHTS: Final = len(LABELS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonFlight:
+    """One flight of a comparison.
+
+    `group` holds the valid flights with its gains in its campaign, None if the flight is not one of them. `scatter` is
+    pooled over the compared campaigns of the same `population`: those in which the same vehicle flew the same
+    experiment.
+    """
+
+    row: TrialRow
+    campaign: CampaignRow
+    experiment: Experiment
+    label: str
+    name: str
+    group: Group | None
+    scatter: PooledScatter
+    population: str
+
+
+def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFlight]:
+    """Collect the flights in the given order.
+
+    Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared.
+    """
+    found = repository.trials_by_id(session, trial_ids)
+    campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
+    experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
+    problems = [
+        Problem(f"trial.{index}", reason)
+        for index, trial_id in enumerate(trial_ids)
+        if (reason := _refusal(trial_ids, index, found.get(trial_id), found, experiments)) is not None
+    ]
+    if problems:
+        raise InputError(
+            "These flights cannot be compared.",
+            hint="Leave the named flights out, or choose others.",
+            problems=tuple(problems),
+        )
+    rows = [found[trial_id] for trial_id in trial_ids]
+    groups = {
+        key: groups_of(history.flown_gains(history.trials_of(session, key)))
+        for key in {row.campaign_id for row in rows}
+    }
+    scatters = _scatters(campaigns, experiments, groups)
+    return [
+        ComparisonFlight(
+            row=row,
+            campaign=campaigns[row.campaign_id],
+            experiment=experiments[row.campaign_id],
+            label=label,
+            name=name,
+            group=next((group for group in groups[row.campaign_id] if row.number in group.numbers), None),
+            scatter=scatters[population],
+            population=population,
+        )
+        for row, label, name in zip(rows, LABELS, names_of(rows, campaigns), strict=False)
+        for population in [population_of(campaigns[row.campaign_id])]
+    ]
+
+
+def population_of(campaign: CampaignRow) -> str:
+    """A key common to campaigns whose flights differ only in their gains: same vehicle, settings and experiment.
+
+    For flights made elsewhere the vehicle is not known, so such a campaign is a population of its own.
+    """
+    vehicle = campaign.vehicle
+    if not fleet.can_fly(vehicle):
+        return f"campaign {campaign.id}"
+    options = {} if vehicle.registered else campaign.vehicle_options
+    experiment = [campaign.experiment, definition_of(campaign).experiment_options]
+    return json.dumps([vehicle.id, options, experiment], sort_keys=True)
+
+
+def _scatters(
+    campaigns: Mapping[int, CampaignRow],
+    experiments: Mapping[int, Experiment],
+    groups: Mapping[int, Sequence[Group]],
+) -> dict[str, PooledScatter]:
+    members: dict[str, list[int]] = {}
+    for key in groups:
+        members.setdefault(population_of(campaigns[key]), []).append(key)
+    return {
+        population: pool_scatter([group for key in keys for group in groups[key]], experiments[keys[0]].scatter)
+        for population, keys in members.items()
+    }
+
+
+def _refusal(
+    trial_ids: Sequence[int],
+    index: int,
+    row: TrialRow | None,
+    found: Mapping[int, TrialRow],
+    experiments: Mapping[int, Experiment],
+) -> str | None:
+    """Why the flight at this index cannot be compared, or None if it can."""
+    trial_id = trial_ids[index]
+    if row is None:
+        return f"there is no trial {trial_id}; its campaign may have been deleted"
+    if trial_id in trial_ids[:index]:
+        return f"flight {row.number} of campaign {row.campaign_id} is named twice"
+    if row.state not in history.FLOWN:
+        return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
+    first = next(found[other] for other in trial_ids if other in found)
+    unit, wanted = experiments[row.campaign_id].error_unit, experiments[first.campaign_id].error_unit
+    if unit == wanted:
+        return None
+    return (
+        f"the error of flight {row.number} of campaign {row.campaign_id} is in {unit}, "
+        f"that of flight {first.number} of campaign {first.campaign_id} in {wanted}: they measure different things"
+    )
+
+
+def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
+    """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
+    row, campaign = side.row, side.campaign
+    kind = VEHICLE_KINDS.get(campaign.vehicle.kind)
+    strategy = STRATEGIES[campaign.strategy]
+    options = fleet.options_of(campaign)
+    found = [
+        FlightSetting(title="Vehicle", unit="", value=campaign.vehicle.title),
+        *_options(options, () if kind is None else kind.options),
+        FlightSetting(title="Experiment", unit="", value=side.experiment.title),
+        *_options(campaign.definition["experiment_options"], get_experiment(campaign.experiment).options),
+        FlightSetting(title="Strategy", unit="", value=strategy.title),
+        *_options(campaign.definition["options"], strategy.options),
+        FlightSetting(title="Seed of the campaign", unit="", value=_seed(campaign)),
+    ]
+    if battery:
+        found.append(FlightSetting(title="Battery", unit="", value=battery))
+    if row.landing_battery_v is not None:
+        found.append(FlightSetting(title="Battery after landing", unit="V", value=round(row.landing_battery_v, 2)))
+    said = row.settings.items() - options.items()
+    return found + [FlightSetting(title=name, unit="", value=value) for name, value in sorted(said)]
+
+
+def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[FlightDifference]:
+    """The settings that are not the same in all flights; None for a flight without that setting."""
+    titles = dict.fromkeys((one.title, one.unit) for settings in flights for one in settings)
+    values = [{(one.title, one.unit): one.value for one in settings} for settings in flights]
+    return _differing((title, unit, [own.get((title, unit)) for own in values]) for title, unit in titles)
+
+
+def gain_differences(sides: Sequence[ComparisonFlight]) -> list[FlightDifference]:
+    """The gains that are not the same in all flights."""
+    known = {gain.name: gain for side in sides for gain in side.experiment.space.gains}
+    names = dict.fromkeys(name for side in sides for name in side.row.gains)
+    return _differing(
+        (name, known[name].unit if name in known else "", [side.row.gains.get(name) for side in sides])
+        for name in names
+    )
+
+
+def _seed(campaign: CampaignRow) -> str:
+    """As text, because the difference between two seeds has no meaning."""
+    return str(campaign.definition["seed"])
+
+
+def _options(
+    values: Mapping[str, OptionValue], known: Iterable[Option] | Iterable[VehicleOption]
+) -> list[FlightSetting]:
+    described = {option.name: option for option in known}
+    return [
+        FlightSetting(
+            title=described[name].title if name in described else name,
+            unit=described[name].unit if name in described else "",
+            value=value,
+        )
+        for name, value in values.items()
+    ]
+
+
+def _differing(rows: Iterable[tuple[str, str, list[OptionValue | None]]]) -> list[FlightDifference]:
+    return [
+        FlightDifference(title=title, unit=unit, values=values, changes=[_change(values[0], one) for one in values])
+        for title, unit, values in rows
+        if any(one != values[0] for one in values)
+    ]
+
+
+def _change(first: OptionValue | None, value: OptionValue | None) -> int | float | None:
+    if any(one is None or isinstance(one, bool | str) for one in (first, value)):
+        return None
+    assert isinstance(first, int | float)
+    assert isinstance(value, int | float)
+    return value - first

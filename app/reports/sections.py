@@ -1,0 +1,289 @@
+"""A campaign's frozen settings, as titles and values: what was tuned, and how.
+
+Content of a report as plain data; `service` collects it, `rendering` formats it.
+
+Anomalies of a campaign, in the order of the flights.
+
+Notes and photos of the flights, limited to a file size that can still be sent.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final, Protocol
+
+from sqlalchemy.orm import Session
+
+from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
+from app.campaigns.trials.schemas import Trial
+from app.common.states import AbortCause
+from app.core.definition import OptionValue
+from app.core.experiments import EXPERIMENTS
+from app.core.experiments.base import Experiment
+from app.core.policy import Gain
+from app.core.strategies import STRATEGIES
+from app.db.models import TrialPhotoRow
+from app.figures.base import Card
+from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
+from app.reports import repository
+from app.reports.formatting import count, gain, gains, number, option, percent
+from app.vehicles.open import VEHICLE_KINDS
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One setting: title and value."""
+
+    title: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Anomaly:
+    """An anomaly: its flight (None if it belongs to none), its kind, and a description."""
+
+    flight: int | None
+    kind: str
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Photo:
+    """An unmodified photo."""
+
+    media_type: str
+    data: bytes
+    added_at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Remark:
+    """Remarks on a trial: its note, the photos that fit into the report, and the number of those left out."""
+
+    trial: Trial
+    photos: tuple[Photo, ...]
+    left_out: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """A campaign as the API returns it, with its settings in words and its figures drawn for a light page.
+
+    `remarks` are in the order of the trials, with at most `photo_bytes` of photos in all; `what` was tuned and `how`;
+    `anomalies` are in the order of the flights; `made_at` is the time of creation, by program `version`.
+    """
+
+    campaign: Campaign
+    statistics: CampaignStatistics
+    trials: tuple[Trial, ...]
+    gains: tuple[Gain, ...]
+    what: tuple[Fact, ...]
+    how: tuple[Fact, ...]
+    cards: tuple[Card, ...]
+    remarks: tuple[Remark, ...]
+    photo_bytes: int
+    anomalies: tuple[Anomaly, ...]
+    version: str
+    made_at: datetime
+
+    @property
+    def flown(self) -> tuple[Trial, ...]:
+        """Trials that left the ground: those in the table of runs."""
+        return tuple(trial for trial in self.trials if trial.state in FLOWN)
+
+
+FLOWN = frozenset({"captured", "valid", "aborted", "invalid", "lost"})
+
+
+_STARTS: Final = {
+    "default": "the vehicle's default gains",
+    "simplex": "the optimum of the simple model (simplex)",
+    "given": "given gains",
+    "campaign": "the best of another campaign",
+}
+
+
+class _Described(Protocol):
+    """A setting of an experiment, a strategy or a vehicle."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+
+
+def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Identity | None) -> tuple[Fact, ...]:
+    """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
+    vehicle = campaign.vehicle
+    kind = VEHICLE_KINDS.get(vehicle.kind)
+    facts = [
+        Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})"),
+        Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation, nothing left the ground"),
+    ]
+    if identity is not None:
+        known = f"{identity.autopilot} {identity.version}".strip()
+        hardware = f", hardware id {identity.uid}" if identity.uid else ""
+        facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}"))
+    facts += _options(vehicle.options, () if kind is None else kind.options)
+    facts.append(Fact("Experiment", experiment.title))
+    facts += _options(campaign.definition.experiment_options, experiment.options)
+    facts += [
+        Fact(
+            f"Gain {each.name}",
+            f"{each.title}{f' ({each.unit})' if each.unit else ''}, {gain(each.lower)} … {gain(each.upper)}",
+        )
+        for each in experiment.space.gains
+    ]
+    return tuple(facts)
+
+
+def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:
+    """Strategy, start, bounds and stop rule, each with its settings."""
+    definition = campaign.definition
+    strategy = STRATEGIES.get(definition.strategy)
+    facts = [Fact("Strategy", definition.strategy if strategy is None else strategy.title)]
+    facts += _options(definition.options, () if strategy is None else strategy.options)
+    facts.append(Fact("Start", _start(definition.start)))
+    facts += [
+        Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}") for name, (low, high) in definition.bounds.items()
+    ]
+    first, later = percent(definition.first_step_fraction), percent(definition.step_fraction)
+    facts.append(Fact("Largest step", f"{first} of each gain's range until a flight is valid, then {later}"))
+    if experiment.output == "altitude_m":
+        facts.append(Fact("Ceiling of the gate", f"{definition.ceiling_m:g} m"))
+    facts.append(Fact("Stop rule", _stop(definition.stop)))
+    facts.append(Fact("Seed", str(definition.seed)))
+    return tuple(facts)
+
+
+def experiment_of(campaign: Campaign) -> Experiment:
+    """The campaign's experiment with its settings."""
+    return EXPERIMENTS[campaign.definition.experiment].configured(campaign.definition.experiment_options)
+
+
+def _options(chosen: Mapping[str, OptionValue], known: Iterable[_Described]) -> Iterator[Fact]:
+    described = {each.name: each for each in known}
+    for name, value in chosen.items():
+        found = described.get(name)
+        if value != "":
+            yield Fact(name, option(value)) if found is None else Fact(found.title, option(value, found.unit))
+
+
+def _start(start: Start) -> str:
+    words = _STARTS[start.kind]
+    if start.donor is not None:
+        words = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
+    return words if start.gains is None else f"{words}: {gains(start.gains)}"
+
+
+def _stop(stop: StopRule) -> str:
+    most = f"at most {count(stop.max_flights, 'flight')}"
+    match stop.kind:
+        case "paper":
+            said = f"two flights in a row less than {percent(stop.improvement)} better than the best; {most}"
+        case "noise":
+            sure = percent(stop.confidence)
+            said = f"nothing left that flights could tell from noise with {sure} confidence; {most}"
+        case _:
+            said = most
+    return said if stop.min_battery_v is None else f"{said}; or a flight that ends below {stop.min_battery_v:g} V"
+
+
+_ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
+_CAUSES: Final[Mapping[AbortCause, str]] = {
+    "limit": "(A limit was met: it counts against the gains.)",
+    "operator": "(Broken off by the operator, who has not said why: it does not count against the gains.)",
+    "behaved badly": "(The vehicle behaved badly, says the operator: it counts against the gains.)",
+    "something else": "(The operator had another reason: it does not count against the gains.)",
+}
+
+
+def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
+    """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
+    for trial in trials:
+        if (kind := _ENDINGS.get(trial.state)) is not None:
+            yield Anomaly(trial.number, kind, f"{trial.reason or 'No reason was given.'}{_counting(trial)}")
+        if trial.overrule_reason:
+            refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
+            yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} The gate had said: {refused}")
+        if trial.read_back is not None and trial.read_back != trial.gains:
+            sentence = f"Planned {gains(trial.gains)}; the vehicle read back {gains(trial.read_back)}."
+            yield Anomaly(trial.number, "Other gains read back", sentence)
+        for glitch in trial.glitches:
+            yield Anomaly(trial.number, "Glitch in the record", glitch.sentence)
+        if trial.glitches and trial.repaired_error is not None:
+            repaired = f"Without the glitches the error would be {number(trial.repaired_error)} {error_unit}."
+            yield Anomaly(trial.number, "Glitch in the record", repaired)
+        if trial.flight is not None and trial.flight.problem:
+            yield Anomaly(trial.number, "Trouble with the vehicle", trial.flight.problem)
+
+
+def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
+    """Flights, by number, whose stored record does not match its checksum."""
+    for number_of_flight in damaged:
+        yield Anomaly(
+            number_of_flight,
+            "Damaged record",
+            "Its stored record does not fit its checksum. Its curve here is the coarse one that was made at its "
+            "landing, and its error is the one computed then; take the record from an earlier backup.",
+        )
+
+
+def _counting(trial: Trial) -> str:
+    """Whether an aborted flight counts against its gains, if that is known."""
+    if trial.state != "aborted" or trial.abort_cause is None:
+        return ""
+    return f" {_CAUSES[trial.abort_cause]}"
+
+
+def of_vehicle(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    acts: Iterable[VehicleAct],
+    ledger: Iterable[GivenGains],
+    trials: Iterable[Trial],
+) -> Iterator[Anomaly]:
+    """Safe gains that could not be verified after a flight, quarantine, and releases from it during the campaign."""
+    numbers = {trial.id: trial.number for trial in trials}
+    for line in ledger:
+        if line.purpose == "restore after flight" and line.campaign_id == campaign.id and line.outcome == "failed":
+            sentence = f"Safe gains {gains(line.asked)} were not read back after the flight."
+            flight = None if line.trial_id is None else numbers.get(line.trial_id)
+            yield Anomaly(flight, "Safe gains not verified", sentence)
+    if vehicle.state == "quarantined":
+        yield Anomaly(None, "Quarantine", f"{vehicle.name} is quarantined: {vehicle.concern}")
+    for act in acts:
+        if act.kind == "release" and campaign.created_at <= act.requested_at <= campaign.updated_at:
+            by = f" by {act.by}" if act.by else ""
+            yield Anomaly(None, "Quarantine", f"Released{by} during the campaign: {act.reason}")
+
+
+MAX_BYTES: Final = 24 * 2**20
+"""Limit for all photos together, in original size; they take a third more in the file."""
+
+
+def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
+    """Remarks of the trials that have any, in order."""
+    photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
+    for row, size in repository.photos(session, campaign_id):
+        photos.setdefault(row.trial_id, []).append((row, size))
+    kept = _fitting(photos)
+    for trial in trials:
+        own = photos.get(trial.id, [])
+        if not trial.note and not own:
+            continue
+        shown = [Photo(row.media_type, row.data, row.added_at) for row, _ in own if row.id in kept]
+        yield Remark(trial=trial, photos=tuple(shown), left_out=len(own) - len(shown))
+
+
+def _fitting(photos: dict[int, list[tuple[TrialPhotoRow, int]]]) -> set[int]:
+    """Ids of the photos that fit: the first photo of each trial comes before the second of any."""
+    kept, room = set[int](), MAX_BYTES
+    turns = sorted((place, row.id, size) for own in photos.values() for place, (row, size) in enumerate(own))
+    for _, photo_id, size in turns:
+        if size <= room:
+            kept.add(photo_id)
+            room -= size
+    return kept
