@@ -26,6 +26,9 @@ from pathlib import Path
 from typing import Final
 
 from app.core.clock import ScaledClock
+from app.simdrone.body import new_body
+from app.simdrone.drone import Drone, Server
+from app.simdrone.registry import get_autopilot
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.dialects import Message, number
@@ -36,10 +39,6 @@ from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialResult
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.simdrone.autopilots.registry import get_autopilot
-from app.vehicles.simdrone.body import new_body
-from app.vehicles.simdrone.drone import Drone
-from app.vehicles.simdrone.server import Server
 
 CORE_SHARE_LIMIT: Final = 0.1
 DEFAULT_S: Final = 30.0

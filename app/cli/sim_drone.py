@@ -8,16 +8,15 @@ from types import FrameType
 from app.cli.console import console
 from app.common.errors import InputError, Problem
 from app.core.clock import ScaledClock
+from app.simdrone.body import new_body
+from app.simdrone.drone import Drone, Server
+from app.simdrone.faults import parse_fault
+from app.simdrone.motion_capture import open_outlet
+from app.simdrone.registry import get_autopilot
 from app.vehicles.mavlink.addresses import Address, UdpInAddress, is_loopback, parse
 from app.vehicles.mavlink.transports import open_transport
 from app.vehicles.mocap.addresses import NatNetAddress, SourceAddress, StreamAddress
 from app.vehicles.mocap.addresses import parse as parse_source
-from app.vehicles.simdrone.autopilots.registry import get_autopilot
-from app.vehicles.simdrone.body import new_body
-from app.vehicles.simdrone.cameras import open_outlet
-from app.vehicles.simdrone.drone import Drone
-from app.vehicles.simdrone.faults import parse_fault
-from app.vehicles.simdrone.server import Server
 
 
 def run_sim_drone(

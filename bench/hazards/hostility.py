@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
+from app.simdrone.drone import Drone
 from app.vehicles.mavlink.dialects import Codec, Dialect, FieldValue, Message, number
-from app.vehicles.simdrone.drone import Drone
 
 COMPANION: Final = 191
 ONBOARD_CONTROLLER: Final = 18

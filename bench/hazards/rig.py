@@ -5,14 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from app.simdrone.body import new_body
+from app.simdrone.drone import BOOT_S, Drone, Lockstep
+from app.simdrone.motion_capture import VehicleLinkOutput
+from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue, StopRequest
 from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.mavlink.kind import MAVLINK
-from app.vehicles.simdrone.autopilots.registry import get_autopilot
-from app.vehicles.simdrone.body import new_body
-from app.vehicles.simdrone.cameras import VehicleLinkOutput
-from app.vehicles.simdrone.drone import BOOT_S, Drone
-from app.vehicles.simdrone.lockstep import Lockstep
 from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case, Mishap
 from bench.hazards.stages import Stage, Stages
 from bench.hazards.wire import DIALECTS, GAINS, Order, order, stops_motors

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.core.trajectory import Trajectory
-from app.vehicles.simdrone.faults import FAULTS
+from app.simdrone.faults import FAULTS
 from bench.hazards.cases import SAFE, TUNED, Case, Mishap
 from bench.hazards.expectations import EXPECTED
 from bench.hazards.hostile import carry_out, cases

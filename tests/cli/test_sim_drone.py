@@ -11,8 +11,8 @@ from pymavlink.dialects.v10 import paparazzi as mavlink
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
-from app.vehicles.simdrone.autopilots.registry import AUTOPILOTS
-from app.vehicles.simdrone.faults import FAULTS
+from app.simdrone.faults import FAULTS
+from app.simdrone.registry import AUTOPILOTS
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "sim-drone.md").read_text()
 GAINLINE = Path(sys.executable).parent / "gainline"

@@ -17,6 +17,10 @@ from typing import Final, Self
 import pytest
 
 from app.core.policy import Gains
+from app.simdrone.body import TICK_S
+from app.simdrone.drone import Lockstep
+from app.simdrone.motion_capture import open_outlet
+from app.simdrone.registry import Make
 from app.vehicles import open as open_module
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
@@ -28,12 +32,8 @@ from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
-from app.vehicles.simdrone.autopilots.registry import Make
-from app.vehicles.simdrone.body import TICK_S
-from app.vehicles.simdrone.cameras import open_outlet
-from app.vehicles.simdrone.lockstep import Lockstep
+from tests.simdrone.ground import switched_on
 from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
-from tests.vehicles.simdrone.ground import switched_on
 
 SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 283, "ki": 13, "kd": 82},

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from app.simdrone import faults
+from app.simdrone.body import OutgoingMessage
+from app.simdrone.faults import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY
@@ -17,9 +20,6 @@ from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.measurements import VehicleEvent
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.simdrone import faults
-from app.vehicles.simdrone.autopilots.base import OutgoingMessage
-from app.vehicles.simdrone.faults import Fault, FaultTarget
 from tests.vehicles.flying import never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_connected import connected

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import pytest
 
+from app.simdrone.body import Autopilot, Body, OutgoingMessage
+from app.simdrone.paparazzi import HOME, NAV, Paparazzi
+from app.simdrone.registry import Make
 from app.vehicles.base import FlightOptions, FlightRecord
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.simdrone.autopilots.base import Autopilot, OutgoingMessage
-from app.vehicles.simdrone.autopilots.paparazzi.autopilot import HOME, NAV, Paparazzi
-from app.vehicles.simdrone.autopilots.registry import Make
-from app.vehicles.simdrone.body import Body
 from tests.vehicles.flying import SAFE, TUNED, never, unwatched
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import connected

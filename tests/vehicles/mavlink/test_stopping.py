@@ -4,17 +4,15 @@ from contextlib import closing
 
 import pytest
 
+from app.simdrone.body import Autopilot, Body
+from app.simdrone.paparazzi import Paparazzi
+from app.simdrone.paparazzi_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
+from app.simdrone.registry import Make
 from app.vehicles.base import FlightOptions, FlightRecord, StopRequest
 from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.simdrone.autopilots.base import Autopilot
-from app.vehicles.simdrone.autopilots.paparazzi.autopilot import Paparazzi
-from app.vehicles.simdrone.autopilots.paparazzi.plan import LANDED_AFTER_S
-from app.vehicles.simdrone.autopilots.paparazzi.settings import KILL_SETTING, NEWER_KILL_SETTING
-from app.vehicles.simdrone.autopilots.registry import Make
-from app.vehicles.simdrone.body import Body
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import connected

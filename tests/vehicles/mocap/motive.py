@@ -6,9 +6,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
+from app.simdrone.motion_capture import MocapOutput, MotionCapture, open_outlet
 from app.vehicles.mavlink.sources import AltitudeSource, SourceSample
 from app.vehicles.mocap.addresses import SourceAddress
-from app.vehicles.simdrone.cameras import MocapOutput, MotionCapture, open_outlet
 
 LOOPBACK: Final = "127.0.0.1"
 

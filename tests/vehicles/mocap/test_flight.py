@@ -12,10 +12,10 @@ from app.core.glitches import find_glitches
 from app.vehicles.base import FlightRecord, OptionValue
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.kind import MAVLINK
+from tests.simdrone.ground import free_port
 from tests.vehicles.flying import SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_vehicle import fly
-from tests.vehicles.simdrone.ground import free_port
 
 
 def natnet(port: int) -> str:

@@ -10,13 +10,13 @@ from dataclasses import replace
 import pytest
 
 from app.core.clock import ScaledClock
+from app.simdrone.motion_capture import MocapFrame, NatNetServer, frame_packet
 from app.vehicles.errors import VehicleError
 from app.vehicles.mocap import natnet
 from app.vehicles.mocap.addresses import NatNetAddress
 from app.vehicles.mocap.natnet import NatNetSource
-from app.vehicles.simdrone.cameras import MocapFrame, NatNetServer, frame_packet
+from tests.simdrone.ground import free_port
 from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
-from tests.vehicles.simdrone.ground import free_port
 
 CLOCK = ScaledClock()
 

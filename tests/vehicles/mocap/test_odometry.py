@@ -17,8 +17,8 @@ from app.vehicles.mocap import odometry
 from app.vehicles.mocap.addresses import StreamAddress
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource
 from app.vehicles.mocap.opening import open_source
+from tests.simdrone.ground import free_port
 from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
-from tests.vehicles.simdrone.ground import free_port
 
 CLOCK = ScaledClock()
 FROM_ZERO = dict.fromkeys(("x", "y", "roll", "pitch", "yaw"), 0.0)

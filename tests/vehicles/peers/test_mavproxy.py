@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from app.core.clock import ScaledClock
-from app.vehicles.simdrone.drone import Drone
+from app.simdrone.drone import Drone
+from tests.simdrone.ground import eventually, free_port, served
+from tests.simdrone.paparazzi import CLIMB, HOLDING_POINT, LAND_HERE, START_ENGINE, SYSTEM, TAKEOFF
 from tests.vehicles.peers.mavproxy import MavProxy
-from tests.vehicles.simdrone.ground import eventually, free_port, served
-from tests.vehicles.simdrone.paparazzi import CLIMB, HOLDING_POINT, LAND_HERE, START_ENGINE, SYSTEM, TAKEOFF
 
 SPEED = 5.0
 PATIENCE_S = 60.0

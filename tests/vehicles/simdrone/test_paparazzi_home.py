@@ -2,11 +2,11 @@
 
 import pytest
 
-from app.vehicles.simdrone.autopilots.paparazzi.autopilot import HOME, NAV, Paparazzi
-from app.vehicles.simdrone.autopilots.paparazzi.plan import HOME_HEIGHT_M
-from app.vehicles.simdrone.body import Body
-from tests.vehicles.simdrone.ground import Ground, flying
-from tests.vehicles.simdrone.paparazzi import ARMED, LAND, LAND_HERE, Pilot, from_vehicle
+from app.simdrone.body import Body
+from app.simdrone.paparazzi import HOME, NAV, Paparazzi
+from app.simdrone.paparazzi_plan import HOME_HEIGHT_M
+from tests.simdrone.ground import Ground, flying
+from tests.simdrone.paparazzi import ARMED, LAND, LAND_HERE, Pilot, from_vehicle
 
 TUNED = (1624, 1356, 195)
 NEAR_M = 6.0

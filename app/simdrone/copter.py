@@ -1,0 +1,452 @@
+"""The MAVLink 2 services that ArduPilot and PX4 share: parameters, commands, modes, rates, failsafes."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Final, Self
+
+from app.simdrone import copter_telemetry
+from app.simdrone.body import (
+    ACCEPTED,
+    FAILED,
+    TEMPORARILY_REJECTED,
+    TICK_S,
+    UNSUPPORTED,
+    Body,
+    OutgoingMessage,
+    Timetable,
+    whole_ticks,
+)
+from app.simdrone.copter_control import AltitudeGuidance, Cascade, Phase
+from app.simdrone.copter_parameters import Behaviour, FirmwareProfile, FlightMode, Parameters, Reaction
+from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
+
+COMPONENT: Final = 1
+FORCE: Final = 21196
+"""The second parameter of 400 that makes it unconditional."""
+
+ESTIMATE_AFTER_S: Final = 3.0
+"""Since the start, until the position is known well enough to arm and to be told."""
+_ESTIMATED: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
+_SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
+"""The hardware id of a simulated drone, but for its last byte."""
+_GROUND_STATION: Final = 6
+_LIST_EVERY_TICKS: Final = 2
+_TELL_TICKS: Final = whole_ticks(30.0)
+_TEXT_LENGTH: Final = 50
+_LAST_TEXT: Final = 65535
+_ACTIVE: Final = 4
+_STANDBY: Final = 3
+_ALTITUDE_BREACH: Final = 2
+_CUSTOM_MODE: Final = 1
+
+# MAV_CMD
+LAND: Final = 21
+TAKE_OFF: Final = 22
+SET_MODE: Final = 176
+ARM_DISARM: Final = 400
+RUN_PREARM_CHECKS: Final = 401
+GET_HOME: Final = 410
+SET_INTERVAL: Final = 511
+REQUEST_MESSAGE: Final = 512
+REQUEST_CAPABILITIES: Final = 520
+
+
+class Copter(ABC):
+    """One autopilot from switching on; see `Autopilot`."""
+
+    firmware: ClassVar[FirmwareProfile]
+
+    def __init__(self, body: Body, cascade: Cascade, *, system: int) -> None:
+        self.dialect = self.firmware.dialect
+        self.system, self.component = system, COMPONENT
+        self.uid = _SIMULATED | system
+        self.refuses_arming = False
+        self.ignores_parameters = False
+        self.took_off = False
+        self.estimate_after_s = ESTIMATE_AFTER_S
+        self.armed = False
+        self.mode = self.firmware.modes[0]
+        self.parameters = Parameters(self.firmware.parameters)
+        self.flyer = AltitudeGuidance(body, cascade)
+        self._body = body
+        self._codec = self.dialect.codec(system=system, component=COMPONENT)
+        self._ticks = 0
+        self._armed_s = 0.0
+        self._ground_heard_s: float | None = None
+        self._is_breached = False
+        self._breaches = 0
+        self._listing: int | None = None
+        self._texts = 0
+        self._timetable = Timetable.from_periods(self.firmware.periods_s)
+        self._out: list[OutgoingMessage] = []
+        self.tune()
+
+    # ------------------------------------------------------------ what differs
+
+    @abstractmethod
+    def tune(self) -> None:
+        """Hand the parameters to the controller."""
+
+    @abstractmethod
+    def requested_mode(self, main: int, sub: int) -> FlightMode | None:
+        """The mode that command 176 asks for."""
+
+    @abstractmethod
+    def take_off(self, param7: float) -> int:
+        """Obey command 22; the result."""
+
+    @abstractmethod
+    def landing_speed_m_s(self) -> float: ...
+
+    @abstractmethod
+    def link_loss(self) -> tuple[float, Reaction]:
+        """After how many seconds without a ground station, and what then."""
+
+    @abstractmethod
+    def fence(self) -> tuple[float, Reaction]:
+        """Above which altitude, and what then."""
+
+    @abstractmethod
+    def idle_limit_s(self) -> float:
+        """How long it stays armed on the ground."""
+
+    def counts_heartbeat(self, _message: Message) -> bool:
+        """Whether this ground station's heartbeat counts."""
+        return True
+
+    def prearm_failure(self) -> str | None:
+        """Why its own checks before arming do not pass, as it tells all the time; None when they do."""
+        return self.firmware.no_estimate if self.refuses_arming or not self._has_estimate else None
+
+    @property
+    def _has_estimate(self) -> bool:
+        return self.boot_s >= self.estimate_after_s
+
+    # ------------------------------------------------------------ time
+
+    @property
+    def boot_s(self) -> float:
+        return self._ticks * TICK_S
+
+    def receive(self, data: bytes) -> None:
+        for message in self._codec.parse(data):
+            handler = _HANDLERS.get(message.get_type()) if is_known(message) else None
+            if handler is not None and getattr(message, "target_system", 0) in (0, self.system):
+                handler(self, message)
+
+    def tick(self) -> list[OutgoingMessage]:
+        self._ticks += 1
+        was_flying = self.flyer.flies
+        self.flyer.tick()
+        if was_flying and not self.flyer.flies:
+            self._disarm()
+        self._watch_idling()
+        self._watch_link()
+        self._watch_fence()
+        self._report()
+        self._tell_readiness()
+        out, self._out = self._out, []
+        return out
+
+    def restore_persistent(self, before: Self) -> None:
+        """A reboot: parameters are stored, and the hardware is the same."""
+        self.parameters, self.uid = before.parameters, before.uid
+        self.tune()
+
+    # ------------------------------------------------------------ flying
+
+    def climb(self, height_m: float, speed_m_s: float) -> None:
+        """Take off, or climb on."""
+        self.took_off = True
+        self.flyer.take_off(height_m, speed_m_s)
+
+    def enter(self, mode: FlightMode) -> None:
+        self.mode = mode
+        match mode.behaviour:
+            case Behaviour.LAND:
+                self.flyer.land(self.landing_speed_m_s())
+            case Behaviour.STAY:
+                self.flyer.hold()
+            case Behaviour.TAKE_OFF:
+                if self.armed:
+                    self.take_off(float("nan"))
+
+    @property
+    def is_by_hand(self) -> bool:
+        return self.mode.name == self.firmware.by_hand
+
+    def take_over(self) -> None:
+        self.enter(self.find_mode(self.firmware.by_hand))
+
+    def hand_back(self) -> None:
+        self.enter(self.find_mode(self.firmware.automatic))
+
+    def held(self, parameter: str) -> float:
+        return self.parameters[parameter]
+
+    def find_mode(self, name: str) -> FlightMode:
+        return next(mode for mode in self.firmware.modes if mode.name == name)
+
+    def _arm(self, *, force: bool) -> int:
+        reason = None if force and not self.refuses_arming else self.arming_refusal()
+        if reason is not None:
+            self.say(reason)
+            return self.firmware.refused
+        if not self.armed:
+            self.armed, self._armed_s = True, self.boot_s
+            if self.mode.behaviour is Behaviour.TAKE_OFF:
+                self.enter(self.mode)
+        return ACCEPTED
+
+    def arming_refusal(self) -> str | None:
+        if reason := Copter.prearm_failure(self):
+            return reason
+        return None if self.mode.may_arm else self.firmware.not_armable
+
+    def _disarm(self) -> None:
+        self.armed = False
+        self.flyer.stop()
+
+    def _watch_idling(self) -> None:
+        limit_s = self.idle_limit_s()
+        if self.armed and not self.flyer.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
+            self._disarm()
+
+    def _watch_link(self) -> None:
+        """A ground station that was never heard cannot be lost."""
+        limit_s, reaction = self.link_loss()
+        if reaction is Reaction.NONE or self._ground_heard_s is None or not self.flyer.flies:
+            return
+        if self.boot_s - self._ground_heard_s > limit_s:
+            self._ground_heard_s = None
+            self._react(reaction, self.firmware.link_lost)
+
+    def _watch_fence(self) -> None:
+        limit_m, reaction = self.fence()
+        is_outside = reaction is not Reaction.NONE and self.flyer.flies and self._body.altitude_m > limit_m
+        was_outside, self._is_breached = self._is_breached, is_outside
+        if is_outside and not was_outside:
+            self._breaches += 1
+            self.send("FENCE_STATUS")
+            self._react(reaction, self.firmware.fence_breached)
+
+    def _tell_readiness(self) -> None:
+        if not self.armed and self._ticks % _TELL_TICKS == 0:
+            self.tell_checks()
+
+    def tell_checks(self) -> None:
+        """What its own checks before arming found, where they do not pass."""
+        if (reason := self.prearm_failure()) is not None:
+            self.say(self.firmware.unready + reason)
+
+    def _react(self, reaction: Reaction, reason: str) -> None:
+        self.say(reason)
+        if reaction is Reaction.LAND:
+            self.enter(self.find_mode(self.firmware.land))
+        elif reaction is Reaction.HOLD:
+            self.enter(self.find_mode(self.firmware.hold))
+
+    # ------------------------------------------------------------ sending
+
+    def say(self, words: str) -> None:
+        """STATUSTEXT, as critical; what does not fit into one goes in several, under one number."""
+        self._texts = self._texts % _LAST_TEXT + 1 if len(words) > _TEXT_LENGTH else self._texts
+        for chunk, start in enumerate(range(0, len(words), _TEXT_LENGTH)):
+            number = self._texts if len(words) > _TEXT_LENGTH else 0
+            text = words[start : start + _TEXT_LENGTH]
+            self._out.append(
+                OutgoingMessage("STATUSTEXT", {"severity": 2, "text": text, "id": number, "chunk_seq": chunk})
+            )
+
+    def send(self, kind: str) -> None:
+        """One of the reports, now."""
+        self._out.append(OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(self._snapshot())))
+
+    def _report(self) -> None:
+        if self._listing is not None and self._ticks % _LIST_EVERY_TICKS == 0:
+            self._send_parameter(self._listing)
+            self._listing = self._listing + 1 if self._listing + 1 < len(self.parameters) else None
+        due = [kind for kind in self._timetable.due(self._ticks) if self._has_estimate or kind not in _ESTIMATED]
+        if due:
+            now = self._snapshot()
+            self._out += [OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(now)) for kind in due]
+
+    def _snapshot(self) -> copter_telemetry.Snapshot:
+        body, manners = self._body, self.firmware
+        return copter_telemetry.Snapshot(
+            boot_s=self.boot_s,
+            north_m=body.north_m,
+            north_m_s=body.north_m_s,
+            local_m=body.altitude_m + manners.ground_m,
+            altitude_m=body.altitude_m,
+            climb_rate_m_s=body.climb_rate_m_s,
+            thrust=body.thrust,
+            battery_v=body.battery_v,
+            armed=self.armed,
+            autopilot=manners.autopilot,
+            base_mode=self.mode.base_mode,
+            custom_mode=self.mode.custom_mode,
+            status=_ACTIVE if self.flyer.flies else _STANDBY,
+            landed_state=_LANDED_STATES[self.flyer.phase],
+            version=manners.version,
+            uid=self.uid,
+            breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
+            breaches=self._breaches,
+            ready=self.prearm_failure() is None,
+        )
+
+    def _send_parameter(self, place: int) -> None:
+        parameter, value = self.parameters.at(place)
+        fields: dict[str, FieldValue] = {
+            "param_id": parameter.name,
+            "param_value": self.firmware.coding.encode(value, parameter.kind),
+            "param_type": int(parameter.kind),
+            "param_count": len(self.parameters),
+            "param_index": place,
+        }
+        self._out.append(OutgoingMessage("PARAM_VALUE", fields))
+
+    def _acknowledge(self, message: Message, command: int, result: int) -> None:
+        sender = {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
+        fields = {"command": command, "result": result, "progress": 0, "result_param2": 0, **sender}
+        self._out.append(OutgoingMessage("COMMAND_ACK", fields))
+
+    # ------------------------------------------------------------ hearing
+
+    def _hear_heartbeat(self, message: Message) -> None:
+        if number(message, "type") == _GROUND_STATION and self.counts_heartbeat(message):
+            self._ground_heard_s = self.boot_s
+
+    def _hear_param_list(self, _message: Message) -> None:
+        self._listing = 0
+
+    def _hear_param_read(self, message: Message) -> None:
+        """What does not exist is met with silence."""
+        index = int(number(message, "param_index"))
+        place = self.parameters.place(text(message, "param_id")) if index < 0 else index
+        if place is not None and place < len(self.parameters):
+            self._send_parameter(place)
+
+    def _hear_param_set(self, message: Message) -> None:
+        """Answered with what is held then, whatever that is; no range is checked."""
+        place = self.parameters.place(text(message, "param_id"))
+        if place is None or self.ignores_parameters:
+            return
+        parameter, _ = self.parameters.at(place)
+        coding = self.firmware.coding
+        fits = not coding.is_strict or number(message, "param_type") == parameter.kind
+        value = coding.decode(number(message, "param_value"), parameter.kind)
+        if fits and value is not None:
+            self.parameters[parameter.name] = value
+            self.tune()
+        self._send_parameter(place)
+
+    def _hear_set_mode(self, message: Message) -> None:
+        """The older way, without an answer."""
+        custom = int(number(message, "custom_mode"))
+        mode = next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
+        if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
+            self.enter(mode)
+
+    def _hear_data_stream(self, message: Message) -> None:
+        """The older way to ask for telemetry, all of it at one rate."""
+        rate_hz = number(message, "req_message_rate") if number(message, "start_stop") else 0.0
+        for kind in self.firmware.streams:
+            self._timetable.set(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
+
+    def _hear_command(self, message: Message) -> None:
+        command = int(number(message, "command"))
+        obey = _COMMANDS.get(command)
+        result = UNSUPPORTED if obey is None else obey(self, message)
+        self._acknowledge(message, command, result)
+
+    def _handle_arm(self, message: Message) -> int:
+        force = number(message, "param2") == FORCE
+        if number(message, "param1") > 0.5:
+            return self._arm(force=force)
+        if not (self.flyer.is_landed or force):
+            self.say(self.firmware.not_landed)
+            return self.firmware.refused
+        self._disarm()
+        return ACCEPTED
+
+    def _obey_mode(self, message: Message) -> int:
+        main, sub = number(message, "param2"), number(message, "param3")
+        mode = self.requested_mode(_whole(main), _whole(sub))
+        if mode is None or not _whole(number(message, "param1")) & _CUSTOM_MODE:
+            return FAILED
+        self.enter(mode)
+        return ACCEPTED
+
+    def _obey_take_off(self, message: Message) -> int:
+        return self.take_off(number(message, "param7"))
+
+    def _obey_land(self, _message: Message) -> int:
+        self.enter(self.find_mode(self.firmware.land))
+        return ACCEPTED
+
+    def _obey_interval(self, message: Message) -> int:
+        """Microseconds; 0 is the default, below that never."""
+        kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        if kind is None:
+            return FAILED
+        interval_us = number(message, "param2")
+        default_s = self.firmware.periods_s.get(kind, 0.0)
+        self._timetable.set(kind, default_s if interval_us == 0.0 else interval_us / 1e6)
+        return ACCEPTED
+
+    def _obey_request(self, message: Message) -> int:
+        kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        if kind is None:
+            return UNSUPPORTED
+        self.send(kind)
+        return ACCEPTED
+
+    def _obey_checks(self, _message: Message) -> int:
+        if self.armed:
+            return TEMPORARILY_REJECTED
+        self.tell_checks()
+        return ACCEPTED
+
+    def _obey_capabilities(self, _message: Message) -> int:
+        self.send("AUTOPILOT_VERSION")
+        return ACCEPTED
+
+    def _obey_home(self, _message: Message) -> int:
+        self.send("HOME_POSITION")
+        return ACCEPTED
+
+
+def _whole(value: float) -> int:
+    """Command parameters are floats; what is no number asks for nothing."""
+    return int(value) if abs(value) < 1e9 else -1
+
+
+_LANDED_STATES: Final = {
+    Phase.IDLE: copter_telemetry.ON_GROUND,
+    Phase.CLIMBING: copter_telemetry.TAKING_OFF,
+    Phase.HOLDING: copter_telemetry.IN_AIR,
+    Phase.LANDING: copter_telemetry.LANDING,
+}
+
+_HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
+    "HEARTBEAT": Copter._hear_heartbeat,
+    "PARAM_REQUEST_LIST": Copter._hear_param_list,
+    "PARAM_REQUEST_READ": Copter._hear_param_read,
+    "PARAM_SET": Copter._hear_param_set,
+    "REQUEST_DATA_STREAM": Copter._hear_data_stream,
+    "SET_MODE": Copter._hear_set_mode,
+    "COMMAND_LONG": Copter._hear_command,
+}
+
+_COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
+    LAND: Copter._obey_land,
+    TAKE_OFF: Copter._obey_take_off,
+    SET_MODE: Copter._obey_mode,
+    ARM_DISARM: Copter._handle_arm,
+    RUN_PREARM_CHECKS: Copter._obey_checks,
+    GET_HOME: Copter._obey_home,
+    SET_INTERVAL: Copter._obey_interval,
+    REQUEST_MESSAGE: Copter._obey_request,
+    REQUEST_CAPABILITIES: Copter._obey_capabilities,
+}

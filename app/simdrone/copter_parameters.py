@@ -1,0 +1,162 @@
+"""Parameters of the MAVLink 2 autopilots: named, typed values, and the two ways of carrying them in a float.
+
+What is data in ArduPilot and PX4: modes, parameters, rates, words.
+"""
+
+import math
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+from app.vehicles.mavlink.dialects import Dialect
+
+
+class Kind(IntEnum):
+    """MAV_PARAM_TYPE."""
+
+    INT8 = 2
+    INT16 = 4
+    INT32 = 6
+    REAL32 = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter with its default."""
+
+    name: str
+    kind: Kind
+    default: float
+
+
+def real(name: str, default: float) -> Parameter:
+    return Parameter(name, Kind.REAL32, default)
+
+
+class Parameters:
+    """The values held, by name and by place."""
+
+    def __init__(self, known: Sequence[Parameter]) -> None:
+        self._known = tuple(known)
+        self._places = {parameter.name: place for place, parameter in enumerate(known)}
+        self._values = [parameter.default for parameter in known]
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[self._places[name]]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        self._values[self._places[name]] = value
+
+    def place(self, name: str) -> int | None:
+        """Case matters."""
+        return self._places.get(name)
+
+    def at(self, place: int) -> tuple[Parameter, float]:
+        return self._known[place], self._values[place]
+
+
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """How a value travels: `encode(value, kind)` gives the float of the message, `decode(float, kind)` the value,
+    None where it is none. `is_strict`: a wrong type changes nothing."""
+
+    encode: Callable[[float, Kind], float]
+    decode: Callable[[float, Kind], float | None]
+    is_strict: bool
+
+
+def _as_number(value: float, _kind: Kind) -> float:
+    return value
+
+
+def _from_number(carried: float, kind: Kind) -> float | None:
+    """Integers are rounded."""
+    if not math.isfinite(carried):
+        return None
+    return carried if kind is Kind.REAL32 else float(round(carried))
+
+
+def _as_bytes(value: float, kind: Kind) -> float:
+    if kind is Kind.REAL32:
+        return value
+    (carried,) = struct.unpack("<f", struct.pack("<i", int(value)))
+    return float(carried)
+
+
+def _from_bytes(carried: float, kind: Kind) -> float | None:
+    if kind is Kind.REAL32:
+        return carried if math.isfinite(carried) else None
+    (value,) = struct.unpack("<i", struct.pack("<f", carried))
+    return float(value)
+
+
+BY_VALUE = Coding(_as_number, _from_number, is_strict=False)
+"""ArduPilot: the number itself, whatever its type; the type of the message does not matter."""
+
+BYTEWISE = Coding(_as_bytes, _from_bytes, is_strict=True)
+"""PX4: the four bytes of an integer, read as a float."""
+
+
+class Behaviour(Enum):
+    """What a flight mode makes the vehicle do."""
+
+    STAY = "where it is"
+    TAKE_OFF = "to the height of takeoff, once armed"
+    LAND = "down"
+
+
+class Reaction(Enum):
+    """What a failsafe does."""
+
+    NONE = "nothing"
+    WARN = "say so"
+    HOLD = "stay where it is"
+    LAND = "come down"
+
+
+@dataclass(frozen=True, slots=True)
+class FlightMode:
+    """A mode: its number in HEARTBEAT.custom_mode, the bits that go with it, and what it does."""
+
+    name: str
+    custom_mode: int
+    base_mode: int
+    behaviour: Behaviour = Behaviour.STAY
+    may_arm: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareProfile:
+    """What is data in an autopilot. `modes` holds every mode, the first being that after the start, and those that the
+    services need by name; `refused` is the result of a refusal, `texts` what is said with one."""
+
+    dialect: Dialect
+    autopilot: int
+    version: int
+    parameters: tuple[Parameter, ...]
+    coding: Coding
+    periods_s: Mapping[str, float]
+    """Of the messages that it sends unasked."""
+    streams: tuple[str, ...]
+    """Those that REQUEST_DATA_STREAM asks for; none where it is not heeded."""
+    modes: tuple[FlightMode, ...]
+    land: str
+    hold: str
+    by_hand: str
+    """A pilot's."""
+    automatic: str
+    """The one that a pilot switches back to."""
+    refused: int
+    unready: str
+    """Says, every now and then, why it would not arm; the reason follows."""
+    no_estimate: str
+    not_armable: str
+    not_landed: str
+    link_lost: str
+    fence_breached: str
+    ground_m: float
+    """Height of the place of takeoff in the local frame."""

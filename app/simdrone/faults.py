@@ -1,0 +1,406 @@
+"""What can go wrong with a simulated drone, on demand: each fault is one class and one line in `FAULTS`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import ClassVar, Final, Protocol
+
+from app.core.errors import InputError, Problem
+from app.core.policy import is_finite
+from app.simdrone.body import Autopilot, Body, OutgoingMessage
+from app.simdrone.motion_capture import MotionCapture
+from app.vehicles.mavlink.dialects import FieldValue
+
+CONNECT: Final = "connect"
+FORM: Final = "NAME[:DURATION]@T, T in seconds after the takeoff command, or NAME[:DURATION]@connect"
+
+_POSITIONS: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
+_LOW_MV: Final = 9000
+_JUMP_M: Final = 1.0
+_JUMP_EVERY: Final = 25
+_TWICE_EVERY: Final = 5
+_SWAP_EVERY: Final = 4
+_WRONG_SYSTEM: Final = 77
+_WIND_M_S: Final = 2.0
+
+
+class FaultTarget(Protocol):
+    """What a fault can reach."""
+
+    body: Body
+    autopilot: Autopilot
+    cameras: MotionCapture
+
+    def reboot(self) -> None: ...
+
+
+class Fault:
+    """The neutral fault: nothing is wrong. Others override what they spoil."""
+
+    name: ClassVar[str]
+
+    def begin(self, drone: FaultTarget) -> None:
+        """Called when the fault sets in."""
+
+    def end(self, drone: FaultTarget) -> None:
+        """Called when it is over."""
+
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        """What becomes of the messages of one tick."""
+        return list(letters)
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
+        """What becomes of the packets of one tick."""
+        return list(frames)
+
+    @property
+    def is_deaf(self) -> bool:
+        """Whether nothing is heard."""
+        return False
+
+
+class NoHeartbeat(Fault):
+    """Everything is sent but HEARTBEAT."""
+
+    name = "no-heartbeat"
+
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [letter for letter in letters if letter.kind != "HEARTBEAT"]
+
+
+class ParamUnconfirmed(Fault):
+    """PARAM_SET changes nothing and is never answered."""
+
+    name = "param-unconfirmed"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.autopilot.ignores_parameters = True
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.autopilot.ignores_parameters = False
+
+
+class ArmRefused(Fault):
+    """The autopilot refuses to arm, in its own manner."""
+
+    name = "arm-refused"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.autopilot.refuses_arming = True
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.autopilot.refuses_arming = False
+
+
+class NoLiftOff(Fault):
+    """The motors do not turn, though the autopilot believes so. In the air the drone falls."""
+
+    name = "no-lift-off"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.body.motors_dead = True
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.body.motors_dead = False
+
+
+class LinkLost(Fault):
+    """Not a packet passes, either way; the autopilot flies on."""
+
+    name = "link-lost"
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002  none of them passes
+        return []
+
+    @property
+    def is_deaf(self) -> bool:
+        return True
+
+
+class Deaf(Fault):
+    """Nothing that is sent to it is heard; what it says arrives."""
+
+    name = "deaf"
+
+    @property
+    def is_deaf(self) -> bool:
+        return True
+
+
+class TakenOver(Fault):
+    """A pilot switches it to a mode of theirs, in which they hold it where it is, and back at the end."""
+
+    name = "taken-over"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.autopilot.take_over()
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.autopilot.hand_back()
+
+
+@dataclass
+class FrozenPosition(Fault):
+    """Packets arrive, but those of the position repeat the last one, its time too."""
+
+    name: ClassVar[str] = "frozen-position"
+    _held: dict[str, OutgoingMessage] = field(default_factory=dict)
+
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [
+            self._held.setdefault(letter.kind, letter) if letter.kind in _POSITIONS else letter for letter in letters
+        ]
+
+
+@dataclass
+class JumpingPosition(Fault):
+    """Every 25th position is one metre too high, alone."""
+
+    name: ClassVar[str] = "jumping-position"
+    _count: int = 0
+
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [self._jumped(letter) for letter in letters]
+
+    def _jumped(self, letter: OutgoingMessage) -> OutgoingMessage:
+        z = letter.fields.get("z")
+        if letter.kind != "LOCAL_POSITION_NED" or not isinstance(z, int | float):
+            return letter
+        self._count += 1
+        jumps = self._count % _JUMP_EVERY == 0
+        return replace(letter, fields={**letter.fields, "z": z - _JUMP_M}) if jumps else letter
+
+
+class LowBattery(Fault):
+    """The battery reads 9.0 V, and 10 % where a share is sent."""
+
+    name = "low-battery"
+
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [replace(letter, fields=_drained(letter.fields)) for letter in letters]
+
+
+class Reboot(Fault):
+    """The autopilot starts anew: its motors stop, its gains are the defaults, its clock begins at 0, and it is silent
+    for two seconds."""
+
+    name = "reboot"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.reboot()
+
+
+@dataclass
+class DuplicatedPackets(Fault):
+    """Every fifth packet arrives twice."""
+
+    name: ClassVar[str] = "duplicated-packets"
+    _count: int = 0
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
+        doubled: list[bytes] = []
+        for frame in frames:
+            self._count += 1
+            doubled += [frame] * (2 if self._count % _TWICE_EVERY == 0 else 1)
+        return doubled
+
+
+@dataclass
+class ReorderedPackets(Fault):
+    """Every fourth packet arrives after the one that followed it."""
+
+    name: ClassVar[str] = "reordered-packets"
+    _count: int = 0
+    _late: list[bytes] = field(default_factory=list)
+
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
+        passed: list[bytes] = []
+        for frame in frames:
+            self._count += 1
+            if self._count % _SWAP_EVERY == 0:
+                self._late.append(frame)
+            else:
+                passed += [frame, *self._late]
+                self._late.clear()
+        return passed
+
+
+class WrongSystem(Fault):
+    """Every packet comes from system 77."""
+
+    name = "wrong-system"
+
+    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [replace(letter, system=_WRONG_SYSTEM) for letter in letters]
+
+
+class CarriedAway(Fault):
+    """Off the ground the drone is carried north at 2 m/s, and does not hold against it."""
+
+    name = "carried-away"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.body.wind_m_s = _WIND_M_S
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.body.wind_m_s = 0.0
+
+
+class MocapLost(Fault):
+    """Motion capture does not see the drone any more, says so, and repeats where it was."""
+
+    name = "mocap-lost"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.cameras.blind = True
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.cameras.blind = False
+
+
+class MocapFrozen(Fault):
+    """Motion capture sends its last frame again and again."""
+
+    name = "mocap-frozen"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.cameras.stuck = True
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.cameras.stuck = False
+
+
+class MocapDrift(Fault):
+    """The altitude that motion capture tells goes away from the true one, by 0.1 m/s."""
+
+    name = "mocap-drift"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.cameras.drifts = True
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.cameras.drifts = False
+
+
+FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
+    {
+        fault.name: fault
+        for fault in (
+            NoHeartbeat,
+            ParamUnconfirmed,
+            ArmRefused,
+            NoLiftOff,
+            LinkLost,
+            Deaf,
+            TakenOver,
+            FrozenPosition,
+            JumpingPosition,
+            LowBattery,
+            Reboot,
+            DuplicatedPackets,
+            ReorderedPackets,
+            WrongSystem,
+            CarriedAway,
+            MocapLost,
+            MocapFrozen,
+            MocapDrift,
+        )
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFault:
+    """A fault and when: `start_s` after the takeoff command, None from the beginning; infinite: for good."""
+
+    fault: str
+    start_s: float | None
+    duration_s: float = float("inf")
+
+    def is_active(self, now_s: float, takeoff_s: float | None) -> bool:
+        """At `now_s`, both in seconds since the drone was switched on."""
+        if self.start_s is None:
+            return now_s < self.duration_s
+        return takeoff_s is not None and 0.0 <= now_s - takeoff_s - self.start_s < self.duration_s
+
+
+def parse_fault(text: str) -> PlannedFault:
+    """What `FORM` writes. Raises InputError saying what is wrong."""
+    what, at, when = text.partition("@")
+    name, colon, duration = what.partition(":")
+    if name not in FAULTS:
+        raise _unusable(f"must be one of {', '.join(FAULTS)}, got {name!r}")
+    if not at:
+        raise _unusable(f"must say when: {FORM}")
+    start_s = None if when == CONNECT else _seconds(when)
+    return PlannedFault(name, start_s, _seconds(duration)) if colon else PlannedFault(name, start_s)
+
+
+class Faults:
+    """The faults planned for one drone, and which of them are at work."""
+
+    def __init__(self, planned: Sequence[PlannedFault]) -> None:
+        self._waiting: list[tuple[PlannedFault, Fault]] = []
+        self._working: list[tuple[PlannedFault, Fault]] = []
+        for plan in planned:
+            self.add(plan)
+
+    def add(self, plan: PlannedFault) -> None:
+        """One more, even while the drone flies."""
+        self._waiting.append((plan, FAULTS[plan.fault]()))
+
+    def update(self, now_s: float, takeoff_s: float | None, drone: FaultTarget) -> None:
+        """Let those begin whose time has come, and those end whose time is over; none comes twice."""
+        for entry in [each for each in self._waiting if each[0].is_active(now_s, takeoff_s)]:
+            self._waiting.remove(entry)
+            self._working.append(entry)
+            entry[1].begin(drone)
+        for entry in [each for each in self._working if not each[0].is_active(now_s, takeoff_s)]:
+            self._working.remove(entry)
+            entry[1].end(drone)
+
+    @property
+    def is_deaf(self) -> bool:
+        return any(fault.is_deaf for _, fault in self._working)
+
+    def letters(self, letters: list[OutgoingMessage]) -> list[OutgoingMessage]:
+        for _, fault in self._working:
+            letters = fault.transform_messages(letters)
+        return letters
+
+    def frames(self, frames: list[bytes]) -> list[bytes]:
+        for _, fault in self._working:
+            frames = fault.transform_frames(frames)
+        return frames
+
+
+def _drained(fields: Mapping[str, FieldValue]) -> dict[str, FieldValue]:
+    """Those fields that speak of a battery, low."""
+    low: dict[str, FieldValue] = dict(fields)
+    if "voltage_battery" in low:
+        low["voltage_battery"] = _LOW_MV
+    voltages = low.get("voltages")
+    if isinstance(voltages, Sequence) and not isinstance(voltages, str | bytes):
+        low["voltages"] = [_LOW_MV, *voltages[1:]]
+    share = low.get("battery_remaining")
+    if isinstance(share, int) and share >= 0:
+        low["battery_remaining"] = 10
+    return low
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = float("nan")
+    if not (is_finite(seconds) and seconds >= 0.0):
+        raise _unusable(f"a time must be a number of seconds from 0 on, got {text!r}")
+    return seconds
+
+
+def _unusable(reason: str) -> InputError:
+    return InputError(
+        "This fault cannot be had.",
+        problems=(Problem("fault", reason),),
+        hint="For example link-lost:8@6, reboot@5 or no-heartbeat@connect.",
+    )

@@ -1,0 +1,440 @@
+"""Paparazzi's rotorcraft firmware as a ground station meets it over MAVLink 1.
+
+The vertical loop is the exact replica. Everything else is what the real one was seen to do on the wire, its dangers
+included: it obeys what stops motors in the air, never asks whether a gain makes sense, and answers much with silence.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final, Self
+
+from app.core.control.fixed_point import fix
+from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, SPEED_BITS
+from app.simdrone import paparazzi_telemetry
+from app.simdrone.body import (
+    ACCEPTED,
+    ARMED,
+    FAILED,
+    MOTORS_OFF,
+    TICK_S,
+    TICK_STEPS,
+    UNSUPPORTED,
+    Body,
+    OutgoingMessage,
+    Timetable,
+    vertical_command,
+    whole_ticks,
+)
+from app.simdrone.paparazzi_plan import (
+    BLOCKS,
+    DESCENT_M_S,
+    HOME_HEIGHT_M,
+    KILL_SETTING,
+    LANDED_AFTER_S,
+    MAX_DISTANCE_M,
+    TAKEOFF,
+    WAYPOINTS,
+    Engine,
+    FlightPlan,
+    Settings,
+    Vertical,
+)
+from app.vehicles.kernels import Integers
+from app.vehicles.mavlink.dialects import PAPARAZZI, FieldValue, Message, is_known, number, text
+
+KILL: Final = 0
+FAILSAFE: Final = 1
+HOME: Final = 2
+BY_HAND: Final = 12
+NAV: Final = 13
+MODES: Final = (KILL, FAILSAFE, HOME, BY_HAND, NAV, 19)
+_WITHOUT_PLAN: Final = (KILL, FAILSAFE, HOME, BY_HAND)
+"""In these no block is flown."""
+_KEEP_THEIR_BLOCK: Final = (HOME, BY_HAND)
+FAILSAFE_DESCENT_M_S: Final = 1.3
+HOMING_M_S: Final = 3.0
+
+GROUND_COUNTS: Final = 25
+"""Height of the local origin's plane below the vehicle on the ground, 1/256 m: there it reads 0.098 m."""
+GROUND_M: Final = GROUND_COUNTS / (1 << POSITION_BITS)
+
+COMPONENT: Final = 190
+RECEIVE_BUFFER: Final = 256
+TRANSACTION_S: Final = 15.3
+_MAVLINK_1: Final = 0xFE
+_REAL32: Final = 9
+_ARM_DISARM: Final = 400
+_NAV_WAYPOINT: Final = 16
+_LOCAL_ENU: Final = 4
+_HIGHEST_M: Final = 10_000.0
+
+_POLL_TICKS: Final = whole_ticks(0.018)
+_NAV_TICKS: Final = 16
+_BLOCK_TICKS: Final = whole_ticks(0.1)
+_LIST_TICKS: Final = whole_ticks(0.2)
+
+_IDLE_THRUST: Final = 500 / 9600
+_GROUNDED_S: Final = 1.0
+_FLYING_S: Final = 1.0
+_TOUCHES_BELOW_M: Final = 0.03
+_REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
+"""By how much the reference (ζ 0.85, 100 °/s) trails a set point that moves, over its speed."""
+
+
+class Paparazzi:
+    """One autopilot from switching on; see `Autopilot`. `tuned_telemetry` says whether it was built with a telemetry
+    file that sends the position at 51 Hz; otherwise it comes at 1.25 Hz. `kill_setting`, `landed_after_s` and
+    `max_distance_m` as in its settings and its flight plan; `tells_mode`: its heartbeat has the mode's number."""
+
+    def __init__(
+        self,
+        body: Body,
+        *,
+        system: int,
+        tuned_telemetry: bool = True,
+        kill_setting: str = KILL_SETTING,
+        landed_after_s: float = LANDED_AFTER_S,
+        max_distance_m: float = MAX_DISTANCE_M,
+        tells_mode: bool = False,
+    ) -> None:
+        self.dialect = PAPARAZZI
+        self.system, self.component = system, COMPONENT
+        self.refuses_arming = False
+        self.ignores_parameters = False
+        self.took_off = False
+        self._body = body
+        self._codec = PAPARAZZI.codec(system=system, component=COMPONENT)
+        self._radio = _Radio()
+        self._ticks = 0
+        self._kill_setting = kill_setting
+        self._settings = Settings(kill_setting)
+        self._plan = FlightPlan(landed_after_s=landed_after_s)
+        self._max_distance_m = max_distance_m
+        self._tells_mode = tells_mode
+        self._motors_on = False
+        self._reported_seq: int | None = None
+        self._listing: int | None = None
+        self._transaction_ends_s = 0.0
+        self._idle_s = 0.0
+        self._thrust_s = 0.0
+        self._flies = False
+        self._touched_s: float | None = None
+        self._touched_m = 0.0
+        self._held_m = 0.0
+        self._timetable = Timetable.from_periods(paparazzi_telemetry.PERIODS_S)
+        if not tuned_telemetry:
+            self._timetable.set("LOCAL_POSITION_NED", paparazzi_telemetry.BARE_POSITION_PERIOD_S)
+        self._out: list[OutgoingMessage] = []
+        self._set_motors(on=False)
+
+    # ------------------------------------------------------------ time
+
+    def receive(self, data: bytes) -> None:
+        self._radio.put(data)
+
+    def restore_persistent(self, before: Self) -> None:
+        """Its settings are those that were compiled in."""
+
+    def tick(self) -> list[OutgoingMessage]:
+        self._ticks += 1
+        if self._ticks % _POLL_TICKS == 0:
+            self._listen()
+        if self._ticks % _NAV_TICKS == 0:
+            self._navigate()
+        self._body.advance(TICK_STEPS, self._command())
+        self._watch_thrust()
+        self._report()
+        out, self._out = self._out, []
+        return out
+
+    @property
+    def boot_s(self) -> float:
+        return self._ticks * TICK_S
+
+    @property
+    def height_m(self) -> float:
+        """In the local frame, up."""
+        return self._body.altitude_m + GROUND_M
+
+    @property
+    def mode(self) -> int:
+        return self._settings.count("aut_mod")
+
+    @property
+    def armed(self) -> bool:
+        return self._motors_on
+
+    def held(self, parameter: str) -> float:
+        return self._settings[parameter]
+
+    # ------------------------------------------------------------ flying
+
+    @property
+    def is_by_hand(self) -> bool:
+        return self.mode == BY_HAND
+
+    def take_over(self) -> None:
+        self._set_mode(BY_HAND)
+        self._held_m = self.height_m
+
+    def hand_back(self) -> None:
+        self._set_mode(NAV)
+
+    def _set_motors(self, *, on: bool) -> None:
+        self._motors_on = on and self.mode != KILL and not self.refuses_arming
+        if self._kill_setting:
+            self._settings[self._kill_setting] = 0.0 if self._motors_on else 1.0
+
+    def _set_mode(self, mode: int) -> None:
+        """Modes that the airframe does not know are passed over."""
+        if mode not in MODES:
+            return
+        self._settings["aut_mod"] = mode
+        if mode == KILL:
+            self._set_motors(on=False)
+
+    def _enter(self, seq: int) -> None:
+        self._plan.enter(seq, self.height_m)
+        self._touched_s = None
+        if self._plan.block.engine is not Engine.LEAVE:
+            self._set_motors(on=self._plan.block.engine is Engine.RESURRECT)
+        if self._plan.seq == TAKEOFF:
+            self.took_off = True
+
+    def _navigate(self) -> None:
+        """Too far from HOME it flies there by itself, and runs no block any more until its mode is set again."""
+        distance_m = abs(self._body.north_m)
+        if self.mode == NAV and distance_m > self._max_distance_m:
+            self._set_mode(HOME)
+        self._body.steered_m_s = -self._homing_m_s() if self.mode == HOME else 0.0
+        if self.mode in _WITHOUT_PLAN:
+            return
+        following = self._plan.next(_NAV_TICKS * TICK_S, self.height_m, distance_m, flies=self._flies)
+        if following is not None:
+            self._enter(following)
+
+    def _homing_m_s(self) -> float:
+        """Slower over the last metres."""
+        return min(max(self._body.north_m, -HOMING_M_S), HOMING_M_S)
+
+    def _command(self) -> Integers:
+        if not self.armed:
+            return MOTORS_OFF
+        if self.mode in _WITHOUT_PLAN:
+            return self._without_plan()
+        match self._plan.block.vertical:
+            case Vertical.THROTTLE:
+                return MOTORS_OFF
+            case Vertical.WAYPOINT:
+                return self._altitude(self._plan.target_m)
+            case Vertical.DESCEND:
+                return self._descent()
+
+    def _without_plan(self) -> Integers:
+        heights_m = {HOME: HOME_HEIGHT_M, BY_HAND: self._held_m}
+        if self.mode in heights_m:
+            return self._altitude(heights_m[self.mode])
+        return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
+
+    def _descent(self) -> Integers:
+        """Down at a constant rate. On the ground the reference sinks on below the vehicle, which the replica's climb
+        mode (of an older version) would not let it do: the thrust fades as it does in the recorded landings."""
+        if self._touched_s is None and self._body.altitude_m < _TOUCHES_BELOW_M:
+            self._touched_s, self._touched_m = self.boot_s, self.height_m
+        if self._touched_s is None:
+            return self._vertical(CLIMB, fix(-DESCENT_M_S, SPEED_BITS))
+        sunk_m = DESCENT_M_S * (self.boot_s - self._touched_s + _REFERENCE_LAG_S)
+        return self._altitude(self._touched_m - sunk_m)
+
+    def _altitude(self, target_m: float) -> Integers:
+        """The loop is the same wherever its origin lies, and the body's is the ground."""
+        return self._vertical(ALT, fix(target_m, POSITION_BITS) - GROUND_COUNTS)
+
+    def _vertical(self, mode: int, target: int) -> Integers:
+        kp, ki, kd = (self._settings.count(f"gui_v_{name}") for name in ("kp", "ki", "kd"))
+        return vertical_command(mode, target, kp, ki, kd)
+
+    def _watch_thrust(self) -> None:
+        """It counts as flying once its motors have pushed for a while, and until they have not for as long."""
+        pushes = self._body.thrust > _IDLE_THRUST
+        self._thrust_s = self._thrust_s + TICK_S if pushes else 0.0
+        self._idle_s = 0.0 if pushes else self._idle_s + TICK_S
+        if self._thrust_s >= _FLYING_S:
+            self._flies = True
+        elif self._body.is_resting or self._idle_s >= _GROUNDED_S:
+            self._flies = False
+
+    # ------------------------------------------------------------ sending
+
+    def _report(self) -> None:
+        if self._listing is not None and self._ticks % _LIST_TICKS == 0:
+            self._send_setting(self._listing)
+            self._listing = self._listing + 1 if self._listing + 1 < len(self._settings) else None
+        if self._ticks % _BLOCK_TICKS == 0 and self._plan.seq != self._reported_seq:
+            self._reported_seq = self._plan.seq
+            self._send("SCRIPT_CURRENT", counter="mission", seq=self._plan.seq)
+        due = self._timetable.due(self._ticks)
+        if due:
+            now = self._snapshot()
+            self._out += [OutgoingMessage(kind, paparazzi_telemetry.MESSAGES[kind](now)) for kind in due]
+
+    def _snapshot(self) -> paparazzi_telemetry.Snapshot:
+        body = self._body
+        return paparazzi_telemetry.Snapshot(
+            boot_s=self.boot_s,
+            height_m=self.height_m,
+            climb_rate_m_s=body.climb_rate_m_s,
+            thrust=body.thrust,
+            battery_v=body.battery_v,
+            mode=self.mode,
+            motors_on=self.armed,
+            north_m=body.north_m,
+            north_m_s=body.north_m_s,
+            tells_mode=self._tells_mode,
+        )
+
+    def _send(self, kind: str, *, counter: str = "", **fields: FieldValue) -> None:
+        self._out.append(OutgoingMessage(kind, fields, counter))
+
+    def _send_setting(self, index: int) -> None:
+        """A number past the end shows whatever lies behind the table."""
+        name, value = self._settings.at(index) if index < len(self._settings) else ("", math.nan)
+        self._send(
+            "PARAM_VALUE",
+            param_id=name,
+            param_value=value,
+            param_type=_REAL32,
+            param_count=len(self._settings),
+            param_index=index,
+        )
+
+    # ------------------------------------------------------------ hearing
+
+    def _listen(self) -> None:
+        for message in self._codec.parse(self._radio.take()):
+            if not is_known(message) or message.get_msgbuf()[0] != _MAVLINK_1:
+                continue
+            handler = _HANDLERS.get(message.get_type())
+            if handler is not None and number(message, "target_system") == self.system:
+                handler(self, message)
+
+    def _hear_param_list(self, _message: Message) -> None:
+        self._listing = 0
+
+    def _hear_param_read(self, message: Message) -> None:
+        index = int(number(message, "param_index"))
+        place = self._settings.find(text(message, "param_id")) if index < 0 else index
+        if place is not None:
+            self._send_setting(place)
+
+    def _hear_param_set(self, message: Message) -> None:
+        """Wrong types, values that are no numbers and names that are not found are met with silence."""
+        name, value = text(message, "param_id"), number(message, "param_value")
+        place = self._settings.find(name)
+        if place is None or self.ignores_parameters or math.isnan(value):
+            return
+        if number(message, "param_type") != _REAL32:
+            return
+        self._set(name, value)
+        self._send_setting(place)
+
+    def _set(self, name: str, value: float) -> None:
+        match name:
+            case "aut_mod":
+                self._set_mode(math.trunc(value) if math.isfinite(value) else -1)
+            case _ if name == self._kill_setting:
+                self._set_motors(on=math.isfinite(value) and math.trunc(value) == 0)
+            case _:
+                self._settings[name] = value
+        if name == "gui_v_ki":
+            self._body.forget_error_sum()
+
+    def _hear_command(self, message: Message) -> None:
+        command, param1 = int(number(message, "command")), number(message, "param1")
+        result = UNSUPPORTED
+        if command == _ARM_DISARM:
+            wanted = param1 > 0.5
+            self._set_motors(on=wanted)
+            result = ACCEPTED if self.armed == wanted else FAILED
+        self._send("COMMAND_ACK", command=command, result=result)
+
+    def _hear_set_mode(self, message: Message) -> None:
+        self._set_motors(on=bool(int(number(message, "base_mode")) & ARMED))
+
+    def _hear_data_stream(self, message: Message) -> None:
+        self._send("DATA_STREAM", stream_id=int(number(message, "req_stream_id")), message_rate=0, on_off=0)
+
+    def _hear_block_list(self, message: Message) -> None:
+        self._begin_transaction()
+        self._send("SCRIPT_COUNT", counter="blocks", count=len(BLOCKS), **_sender(message))
+
+    def _hear_block_request(self, message: Message) -> None:
+        seq = int(number(message, "seq"))
+        if not self._is_listing_blocks or seq >= len(BLOCKS):
+            return
+        self._begin_transaction()
+        self._send("SCRIPT_ITEM", counter="blocks", seq=seq, name=BLOCKS[seq].name, **_sender(message))
+
+    def _hear_block(self, message: Message) -> None:
+        """Go to a block, unless somebody is still reading the list, or no block is flown; there is no answer either
+        way."""
+        if not self._is_listing_blocks and self.mode not in _KEEP_THEIR_BLOCK:
+            self._enter(int(number(message, "seq")))
+
+    def _hear_mission_ack(self, _message: Message) -> None:
+        self._transaction_ends_s = 0.0
+
+    def _hear_waypoint(self, message: Message) -> None:
+        seq, height_m = int(number(message, "seq")), number(message, "z")
+        is_waypoint = number(message, "frame") == _LOCAL_ENU and number(message, "command") == _NAV_WAYPOINT
+        if not is_waypoint or seq >= len(WAYPOINTS) or not abs(height_m) <= _HIGHEST_M:
+            return
+        self._plan.altitudes_m[WAYPOINTS[seq]] = height_m
+        self._send("MISSION_ACK", counter="mission", type=0, **_sender(message))
+
+    @property
+    def _is_listing_blocks(self) -> bool:
+        return self.boot_s < self._transaction_ends_s
+
+    def _begin_transaction(self) -> None:
+        self._transaction_ends_s = self.boot_s + TRANSACTION_S
+
+
+class _Radio:
+    """The receive buffer: what arrives between two looks must fit in, or all of it is lost."""
+
+    def __init__(self) -> None:
+        self._waiting = bytearray()
+        self._overrun = False
+
+    def put(self, data: bytes) -> None:
+        if len(self._waiting) + len(data) > RECEIVE_BUFFER:
+            self._overrun = True
+        else:
+            self._waiting += data
+
+    def take(self) -> bytes:
+        data = b"" if self._overrun else bytes(self._waiting)
+        self._waiting.clear()
+        self._overrun = False
+        return data
+
+
+def _sender(message: Message) -> dict[str, int]:
+    """The target of an answer."""
+    return {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
+
+
+_HANDLERS: Final[Mapping[str, Callable[[Paparazzi, Message], None]]] = {
+    "PARAM_REQUEST_LIST": Paparazzi._hear_param_list,
+    "PARAM_REQUEST_READ": Paparazzi._hear_param_read,
+    "PARAM_SET": Paparazzi._hear_param_set,
+    "COMMAND_LONG": Paparazzi._hear_command,
+    "SET_MODE": Paparazzi._hear_set_mode,
+    "REQUEST_DATA_STREAM": Paparazzi._hear_data_stream,
+    "SCRIPT_REQUEST_LIST": Paparazzi._hear_block_list,
+    "SCRIPT_REQUEST": Paparazzi._hear_block_request,
+    "SCRIPT_ITEM": Paparazzi._hear_block,
+    "MISSION_ACK": Paparazzi._hear_mission_ack,
+    "MISSION_ITEM": Paparazzi._hear_waypoint,
+}

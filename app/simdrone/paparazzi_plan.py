@@ -1,0 +1,262 @@
+"""The flight plan: blocks, waypoints, and how one block follows another.
+
+The settings of the AR.Drone 2 airframe: names as MAVLink shows them, in order, with their values after the start.
+
+A name is what 16 characters hold of the C variable's; longer ones end alike, and none of 16 characters is ever found.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+from app.core.control.fixed_point import INT32_MAX, INT32_MIN
+
+DESCENT_M_S: Final = 0.8
+LANDED_AFTER_S: Final = 3.0
+"""By this program's flight plan. Plans without such a guard stop the thrust of a vehicle that is told to land in the
+first second, before it counts as flying."""
+DEFAULT_ALTITUDE_M: Final = 2.0
+MAX_DISTANCE_M: Final = 50.0
+"""max_dist_from_home: farther than that from HOME, the origin, no block is flown any more."""
+HOME_HEIGHT_M: Final = 1.0
+"""home_mode_height: at which it flies back then, and stays."""
+
+CLIMB: Final = 2
+WAYPOINTS: Final = ("dummy", "HOME", "CLIMB", "STDBY", "p1", "p2", "p3", "p4", "CAM", "TD")
+"""By index. Their names are not transmitted."""
+
+
+class Vertical(Enum):
+    """What a block does with height."""
+
+    THROTTLE = "no thrust"
+    WAYPOINT = "the altitude of its waypoint"
+    DESCEND = "down at DESCENT_M_S until it no longer flies"
+
+
+class Engine(Enum):
+    """What entering a block does with the motors."""
+
+    LEAVE = "nothing"
+    KILL = "stop"
+    RESURRECT = "start"
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block. `after` is the block that follows at once, where it only passes through; `landed` the one that
+    follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an
+    axis from HOME) are exceptions that lead to "land here"."""
+
+    name: str
+    vertical: Vertical = Vertical.WAYPOINT
+    waypoint: str = "STDBY"
+    engine: Engine = Engine.LEAVE
+    after: str | None = None
+    landed: str | None = None
+    max_time_s: float = float("inf")
+    max_height_m: float = float("inf")
+    max_distance_m: float = float("inf")
+
+    def is_over(self, time_s: float, height_m: float, distance_m: float) -> bool:
+        """Whether one of its exceptions holds."""
+        return time_s > self.max_time_s or height_m > self.max_height_m or distance_m > self.max_distance_m
+
+
+BLOCKS: Final = (
+    Block("Wait GPS", Vertical.THROTTLE, engine=Engine.KILL, after="Geo init"),
+    Block("Geo init", Vertical.THROTTLE, engine=Engine.KILL, after="Holding point"),
+    Block("Holding point", Vertical.THROTTLE, engine=Engine.KILL),
+    Block("Start Engine", Vertical.THROTTLE, engine=Engine.RESURRECT),
+    Block("Takeoff", waypoint="CLIMB", max_time_s=45.0, max_height_m=4.5, max_distance_m=8.0),
+    Block("Standby"),
+    Block("stay_p1", waypoint="p1"),
+    Block("go_p2", waypoint="p2"),
+    Block("line_p1_p2", waypoint="p1"),
+    Block("route", waypoint="p1"),
+    Block("Oval", waypoint="p1"),
+    Block("test yaw", waypoint="p1"),
+    Block("circle CAM", waypoint="CAM"),
+    Block("land here", waypoint="TD", after="land"),
+    Block("land", waypoint="TD", after="flare"),
+    Block("flare", Vertical.DESCEND, landed="landed"),
+    Block("landed", Vertical.THROTTLE),
+    Block("HOME", waypoint="HOME"),
+)
+"""The plan's blocks in order; the horizontal figures of some are not flown, only their height."""
+
+BY_NAME: Final = {block.name: seq for seq, block in enumerate(BLOCKS)}
+LAND_HERE: Final = BY_NAME["land here"]
+TAKEOFF: Final = BY_NAME["Takeoff"]
+HOLDING_POINT: Final = BY_NAME["Holding point"]
+
+
+class FlightPlan:
+    """Where in the plan the vehicle is."""
+
+    def __init__(self, *, landed_after_s: float) -> None:
+        """`landed_after_s`: how long it descends before it may believe to have landed."""
+        self._landed_after_s = landed_after_s
+        self.seq = HOLDING_POINT
+        self.time_s = 0.0
+        """Since the block was entered."""
+        self.altitudes_m = dict.fromkeys(WAYPOINTS, DEFAULT_ALTITUDE_M)
+
+    @property
+    def block(self) -> Block:
+        return BLOCKS[self.seq]
+
+    @property
+    def target_m(self) -> float:
+        """The altitude of the block's waypoint, in the local frame."""
+        return self.altitudes_m[self.block.waypoint]
+
+    def enter(self, seq: int, height_m: float) -> None:
+        """Go to a block at this height (local frame, up); a number past the end means the last one."""
+        self.seq = min(seq, len(BLOCKS) - 1)
+        self.time_s = 0.0
+        if self.seq == LAND_HERE:
+            self.altitudes_m["TD"] = height_m
+
+    def next(self, elapsed_s: float, height_m: float, distance_m: float, *, flies: bool) -> int | None:
+        """Let time pass in the block, so far from HOME; the block that the plan leads to, if to another."""
+        self.time_s += elapsed_s
+        block = self.block
+        if block.after is not None:
+            return BY_NAME[block.after]
+        if block.landed is not None and not flies and self.time_s > self._landed_after_s:
+            return BY_NAME[block.landed]
+        return LAND_HERE if block.is_over(self.time_s, height_m, distance_m) else None
+
+
+NAME_LIMIT: Final = 16
+KILL_SETTING: Final = "kil_thr"
+NEWER_KILL_SETTING: Final = "aut_kil_thr"
+"""The same in a tree of 2017 that calls itself 5.10, whose variables are those of one structure."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One setting; a whole default stands for an integer in the autopilot, into which every value is cut."""
+
+    name: str
+    default: int | float
+
+    def held(self, value: float) -> float:
+        """What is left of `value` in the autopilot's variable."""
+        if isinstance(self.default, float):
+            return value
+        return float(min(max(math.trunc(value), INT32_MIN), INT32_MAX)) if math.isfinite(value) else float(INT32_MIN)
+
+
+class Settings:
+    """The values held, from the defaults on."""
+
+    def __init__(self, kill_setting: str) -> None:
+        """`kill_setting`: what this release calls the one that kills the throttle; empty where there is none."""
+        named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
+        self._settings = tuple(setting for setting in named if setting.name)
+        self._values: list[float] = [float(setting.default) for setting in self._settings]
+        self._places = {setting.name: place for place, setting in reversed(list(enumerate(self._settings)))}
+
+    def __len__(self) -> int:
+        return len(self._settings)
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[self._places[name]]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        place = self._places[name]
+        self._values[place] = self._settings[place].held(value)
+
+    def count(self, name: str) -> int:
+        """A setting that is an integer in the autopilot."""
+        return int(self[name])
+
+    def at(self, index: int) -> tuple[str, float]:
+        return self._settings[index].name, self._values[index]
+
+    def find(self, name: str) -> int | None:
+        """The place of the setting that this name finds first, if any; case matters."""
+        return self._places.get(name) if len(name) < NAME_LIMIT else None
+
+
+SETTINGS: Final = (
+    Setting("tel_mod_Mav", 0),
+    Setting("tel_mod_Mai", 0),
+    Setting("aut_mod_aut", 13),
+    Setting(KILL_SETTING, 1),
+    Setting("aut_pow_swi", 0),
+    Setting("aut_mod", 13),
+    Setting("gui_v_kp", 283),
+    Setting("gui_v_kd", 82),
+    Setting("gui_v_ki", 13),
+    Setting("gui_v_nom_thr", 0.655),
+    Setting("gui_v_ada_thr_en", 0),
+    Setting("gui_v_z_sp", -23),
+    Setting("gui_h_use_ref", 1),
+    Setting("gh_ref_max_spe", 5.0),
+    Setting("gui_h_app_for_by", 0.0),
+    Setting("gh_ref_tau", 0.5),
+    Setting("gh_ref_ome", 1.169371),
+    Setting("gh_ref_zet", 0.85),
+    Setting("gui_h_gai_p", 79),
+    Setting("gui_h_gai_d", 100),
+    Setting("gui_h_gai_i", 30),
+    Setting("gui_h_gai_v", 0),
+    Setting("gui_h_gai_a", 0),
+    Setting("gui_h_sp_pos_x", 0),
+    Setting("gui_h_sp_pos_y", 0),
+    Setting("fli_alt", 149.0),
+    Setting("nav_hea", 31),
+    Setting("nav_rad", 5.0),
+    Setting("nav_cli_vsp", 0.5),
+    Setting("nav_des_vsp", -0.8),
+    Setting("sta_gai_p_x", 850),
+    Setting("sta_gai_d_x", 425),
+    Setting("sta_gai_i_x", 0),
+    Setting("sta_gai_dd_x", 0),
+    Setting("sta_gai_p_y", 850),
+    Setting("sta_gai_d_y", 425),
+    Setting("sta_gai_i_y", 0),
+    Setting("sta_gai_dd_y", 0),
+    Setting("sta_gai_p_z", 1000),
+    Setting("sta_gai_d_z", 700),
+    Setting("sta_gai_i_z", 0),
+    Setting("sta_gai_dd_z", 100),
+    Setting("att_ref_qua_i_mo", 7.853981),
+    Setting("att_ref_qua_i_mo", 0.9),
+    Setting("att_ref_qua_i_mo", 7.853981),
+    Setting("att_ref_qua_i_mo", 0.9),
+    Setting("att_ref_qua_i_mo", 3.490659),
+    Setting("att_ref_qua_i_mo", 0.9),
+    Setting("nps_byp_ahr", 0),
+    Setting("nps_byp_ins", 0),
+    Setting("gps_has_fix", 1),
+    Setting("dat_ena", 1),
+    Setting("nps_ele_sup_vol", 12.4),
+    Setting("nps_atm_win_spe", 0.0),
+    Setting("nps_atm_win_dir", 0.0),
+    Setting("nps_atm_tur_sev", 0.0),
+    Setting("imu_bod_to_imu_e", 0.0),
+    Setting("imu_bod_to_imu_e", 0.0),
+    Setting("imu_bod_to_imu_e", 0.0),
+    Setting("imu_b2i_set_cur", 0),
+    Setting("mul_gps_mod", 0),
+    Setting("ahr_icq_gra_heu_", 30),
+    Setting("ahr_icq_acc_ome", 0.063),
+    Setting("ahr_icq_acc_zet", 0.9),
+    Setting("ahr_icq_mag_ome", 0.04),
+    Setting("ahr_icq_mag_zet", 0.9),
+    Setting("air_dat_qnh", 1013.315),
+    Setting("air_dat_tas_fac", 1.0),
+    Setting("air_dat_cal_qnh_", 0),
+    Setting("air_dat_cal_air", 1),
+    Setting("air_dat_cal_tas_", 1),
+    Setting("air_dat_cal_ams_", 0),
+    Setting("geo_mag_cal_onc", 0),
+    Setting("gps_nps_gps_nps_", 1),
+    Setting("dat_mav_per_sta", 1),
+    Setting("dat_mav_per_tel_", 1),
+)

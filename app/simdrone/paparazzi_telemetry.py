@@ -1,0 +1,204 @@
+"""What Paparazzi sends unasked: messages, their periods and their peculiarities."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from app.core.control.vertical_loop import POSITION_BITS, SPEED_BITS
+from app.simdrone.body import ARMED, Fields
+
+PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "LOCAL_POSITION_NED": 0.02,
+        "HEARTBEAT": 0.5,
+        "ATTITUDE": 0.5,
+        "GLOBAL_POSITION_INT": 0.9,
+        "SYS_STATUS": 1.2,
+        "VFR_HUD": 1.3,
+        "ATTITUDE_QUATERNION": 1.5,
+        "SYSTEM_TIME": 2.0,
+        "BATTERY_STATUS": 4.0,
+        "GPS_GLOBAL_ORIGIN": 5.1,
+        "AUTOPILOT_VERSION": 11.1,
+    }
+)
+"""With a telemetry file made for tuning."""
+
+BARE_POSITION_PERIOD_S: Final = 0.8
+"""Without one."""
+
+_LATITUDE_E7: Final = 435641193
+_LONGITUDE_E7: Final = 14812804
+_ORIGIN_MM: Final = 147095
+_GEOID_MM: Final = 49817
+_KILL: Final = 0
+_FAILSAFE: Final = 1
+_GUIDED: Final = 19
+_BY_HAND: Final = 12
+_NO_TEMPERATURE: Final = 32767
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """What the autopilot knows of itself; heights in its local frame, up."""
+
+    boot_s: float
+    height_m: float
+    climb_rate_m_s: float
+    thrust: float
+    battery_v: float
+    mode: int
+    motors_on: bool
+    north_m: float
+    north_m_s: float
+    tells_mode: bool
+
+    @property
+    def boot_ms(self) -> int:
+        return int(self.boot_s * 1000.0)
+
+    @property
+    def battery_mv(self) -> int:
+        """From steps of 0.1 V."""
+        return math.floor(self.battery_v * 10.0) * 100
+
+
+def heartbeat(now: Snapshot) -> Fields:
+    """NAV and HOME look alike where the mode's own number is not told."""
+    mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8, _BY_HAND: 64 | 16}.get(now.mode, 4)
+    return {
+        "type": 2,
+        "autopilot": 9,
+        "base_mode": mode | (ARMED if now.motors_on else 0),
+        "custom_mode": now.mode if now.tells_mode else 0,
+        "system_status": 4 if now.motors_on else 3,
+        "mavlink_version": 3,
+    }
+
+
+def local_position(now: Snapshot) -> Fields:
+    """z down, in steps of the autopilot's integers."""
+    return {
+        "time_boot_ms": now.boot_ms,
+        "x": _stepped(now.north_m, POSITION_BITS),
+        "y": 0.0,
+        "z": -_stepped(now.height_m, POSITION_BITS),
+        "vx": _stepped(now.north_m_s, SPEED_BITS),
+        "vy": 0.0,
+        "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS),
+    }
+
+
+def global_position(now: Snapshot) -> Fields:
+    """`relative_alt` takes the origin, in metres, from the altitude, in millimetres."""
+    altitude_mm = _ORIGIN_MM + _GEOID_MM + round(now.height_m * 1000.0)
+    return {
+        "time_boot_ms": now.boot_ms,
+        "lat": _LATITUDE_E7,
+        "lon": _LONGITUDE_E7,
+        "alt": altitude_mm,
+        "relative_alt": altitude_mm - _ORIGIN_MM // 1000 - 1,
+        "vx": 0,
+        "vy": 0,
+        "vz": _down_cm_s(now),
+        "hdg": 33,
+    }
+
+
+def vfr_hud(now: Snapshot) -> Fields:
+    """`climb` is positive downwards."""
+    return {
+        "airspeed": 0.0,
+        "groundspeed": 0.0,
+        "heading": 0,
+        "throttle": round(now.thrust * 100.0),
+        "alt": (_ORIGIN_MM + _GEOID_MM) / 1000.0 + now.height_m,
+        "climb": -now.climb_rate_m_s,
+    }
+
+
+def sys_status(now: Snapshot) -> Fields:
+    errors = dict.fromkeys(("errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
+    return {
+        "onboard_control_sensors_present": 15,
+        "onboard_control_sensors_enabled": 15,
+        "onboard_control_sensors_health": 15,
+        "load": 65535,
+        "voltage_battery": now.battery_mv,
+        "current_battery": _current(now),
+        "battery_remaining": -1,
+        "drop_rate_comm": 0,
+        **errors,
+    }
+
+
+def battery_status(now: Snapshot) -> Fields:
+    return {
+        "id": 0,
+        "battery_function": 0,
+        "type": 0,
+        "temperature": _NO_TEMPERATURE,
+        "voltages": [now.battery_mv, *[0] * 9],
+        "current_battery": _current(now),
+        "current_consumed": 0,
+        "energy_consumed": 0,
+        "battery_remaining": -1,
+    }
+
+
+def attitude(now: Snapshot) -> Fields:
+    return {"time_boot_ms": now.boot_ms, "roll": 0.0, "pitch": 0.0, "yaw": 0.0, **_RATES}
+
+
+def attitude_quaternion(now: Snapshot) -> Fields:
+    return {"time_boot_ms": now.boot_ms, "q1": 1.0, "q2": 0.0, "q3": 0.0, "q4": 0.0, **_RATES}
+
+
+def system_time(now: Snapshot) -> Fields:
+    return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
+
+
+def global_origin(_now: Snapshot) -> Fields:
+    return {"latitude": _LATITUDE_E7, "longitude": _LONGITUDE_E7, "altitude": _ORIGIN_MM}
+
+
+def version(_now: Snapshot) -> Fields:
+    custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
+    numbers = dict.fromkeys(
+        ("capabilities", "middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id", "uid"), 0
+    )
+    return {"flight_sw_version": 51000, **numbers, **custom}
+
+
+_RATES: Final = {"rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
+
+MESSAGES: Final[Mapping[str, Callable[[Snapshot], Fields]]] = MappingProxyType(
+    {
+        "LOCAL_POSITION_NED": local_position,
+        "HEARTBEAT": heartbeat,
+        "ATTITUDE": attitude,
+        "GLOBAL_POSITION_INT": global_position,
+        "SYS_STATUS": sys_status,
+        "VFR_HUD": vfr_hud,
+        "ATTITUDE_QUATERNION": attitude_quaternion,
+        "SYSTEM_TIME": system_time,
+        "BATTERY_STATUS": battery_status,
+        "GPS_GLOBAL_ORIGIN": global_origin,
+        "AUTOPILOT_VERSION": version,
+    }
+)
+
+
+def _stepped(value: float, bits: int) -> float:
+    return round(value * (1 << bits)) / (1 << bits)
+
+
+def _down_cm_s(now: Snapshot) -> int:
+    return round(-now.climb_rate_m_s * 100.0)
+
+
+def _current(now: Snapshot) -> int:
+    """10 mA: what the motors draw at hover in the recorded flights, while they turn."""
+    return round(443 * now.thrust / 0.63)

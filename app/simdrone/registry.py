@@ -1,0 +1,140 @@
+"""The autopilots there are."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from app.core.errors import InputError, Problem
+from app.simdrone.ardupilot import ArduPilot, ArduPilot47
+from app.simdrone.body import Autopilot, Body
+from app.simdrone.copter import Copter
+from app.simdrone.paparazzi import Paparazzi
+from app.simdrone.paparazzi_plan import NEWER_KILL_SETTING
+from app.simdrone.px4 import Px4
+
+_ARDUPILOT_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0}
+"""Land when the ground station is lost; keep inside the fence."""
+_LAND: Final = 3.0
+_RETURN: Final = 3.0
+
+Make = Callable[[Body, int], Autopilot]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutopilotKind:
+    """An autopilot that a simulated drone can have; `make(body, system)` switches one on as it comes, `set_up` as a
+    person leaves it before a first flight: with the failsafes on that come switched off."""
+
+    name: str
+    title: str
+    system: int
+    """Its system id unless another is asked for."""
+    link: str
+    """Where it speaks unless told otherwise."""
+    make: Make
+    set_up: Make
+
+
+def _paparazzi(body: Body, system: int) -> Autopilot:
+    return Paparazzi(body, system=system)
+
+
+def _ardupilot(body: Body, system: int) -> Copter:
+    return ArduPilot(body, system=system)
+
+
+def _ardupilot_47(body: Body, system: int) -> Copter:
+    return ArduPilot47(body, system=system)
+
+
+def _with(make: Callable[[Body, int], Copter], **parameters: float) -> Make:
+    """The same copter with these parameters set."""
+
+    def switch_on(body: Body, system: int) -> Autopilot:
+        copter = make(body, system)
+        for name, value in parameters.items():
+            copter.parameters[name] = value
+        return copter
+
+    return switch_on
+
+
+def _px4(body: Body, system: int) -> Copter:
+    return Px4(body, system=system)
+
+
+def _bare_paparazzi(body: Body, system: int) -> Autopilot:
+    return Paparazzi(body, system=system, tuned_telemetry=False)
+
+
+def _paparazzi_510(body: Body, system: int) -> Autopilot:
+    return Paparazzi(body, system=system, kill_setting=NEWER_KILL_SETTING)
+
+
+AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
+    {
+        kind.name: kind
+        for kind in (
+            AutopilotKind(
+                name="paparazzi",
+                title="Paparazzi with a telemetry file for tuning",
+                system=31,
+                link="udp:127.0.0.1:4244@4245",
+                make=_paparazzi,
+                set_up=_paparazzi,
+            ),
+            AutopilotKind(
+                name="paparazzi-bare",
+                title="Paparazzi as it is built by default: its position comes at 1.25 Hz",
+                system=31,
+                link="udp:127.0.0.1:4244@4245",
+                make=_bare_paparazzi,
+                set_up=_bare_paparazzi,
+            ),
+            AutopilotKind(
+                name="paparazzi-5.10",
+                title="Paparazzi of 2017, whose setting that kills the throttle has another name",
+                system=31,
+                link="udp:127.0.0.1:4244@4245",
+                make=_paparazzi_510,
+                set_up=_paparazzi_510,
+            ),
+            AutopilotKind(
+                name="ardupilot",
+                title="ArduCopter up to 4.6",
+                system=1,
+                link="udp:127.0.0.1:14550",
+                make=_ardupilot,
+                set_up=_with(_ardupilot, **_ARDUPILOT_FAILSAFES),
+            ),
+            AutopilotKind(
+                name="ardupilot-4.7",
+                title="ArduCopter from 4.7 on",
+                system=1,
+                link="udp:127.0.0.1:14550",
+                make=_ardupilot_47,
+                set_up=_with(_ardupilot_47, **_ARDUPILOT_FAILSAFES),
+            ),
+            AutopilotKind(
+                name="px4",
+                title="PX4",
+                system=1,
+                link="udp:127.0.0.1:14550",
+                make=_px4,
+                set_up=_with(_px4, NAV_DLL_ACT=_LAND, GF_ACTION=_RETURN, GF_MAX_VER_DIST=10.0),
+            ),
+        )
+    }
+)
+
+
+def get_autopilot(name: str) -> AutopilotKind:
+    """Raises InputError when there is none of that name."""
+    if name not in AUTOPILOTS:
+        raise InputError(
+            "There is no such autopilot.",
+            problems=(Problem("autopilot", f"must be one of {', '.join(AUTOPILOTS)}, got {name!r}"),),
+            hint="gainline sim-drone --help lists them.",
+        )
+    return AUTOPILOTS[name]

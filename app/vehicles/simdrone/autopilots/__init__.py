@@ -1,1 +1,0 @@
-"""The autopilots a simulated drone can have."""

@@ -1,1 +1,0 @@
-"""Paparazzi, as it answers on the wire: MAVLink 1, its settings, its flight plan, its telemetry."""

@@ -1,0 +1,235 @@
+"""Everything that can go wrong with a simulated drone on demand, as a ground station sees it."""
+
+from itertools import pairwise
+
+import pytest
+
+from app.core.errors import InputError
+from app.simdrone.faults import FAULTS, PlannedFault, parse_fault
+from tests.simdrone import copters
+from tests.simdrone.ground import Heard, flying
+from tests.simdrone.paparazzi import LAND_HERE, START_ENGINE, Pilot, from_vehicle
+
+
+def positions(messages: list[Heard]) -> list[Heard]:
+    return from_vehicle(messages, "LOCAL_POSITION_NED")
+
+
+def sequence_steps(messages: list[Heard]) -> set[int]:
+    """How the packets of the telemetry are numbered, from one to the next."""
+    counted = [each.get_seq() for each in messages if not each.get_type().startswith(("SCRIPT_", "MISSION_"))]
+    return {(b - a) % 256 for a, b in pairwise(counted)}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_every_fault_says_what_it_does(name: str) -> None:
+    assert FAULTS[name].__doc__
+    assert FAULTS[name].name == name
+
+
+@pytest.mark.parametrize(
+    ("text", "planned"),
+    [
+        ("link-lost:8@6", PlannedFault("link-lost", 6.0, 8.0)),
+        ("reboot@5.5", PlannedFault("reboot", 5.5)),
+        ("no-heartbeat@connect", PlannedFault("no-heartbeat", None)),
+        ("arm-refused:3@connect", PlannedFault("arm-refused", None, 3.0)),
+    ],
+)
+def test_a_fault_is_written_with_its_time_and_duration(text: str, planned: PlannedFault) -> None:
+    assert parse_fault(text) == planned
+
+
+@pytest.mark.parametrize("text", ["gremlins@5", "reboot", "reboot@soon", "link-lost:-1@5", "reboot@nan", "@5", ""])
+def test_a_fault_that_cannot_be_had_is_refused_in_words(text: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        parse_fault(text)
+    assert refusal.value.problems[0].field == "fault"
+
+
+def test_no_heartbeat_leaves_everything_else() -> None:
+    ground = flying("paparazzi", faults=["no-heartbeat@connect"])
+    kinds = {each.get_type() for each in ground.listen(5.0)}
+    assert "HEARTBEAT" not in kinds
+    assert {"LOCAL_POSITION_NED", "SYS_STATUS"} <= kinds
+
+
+def test_an_unconfirmed_parameter_is_neither_answered_nor_held() -> None:
+    ground = flying("paparazzi", faults=["param-unconfirmed@connect"])
+    pilot = Pilot(ground)
+    pilot.send_setting("gui_v_kp", 400.0)
+    assert ground.wait_for("PARAM_VALUE", within_s=2.0) is None
+    held = pilot.read("gui_v_kp")
+    assert held is not None
+    assert held.param_value == 283.0
+
+
+def test_paparazzi_refuses_to_arm_without_a_word() -> None:
+    ground = flying("paparazzi", faults=["arm-refused@connect"])
+    pilot = Pilot(ground)
+    pilot.block(START_ENGINE)
+    assert not pilot.is_armed()
+    assert pilot.command(400, 1.0) == 4
+
+
+@pytest.mark.parametrize(("autopilot", "result"), [("ardupilot", 4), ("px4", 1)])
+def test_the_others_refuse_to_arm_and_say_why(autopilot: str, result: int) -> None:
+    ground = flying(autopilot, faults=["arm-refused@connect"])
+    pilot = copters.Pilot(ground)
+    ground.listen(4.0)
+    assert pilot.command(copters.ARM, 1.0) == result
+    assert pilot.command(copters.ARM, 1.0, copters.FORCE) == result
+    assert len(pilot.words()) == 2
+
+
+def test_without_lift_off_it_stands_though_it_is_armed_and_told_to_climb() -> None:
+    ground = flying("paparazzi", faults=["no-lift-off@connect"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    assert max(-each.z for each in positions(ground.listen(5.0))) < 0.11
+    assert pilot.is_armed()
+
+
+def test_a_lost_link_is_silent_both_ways_while_the_drone_flies_on() -> None:
+    ground = flying("paparazzi", faults=["link-lost:8@4"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    heard = positions(ground.listen(25.0))
+    gaps_ms = [b.time_boot_ms - a.time_boot_ms for a, b in pairwise(heard)]
+    assert max(gaps_ms) == pytest.approx(8000, abs=50)
+    assert sorted(gaps_ms)[-2] <= 20
+    assert -heard[-1].z > 2.8
+
+
+def test_during_a_lost_link_commands_do_not_arrive() -> None:
+    ground = flying("paparazzi", faults=["link-lost:4@2"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    ground.listen(1.9)
+    ground.listen_to_silence(1.2)
+    pilot.send_setting("gui_v_kp", 400.0)
+    ground.expect("LOCAL_POSITION_NED", within_s=10.0)
+    held = pilot.read("gui_v_kp")
+    assert held is not None
+    assert held.param_value == 283.0
+
+
+def test_a_frozen_position_repeats_itself_its_time_too_while_packets_arrive() -> None:
+    ground = flying("paparazzi", faults=["frozen-position:3@2"])
+    Pilot(ground).take_off()
+    heard = positions(ground.listen(8.0))
+    repeated = [a.time_boot_ms for a, b in pairwise(heard) if a.time_boot_ms == b.time_boot_ms]
+    assert len(set(repeated)) == 1
+    assert len(repeated) == pytest.approx(3.0 * 51.2, abs=3)
+
+
+def test_a_jumping_position_jumps_a_metre_up_alone() -> None:
+    ground = flying("paparazzi", faults=["jumping-position@0"])
+    Pilot(ground).take_off()
+    heights = [-each.z for each in positions(ground.listen(8.0))]
+    jumps = [index for index, (a, b) in enumerate(pairwise(heights)) if b - a > 0.7]
+    falls = [index for index, (a, b) in enumerate(pairwise(heights)) if a - b > 0.7]
+    assert len(jumps) > 10
+    assert falls == [index + 1 for index in jumps]
+    assert {b - a for a, b in pairwise(jumps)} == {25}
+
+
+@pytest.mark.parametrize("autopilot", ["paparazzi", "ardupilot", "px4"])
+def test_a_low_battery_reads_nine_volts(autopilot: str) -> None:
+    ground = flying(autopilot, faults=["low-battery@connect"])
+    assert ground.expect("SYS_STATUS").voltage_battery == 9000
+    assert ground.expect("BATTERY_STATUS").voltages[0] == 9000
+
+
+def test_a_reboot_in_the_air_stops_the_motors_forgets_the_gains_and_starts_the_clock_anew() -> None:
+    ground = flying("paparazzi", faults=["reboot@6"])
+    pilot = Pilot(ground)
+    pilot.set_gains(1624, 1356, 195)
+    pilot.take_off()
+    heard = positions(ground.listen(9.0))
+    first_after = next(b for a, b in pairwise(heard) if b.time_boot_ms < a.time_boot_ms)
+    assert first_after.time_boot_ms < 100
+    assert -first_after.z < 0.2
+    assert not pilot.is_armed()
+    held = pilot.read("gui_v_kp")
+    assert held is not None
+    assert held.param_value == 283.0
+
+
+def test_a_reboot_does_not_mend_what_else_is_wrong() -> None:
+    ground = flying("paparazzi", faults=["param-unconfirmed@connect", "reboot@1"])
+    pilot = Pilot(ground)
+    pilot.take_off()
+    ground.listen(max(1.2 - ground.elapsed_s, 0.1))
+    ground.expect("LOCAL_POSITION_NED", lambda message: message.time_boot_ms < 1000, within_s=10.0)
+    ground.listen(1.0)
+    pilot.send_setting("gui_v_kp", 400.0)
+    assert ground.wait_for("PARAM_VALUE", within_s=1.0) is None
+
+
+def test_some_packets_arrive_twice() -> None:
+    ground = flying("paparazzi", faults=["duplicated-packets@connect"])
+    heard = ground.listen(5.0)
+    assert sequence_steps(heard) == {0, 1}
+
+
+def test_some_packets_arrive_late() -> None:
+    ground = flying("paparazzi", faults=["reordered-packets@connect"])
+    heard = ground.listen(5.0)
+    assert sequence_steps(heard) == {1, 2, 255}
+
+
+def test_packets_may_come_from_another_system() -> None:
+    ground = flying("paparazzi", faults=["wrong-system:2@0"])
+    Pilot(ground).take_off()
+    systems = [each.get_srcSystem() for each in ground.listen(5.0)]
+    assert set(systems) == {31, 77}
+    assert systems[-1] == 31
+
+
+def test_a_deaf_drone_obeys_nothing_and_tells_on() -> None:
+    ground = flying("paparazzi", faults=["deaf:4@6"])
+    pilot = Pilot(ground)
+    pilot.hover()
+    ground.expect("LOCAL_POSITION_NED", lambda message: message.time_boot_ms > 8000, within_s=20.0)
+    pilot.block(LAND_HERE)
+    assert len(positions(ground.listen(1.0))) > 40
+    assert pilot.read("gui_v_kp") is None
+    ground.listen(4.0)
+    pilot.block(LAND_HERE)
+    ground.expect("SCRIPT_CURRENT", lambda message: message.seq > LAND_HERE)
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "by_hand", "automatic"), [("paparazzi", (80, 0), (4, 0)), ("px4", (81, 3 << 16), (29, 0x03040000))]
+)
+def test_a_pilot_takes_it_over_holds_it_and_hands_it_back(
+    autopilot: str, by_hand: tuple[int, int], automatic: tuple[int, int]
+) -> None:
+    ground = flying(autopilot, faults=["taken-over:4@18"])
+    if autopilot == "paparazzi":
+        pilot = Pilot(ground)
+        pilot.set_gains(1624, 1356, 195)
+        pilot.take_off()
+    else:
+        copters.Px4(ground).hover()
+    ground.listen(8.0)
+    before_m = ground.expect("LOCAL_POSITION_NED").z
+    for base_mode, custom_mode in (by_hand, automatic):
+
+        def is_it(heard: Heard, mode: int = base_mode) -> bool:
+            return bool(heard.base_mode & 127 == mode)
+
+        beat = ground.expect("HEARTBEAT", is_it, within_s=16.0)
+        assert (beat.custom_mode, beat.base_mode & 128) == (custom_mode, 128)
+        ground.listen(2.0)
+        assert ground.expect("LOCAL_POSITION_NED").z == pytest.approx(before_m, abs=0.4)
+
+
+def test_the_registry_holds_what_was_promised() -> None:
+    promised = (
+        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf taken-over frozen-position "
+        "jumping-position low-battery reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost "
+        "mocap-frozen mocap-drift"
+    )
+    assert list(FAULTS) == promised.split()
