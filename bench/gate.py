@@ -19,21 +19,19 @@ from typing import Final
 import numpy as np
 from scipy.signal import find_peaks
 
-from app.core.checks import Check, Envelope
-from app.core.control.vertical_loop import RATE_HZ
-from app.core.experiments.base import Matrix
+from app.core.control.paparazzi import RATE_HZ
+from app.core.experiments.base import Check, Envelope, Matrix, ParameterDistribution, prior_distribution
 from app.core.experiments.takeoff import Takeoff
-from app.core.hazards.flights import (
+from app.core.experiments.takeoff_hazards import (
     LARGEST_TOUCH_DOWN_M_S,
     SMALLEST_SWING_M_S,
     UNDAMPED,
     abort_steps,
     fly_runs,
 )
-from app.core.hazards.kernels import HIGHEST_M, TOUCH_DOWN_M_S
-from app.core.plants.vertical import Counts
+from app.core.models.vertical import Counts
+from app.core.models.vertical_hazards import HIGHEST_M, TOUCH_DOWN_M_S
 from app.core.policy import Vector
-from app.core.spread import ParameterDistribution, prior_distribution
 
 LIMIT_S: Final = 0.15
 SEED: Final = 20260101

@@ -19,8 +19,8 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.vertical_loop import STATE_SIZE
-from app.core.plants.vertical import CHANNELS, rollout
+from app.core.control.paparazzi import STATE_SIZE
+from app.core.models.vertical import CHANNELS, rollout
 
 SAMPLES: Final = 16_693
 ROUNDS: Final = 300

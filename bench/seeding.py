@@ -19,9 +19,9 @@ from app.common.settings import Settings
 from app.common.states import CampaignState, JobState, TrialState
 from app.core.definition import Definition
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
-from app.core.gate import check_policy
-from app.core.strategies.base import Explanation, Interval, band_channels
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.gate import check_policy
+from app.core.tuning.strategy import Explanation, Interval, band_channels
 from app.db import trajectories
 from app.db.migrate import migrate
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrajectoryRow, TrialRow

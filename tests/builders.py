@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.campaigns import computation, proposals
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.db.session import Database
 from app.flights import queue
 from app.flights.queue import FlightTask

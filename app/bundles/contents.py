@@ -14,11 +14,11 @@ from app.campaigns.schemas import Definition
 from app.campaigns.trials.schemas import Glitch
 from app.common.schemas import Gate, Interval, Name, OptionValue
 from app.common.states import AbortCause, CampaignState, Ending, Outcome, TrialKind, TrialState
-from app.core.advice import Advice
-from app.core.spread import ParameterDistribution
-from app.core.stopping import StopVerdict
-from app.core.strategies.base import Explanation
-from app.core.strategies.base import Kind as ProposalKind
+from app.core.experiments.base import ParameterDistribution
+from app.core.tuning.proposals import Advice
+from app.core.tuning.stop_rules import StopVerdict
+from app.core.tuning.strategy import Explanation
+from app.core.tuning.strategy import Kind as ProposalKind
 
 FORMAT: Final = "gainline-campaign"
 VERSION: Final = 2

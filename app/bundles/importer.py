@@ -18,7 +18,7 @@ from app.campaigns.schemas import Campaign as CampaignView
 from app.campaigns.schemas import Definition
 from app.common.data_folder import log_of_trial
 from app.common.errors import ConflictError, InputError, Problem
-from app.core.checking import problems_of
+from app.core.tuning.definition_checks import problems_of
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet

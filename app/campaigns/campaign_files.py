@@ -13,12 +13,12 @@ from app.campaigns.definitions import check_campaign
 from app.campaigns.schemas import NewCampaign
 from app.common.errors import InputError, NotFoundError, Problem
 from app.common.schemas import Number, Text
-from app.core.checking import MAX_FLIGHTS
 from app.core.definition import Definition
 from app.core.experiments import experiment_of, get_experiment
 from app.core.policy import shortened
-from app.core.strategies import STRATEGIES
-from app.core.strategies.manual import MANUAL
+from app.core.tuning.definition_checks import MAX_FLIGHTS
+from app.core.tuning.strategies import STRATEGIES
+from app.core.tuning.strategies.manual import MANUAL
 from app.vehicles.open import get_kind
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
 from app.common.schemas import OptionValue
 from app.core.experiments import EXPERIMENTS
-from app.core.strategies import STRATEGIES
-from app.core.strategies.base import Strategy
-from app.core.trajectory import CHANNEL_UNITS
+from app.core.records.trajectory import CHANNEL_UNITS
+from app.core.tuning.strategies import STRATEGIES
+from app.core.tuning.strategy import Strategy
 from app.fleet.views import is_registered_one_by_one
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.open import VEHICLE_KINDS, get_kind

@@ -2,17 +2,15 @@
 
 from dataclasses import dataclass
 
-from app.core.advice import Advice, advise
-from app.core.calibration import known_distribution
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
+from app.core.experiments.base import ParameterDistribution
 from app.core.experiments.takeoff import Takeoff
-from app.core.gate import GateResult, check_policy
-from app.core.landscape import space_of
-from app.core.proposing import next_proposal
-from app.core.spread import ParameterDistribution
-from app.core.stopping import StopVerdict, evaluate_stop_rule
-from app.core.strategies.base import Proposal
+from app.core.tuning.calibration import known_distribution
+from app.core.tuning.gate import GateResult, check_policy, space_of
+from app.core.tuning.proposals import Advice, advise, next_proposal
+from app.core.tuning.stop_rules import StopVerdict, evaluate_stop_rule
+from app.core.tuning.strategy import Proposal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,10 +17,10 @@ from app.campaigns.schemas import Definition as DefinitionIn
 from app.campaigns.schemas import Donor, Start
 from app.common.errors import NotFoundError
 from app.common.states import TrialState
-from app.core.checking import check_definition
 from app.core.definition import Definition
 from app.core.errors import InputError, Problem
 from app.core.experiments import get_experiment
+from app.core.tuning.definition_checks import check_definition
 from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue

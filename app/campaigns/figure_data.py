@@ -16,9 +16,9 @@ from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
-from app.core.statistics import groups_of, pool_scatter, select_winner
-from app.core.strategies.base import band_channels
-from app.core.trajectory import CHANNEL_UNITS, Trajectory
+from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
+from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
+from app.core.tuning.strategy import band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES

@@ -5,19 +5,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from app.core.definition import Definition, Flight, flight_seed
-from app.core.envelope import envelope_of
+from app.core.definition import Definition, Flight, flight_seed, was_flown
 from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.gate import check_policy, require_flyable
-from app.core.glitches import find_glitches
 from app.core.policy import Gains
-from app.core.predictions import prediction_of
-from app.core.proposing import next_proposal
-from app.core.stopping import evaluate_stop_rule, landing_battery_v
-from app.core.strategies.base import Explanation, Interval, Kind, Proposal
-from app.core.strategies.history import was_flown
+from app.core.records.glitches import find_glitches
+from app.core.tuning.gate import check_policy, envelope_of, require_flyable
+from app.core.tuning.predictions import prediction_of
+from app.core.tuning.proposals import next_proposal
+from app.core.tuning.stop_rules import evaluate_stop_rule, landing_battery_v
+from app.core.tuning.strategy import Explanation, Interval, Kind, Proposal
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, Vehicle
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.open import get_kind, open_vehicle

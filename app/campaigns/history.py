@@ -28,7 +28,7 @@ from app.common.states import (
 )
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.db import trajectories
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpacked

@@ -1,7 +1,7 @@
 """The model's error around a campaign's gains, computed as a job for one proposal and stored as that job's result.
 
-For a worker: `read_plan`, then `app.core.landscape` (pure, in any process), then store the result of `as_json`. Only
-the newest landscape of a campaign is kept.
+For a worker: `read_plan`, then `app.core.tuning.landscape` (pure, in any process), then store the result of `as_json`.
+Only the newest landscape of a campaign is kept.
 """
 
 from dataclasses import asdict, dataclass
@@ -18,7 +18,8 @@ from app.campaigns.proposals import is_stale, read_history
 from app.common.errors import GainlineError
 from app.common.states import JobState
 from app.core.experiments import experiment_of
-from app.core.landscape import Landscape, LandscapePlan, free_gains, space_of
+from app.core.tuning.gate import space_of
+from app.core.tuning.landscape import Landscape, LandscapePlan, free_gains
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.landscape import LandscapeFigure, Search, Tried

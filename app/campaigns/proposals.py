@@ -16,14 +16,12 @@ from app.campaigns.definitions import definition_of, frozen_digest
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import UNFLOWN_TRIAL_STATES, CampaignState, Outcome, TrialState
-from app.core.checks import Check
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
-from app.core.experiments.base import Experiment
-from app.core.gate import GateResult
-from app.core.policy import Gains, PolicySpace
-from app.core.spread import ParameterDistribution, prior_distribution
-from app.core.stopping import Reason, StopVerdict
+from app.core.experiments.base import Check, Experiment, ParameterDistribution, prior_distribution
+from app.core.policy import Gains
+from app.core.tuning.gate import GateResult
+from app.core.tuning.stop_rules import Reason, StopVerdict
 from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.db.types import utc_now
@@ -207,11 +205,6 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
     notify_rehearsed_campaign(session, campaign)
     flight = history.flight_under_way(session, campaign.id)
     cancel_unflown(history.trials_of(session, campaign.id), flight, "the campaign was finished")
-
-
-def space_of(definition: Definition) -> PolicySpace:
-    """Gain space of a campaign, within its bounds."""
-    return experiment_of(definition).space.narrowed(definition.bounds)
 
 
 def gate_json(gate: GateResult) -> JsonObject:

@@ -8,9 +8,9 @@ from pydantic import BaseModel, Field
 
 from app.common.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
 from app.common.states import CampaignState, Outcome
-from app.core.advice import AdviceKind
-from app.core.statistics import Verdict
-from app.core.strategies.base import Explanation, Kind
+from app.core.statistics.comparisons import Verdict
+from app.core.tuning.proposals import AdviceKind
+from app.core.tuning.strategy import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]

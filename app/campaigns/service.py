@@ -35,11 +35,11 @@ from app.common.errors import BusyError, ConflictError, InputError, NotFoundErro
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.state_machine import check_action, check_version
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
-from app.core.confirming import ComparisonState
 from app.core.definition import Definition as CoreDefinition
+from app.core.definition import format_gains
 from app.core.experiments import get_experiment
-from app.core.strategies.history import format_gains
-from app.core.wording import percent
+from app.core.formatting import percent
+from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet
 from app.fleet.registration import promote_gains

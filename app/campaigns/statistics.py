@@ -17,14 +17,14 @@ from app.campaigns.schemas import (
     TrackRecord,
     Trend,
 )
-from app.core.confirming import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
+from app.core.definition import format_gains
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
-from app.core.predictions import TrackRecord as Record
-from app.core.predictions import track_record
-from app.core.statistics import Group, drift_of, optimism, pool_scatter, trend_of
-from app.core.strategies.history import format_gains
-from app.core.wording import percent, plus_minus, short
+from app.core.formatting import percent, plus_minus, short
+from app.core.statistics.comparisons import Group, drift_of, optimism, pool_scatter, trend_of
+from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
+from app.core.tuning.predictions import TrackRecord as Record
+from app.core.tuning.predictions import track_record
 from app.db.models import CampaignRow, TrialRow
 
 _SURE: Final = 0.9

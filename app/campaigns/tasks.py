@@ -8,7 +8,7 @@ import structlog
 
 from app.campaigns import computation, landscapes, proposals
 from app.common.errors import GainlineError
-from app.core.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob

@@ -29,9 +29,9 @@ from app.campaigns.statistics import best_trial, standing_of
 from app.common.schemas import Gate, Interval, Trouble
 from app.common.state_machine import allowed
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
-from app.core.confirming import ComparisonState
-from app.core.statistics import Verdict
-from app.core.strategies.base import Explanation
+from app.core.statistics.comparisons import Verdict
+from app.core.tuning.confirmation import ComparisonState
+from app.core.tuning.strategy import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.jobs import service as jobs

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
-from app.core.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
+from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
 from app.figures.batteries import BatteriesFigure, BatteryFlight

@@ -16,8 +16,8 @@ from rich.table import Table
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
 from app.controller_checks.check import LogCheck, check_log, check_trace, parse_gains
-from app.core.control.replay import OUTPUTS, Replay
-from app.core.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
+from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
+from app.core.control.paparazzi import OUTPUTS, Replay
 from app.logs.loop_trace import read_loop_trace
 from app.reproductions.controller import run_controller
 from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction

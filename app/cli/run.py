@@ -24,8 +24,8 @@ from app.common.errors import InputError, Problem
 from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.strategies.base import Proposal
-from app.core.trajectory import CHANNEL_UNITS
+from app.core.records.trajectory import CHANNEL_UNITS
+from app.core.tuning.strategy import Proposal
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue, Sample
 from app.vehicles.open import get_kind

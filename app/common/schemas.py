@@ -20,7 +20,6 @@ from pydantic_core import PydanticCustomError
 
 from app.common.errors import InputError
 from app.common.errors import Problem as FieldProblem
-from app.figures.base import Card
 
 _BIDIRECTIONAL: Final = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Marks, embeddings, overrides and isolates (Unicode Standard Annex 9)."""
@@ -214,6 +213,6 @@ class FigureCard(BaseModel):
     table: FigureTable | None
 
 
-def figure_card(card: Card) -> FigureCard:
-    """Convert a card to its API schema."""
+def figure_card(card: object) -> FigureCard:
+    """Convert a card (`app.figures.base.Card`) to its API schema; raises ValidationError for another object."""
     return FigureCard.model_validate(card, from_attributes=True)

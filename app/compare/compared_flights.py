@@ -20,13 +20,12 @@ from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
 from app.compare import repository
 from app.compare.schemas import FlightDifference, FlightSetting
+from app.core.definition import Option, format_gains
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
-from app.core.options import Option
-from app.core.statistics import Group, PooledScatter, groups_of, pool_scatter
-from app.core.strategies import STRATEGIES
-from app.core.strategies.history import format_gains
-from app.core.wording import plus_minus
+from app.core.formatting import plus_minus
+from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
+from app.core.tuning.strategies import STRATEGIES
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.base import VehicleOption

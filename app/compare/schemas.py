@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 from app.campaigns.trials.schemas import GroupBrief
 from app.common.schemas import Gains, OptionValue
 from app.common.states import TrialState
-from app.core.statistics import Verdict
+from app.core.statistics.comparisons import Verdict
 
 Basis = Literal["gains", "repeats", "apart", "no error"]
 _BASIS = (

@@ -20,7 +20,7 @@ from app.compare.compared_flights import (
 )
 from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
 from app.compare.verdicts import compare_pair, list_notes, overall_verdict
-from app.core.trajectory import CHANNEL_UNITS, Samples
+from app.core.records.trajectory import CHANNEL_UNITS, Samples
 from app.db import trajectories
 from app.figures.base import Card, card_of
 from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure

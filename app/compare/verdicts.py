@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from app.campaigns.trials.views import CONFIDENCE
 from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named, percent
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.core.confirming import SCATTER_NOT_KNOWN
-from app.core.statistics import Comparison, Group, Verdict, compare, drift_of
-from app.core.strategies.history import format_gains
+from app.core.definition import format_gains
+from app.core.statistics.comparisons import Comparison, Group, Verdict, compare, drift_of
+from app.core.tuning.confirmation import SCATTER_NOT_KNOWN
 from app.fleet import service as fleet
 
 

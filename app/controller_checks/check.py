@@ -10,9 +10,7 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.replay import LoopTrace, Replay, compared, replayed
-from app.core.errors import InputError, Problem
-from app.core.loop_log import (
+from app.core.control.loop_log import (
     GAINS,
     CommandCheck,
     Overlay,
@@ -21,6 +19,8 @@ from app.core.loop_log import (
     compare_simulation,
     infer_gains,
 )
+from app.core.control.paparazzi import LoopTrace, Replay, compared, replayed
+from app.core.errors import InputError, Problem
 from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
 from app.logs.paparazzi import is_paparazzi, read_loop_log
 

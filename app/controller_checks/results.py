@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.controller_checks.check import LogCheck, TraceCheck, check_recording
-from app.core.control.replay import INPUTS, OUTPUTS
-from app.core.control.vertical_loop import RATE_HZ
-from app.core.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay
-from app.core.loop_log import UNITS as REFERENCE_UNITS
-from app.core.trajectory import Samples
+from app.core.control.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay
+from app.core.control.loop_log import UNITS as REFERENCE_UNITS
+from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ
+from app.core.records.trajectory import Samples
 from app.figures.controller import Overlaid
 from app.figures.scale import thinned
 

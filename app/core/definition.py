@@ -1,14 +1,21 @@
-"""The frozen definition of a campaign: the fields that computations need."""
+"""The frozen definition of a campaign: the fields that computations need.
+
+Settings of strategies and experiments, and validation of their values.
+
+Queries of the flight history, shared by strategies.
+"""
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from app.core.trajectory import Trajectory
+from app.core.errors import Problem
+from app.core.policy import Gains, is_finite, shortened
+from app.core.records.trajectory import Trajectory
 
 OptionValue = bool | int | float | str
 
@@ -116,3 +123,77 @@ class Flight:
 def flight_seed(seed: int, number: int) -> int:
     """Random seed of a campaign's flight `number` (from 1): 32 bits, independent between flights and campaigns."""
     return int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """One setting: one of `choices`, or any number of the default's type within `lower` … `upper`."""
+
+    name: str
+    title: str
+    default: OptionValue
+    choices: tuple[OptionValue, ...] = ()
+    unit: str = ""
+    lower: float | None = None
+    upper: float | None = None
+
+    def refusal(self, value: OptionValue) -> str | None:
+        """Why `value` is not allowed, or None if it is."""
+        return self._not_a_choice(value) if self.choices else self._no_number(value)
+
+    def _not_a_choice(self, value: OptionValue) -> str | None:
+        if any(value == choice and type(value) is type(choice) for choice in self.choices):
+            return None
+        return f"must be one of {', '.join(str(choice).lower() for choice in self.choices)}, got {value!r}"
+
+    def _no_number(self, value: OptionValue) -> str | None:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return f"must be a number, got {value!r}"
+        if not is_finite(value):
+            return f"must be a finite number, got {shortened(value)}"
+        if isinstance(self.default, int) and value != int(value):
+            return f"must be a whole number, got {value:g}"
+        if (self.lower is not None and value < self.lower) or (self.upper is not None and value > self.upper):
+            return f"must lie in {_edge(self.lower)} … {_edge(self.upper)} {self.unit}".rstrip() + f", got {value:g}"
+        return None
+
+
+def problems_of_options(
+    chosen: Mapping[str, OptionValue], offered: Sequence[Option], *, field: str, owner: str
+) -> Iterator[Problem]:
+    """Every setting in `chosen` that `owner` does not have, or whose value is not allowed."""
+    known = {option.name: option for option in offered}
+    for name, value in chosen.items():
+        if name not in known:
+            yield Problem(f"{field}.{name}", f"is not an option of {owner} (it has: {', '.join(known) or 'none'})")
+        elif (reason := known[name].refusal(value)) is not None:
+            yield Problem(f"{field}.{name}", reason)
+
+
+def with_defaults(chosen: Mapping[str, OptionValue], offered: Sequence[Option]) -> dict[str, OptionValue]:
+    """Every setting: the chosen value, else the default."""
+    return {option.name: chosen.get(option.name, option.default) for option in offered}
+
+
+def _edge(limit: float | None) -> str:
+    return "any" if limit is None else f"{limit:g}"
+
+
+def best_flight(flights: Sequence[Flight]) -> Flight:
+    """The valid flight with the lowest error, the earliest of equals. At least one flight must be valid."""
+    return min(
+        (flight for flight in flights if flight.error is not None and flight.outcome == "valid"),
+        key=lambda flight: (flight.error, flight.number),
+    )
+
+
+def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
+    """Whether these gains were flown before, to the end or until an abort that counts against them."""
+    return any(
+        dict(flight.gains) == dict(gains) for flight in flights if flight.outcome == "valid" or flight.against_gains
+    )
+
+
+def format_gains(gains: Gains) -> str:
+    """`kp 283, ki 13, kd 82`."""
+    return ", ".join(f"{name} {value:g}" for name, value in gains.items())

@@ -35,7 +35,7 @@ from app.common.states import (
     TrialState,
     VehicleState,
 )
-from app.core.strategies.base import Kind as ProposalKind
+from app.core.tuning.strategy import Kind as ProposalKind
 from app.db.types import UtcDateTime, utc_now
 
 Topic = Literal["campaign", "trial", "proposal", "job", "flight", "vehicle", "check"]

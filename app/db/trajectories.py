@@ -22,7 +22,7 @@ from sqlalchemy.orm import Session, defer, undefer
 
 from app.common.errors import StorageError
 from app.core.errors import Problem, TrajectoryError
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
 

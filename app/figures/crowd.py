@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.trajectory import Samples
+from app.core.records.trajectory import Samples
 from app.figures import theme
 from app.figures.history import Band, Curve, FlightData, History
 from app.figures.theme import Palette

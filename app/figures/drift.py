@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from app.core.drift import MONITORED_PARAMETERS, Fitted
+from app.core.statistics.drift import MONITORED_PARAMETERS, Fitted
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.theme import PALETTES, Palette, ThemeName

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from app.core.policy import Gain, Gains
-from app.core.trajectory import Samples
+from app.core.records.trajectory import Samples
 
 Outcome = Literal["not yet judged", "valid", "aborted", "invalid", "lost"]
 """Label of a flight's outcome in figures."""

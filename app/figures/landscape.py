@@ -7,8 +7,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from app.core.landscape import Landscape, Slice
 from app.core.policy import Gain, Gains
+from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
 from app.figures.history import FlightData, History

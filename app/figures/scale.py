@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.thinning import select_bends, select_samples
-from app.core.trajectory import Samples
+from app.core.records.trajectory import Samples, select_bends, select_samples
 from app.figures.history import Range
 
 MARGIN = 0.06

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Final
 
-from app.core.landscape import Slice
 from app.core.policy import Gains
+from app.core.tuning.landscape import Slice
 from app.figures.history import FlightData
 
 NUMBER_ROOM: Final = (0.07, 0.075)

@@ -27,7 +27,7 @@ from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError
 from app.common.states import FlightMode, FlightState, TrialState, VehicleState
-from app.core.stopping import landing_battery_v, starting_battery_v
+from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet

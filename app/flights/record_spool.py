@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from app.common.errors import StorageError
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.vehicles.base import Ending, FlightRecord, OptionValue
 
 RESERVED_BYTES: Final = 4 * 2**20

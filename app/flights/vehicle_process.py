@@ -17,7 +17,6 @@ from typing import Final
 from app.common.states import ActKind
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
-from app.fleet.pipe import PipeClosedError, WorkerPipe
 from app.flights.process_messages import (
     CancelFlight,
     CancelTakeOff,
@@ -41,6 +40,7 @@ from app.flights.process_messages import (
     mark_if_requested,
 )
 from app.flights.vehicle_connection import TAKE_OFF_TIMEOUT_S
+from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.vehicles.base import ConnectedVehicle, FlightRecord, StopRequest
 from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError

@@ -15,7 +15,7 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.trajectory import Samples
+from app.core.records.trajectory import Samples
 from app.logs.contents import Contents, contents, refused
 from app.logs.gains import ARDUPILOT_SETS, names_in
 from app.logs.takeoffs import FlightLog, LogEvent, Setting

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from app.core.loop_log import GAINS
+from app.core.control.loop_log import GAINS
 
 PAPARAZZI: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
 """Its MAVLink parameters, and the names of these gains in the takeoff experiment."""

@@ -13,9 +13,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
-from app.core.control.fixed_point import INT32_MAX, INT32_MIN
-from app.core.control.replay import INPUTS, OUTPUTS, LoopTrace
-from app.core.control.vertical_loop import MODES
+from app.core.control.paparazzi import INPUTS, INT32_MAX, INT32_MIN, MODES, OUTPUTS, LoopTrace
 from app.core.errors import InputError, Problem
 
 COLUMNS: Final = ("step", *INPUTS[:7], "zdd", *INPUTS[7:], *OUTPUTS)

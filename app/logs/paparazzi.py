@@ -14,10 +14,9 @@ from xml.parsers import expat
 
 import numpy as np
 
-from app.core.control.fixed_point import INT32_MAX, INT32_MIN
-from app.core.control.vertical_loop import FULL_THRUST
-from app.core.loop_log import FIELDS, GAINS, LoopLog, infer_gains
-from app.core.trajectory import Samples
+from app.core.control.loop_log import FIELDS, GAINS, LoopLog, infer_gains
+from app.core.control.paparazzi import FULL_THRUST, INT32_MAX, INT32_MIN
+from app.core.records.trajectory import Samples
 from app.logs.contents import refused
 from app.logs.gains import PAPARAZZI_SETS
 from app.logs.takeoffs import FlightLog, LogEvent, Setting

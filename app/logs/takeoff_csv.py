@@ -16,7 +16,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.core.errors import Problem, TrajectoryError
-from app.core.trajectory import CHANNEL_UNITS, Samples, Trajectory
+from app.core.records.trajectory import CHANNEL_UNITS, Samples, Trajectory
 
 MAX_ROWS: Final = 200_000
 MIN_ROWS: Final = 20

@@ -15,7 +15,7 @@ import numpy as np
 
 from app.core.errors import Problem, TrajectoryError
 from app.core.policy import Gains
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Samples, Trajectory
 
 NEAR_GROUND_M: Final = 0.15
 HIGHEST_HOP_M: Final = 0.5

@@ -6,7 +6,7 @@ from typing import Final
 
 from app.common.schemas import Interval
 from app.core.definition import OptionValue
-from app.core.wording import decimals
+from app.core.formatting import decimals
 
 NOTHING: Final = "–"
 

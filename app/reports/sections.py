@@ -21,7 +21,7 @@ from app.core.definition import OptionValue
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
 from app.core.policy import Gain
-from app.core.strategies import STRATEGIES
+from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow
 from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct

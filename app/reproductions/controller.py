@@ -6,8 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.replay import OUTPUTS, LoopTrace, compared, replayed
-from app.core.control.vertical_loop import RATE_HZ
+from app.core.control.paparazzi import OUTPUTS, RATE_HZ, LoopTrace, compared, replayed
 from app.figures.panels import Panel, Plot
 from app.logs.loop_trace import read_loop_trace
 from app.reproductions.results import Progress, Result, Row, curve

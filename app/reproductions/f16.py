@@ -8,8 +8,8 @@ import numpy as np
 
 from app.core.experiments.pitch_tracking import OUTPUT, PitchTracking
 from app.core.policy import Vector
-from app.core.strategies.simplex import model_optimum
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.corrected_model import model_optimum
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.f16_campaigns import (
     BEST_ERROR,

@@ -13,9 +13,9 @@ import numpy as np
 
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule, flight_seed
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.proposing import next_proposal
-from app.core.strategies.simplex import Optimum, model_optimum
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.corrected_model import Optimum, model_optimum
+from app.core.tuning.proposals import next_proposal
 from app.processes import process_context
 from app.vehicles.lti import whole_flight
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from app.core.trajectory import Samples
+from app.core.records.trajectory import Samples
 from app.figures.panels import Line, Plot, Style
 from app.figures.scale import thinned
 

@@ -14,10 +14,10 @@ from typing import Final
 
 from app.core.definition import Definition
 from app.core.experiments import get_experiment
-from app.core.gate import GateResult, check_policy, require_flyable
+from app.core.experiments.base import prior_distribution
 from app.core.policy import Gains
-from app.core.spread import prior_distribution
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Samples, Trajectory
+from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.results import OVERRULE, Progress, Result, Row, curve
 from app.vehicles.base import FlightOptions, OptionValue

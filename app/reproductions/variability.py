@@ -14,7 +14,7 @@ from app.core.definition import flight_seed
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Matrix, Scatter
 from app.core.policy import Vector
-from app.core.statistics import Group, pool_scatter, trend_of
+from app.core.statistics.comparisons import Group, pool_scatter, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.results import OVERRULE, Progress, Result, Row, marks, ratio
 from app.reproductions.tables import overruled_for

@@ -10,7 +10,7 @@ from typing import Final, Protocol, Self
 
 import numpy as np
 
-from app.core.control.vertical_loop import RATE_HZ, THROTTLE, Z_SUM_ERR
+from app.core.control.paparazzi import RATE_HZ, THROTTLE, Z_SUM_ERR
 from app.core.errors import InputError, Problem
 from app.vehicles.base import OptionValue
 from app.vehicles.errors import VehicleError

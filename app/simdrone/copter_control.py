@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
-from app.core.plants.vertical import GRAVITY_M_S2
+from app.core.models.vertical import GRAVITY_M_S2
 from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, throttle_command
 
 HOVER_THRUST: Final = 0.62

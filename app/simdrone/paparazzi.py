@@ -8,8 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, Self
 
-from app.core.control.fixed_point import fix
-from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, SPEED_BITS
+from app.core.control.paparazzi import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
 from app.simdrone import paparazzi_telemetry
 from app.simdrone.body import (
     ACCEPTED,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from app.core.control.vertical_loop import POSITION_BITS, SPEED_BITS
+from app.core.control.paparazzi import POSITION_BITS, SPEED_BITS
 from app.simdrone.body import ARMED, Fields
 
 PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(

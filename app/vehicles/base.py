@@ -7,7 +7,7 @@ from typing import Final, Literal, Protocol
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.policy import Gains
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 
 OptionValue = bool | int | float | str
 Ending = Literal["completed", "aborted", "invalid"]

@@ -5,8 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.fixed_point import measured
-from app.core.control.vertical_loop import (
+from app.core.control.paparazzi import (
     FB_CMD,
     FF_CMD,
     FULL_THRUST,
@@ -18,11 +17,12 @@ from app.core.control.vertical_loop import (
     STEP_S,
     Z_REF,
     detect_flight,
+    measured,
     start,
     step,
 )
 from app.core.kernels import kernel
-from app.core.plants.vertical import GRAVITY_M_S2
+from app.core.models.vertical import GRAVITY_M_S2
 
 Rows = NDArray[np.float64]
 Integers = NDArray[np.int64]

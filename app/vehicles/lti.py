@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from app.core.experiments.pitch_tracking import DETAIL_CHANNELS, OUTPUT, WINDOW_S, PitchTracking, named_channels
-from app.core.plants.f16 import SYSTEM
-from app.core.plants.pitch import (
+from app.core.models.f16 import (
     AMPLITUDE_RAD,
     DETAIL,
     MEMORY_SIZE,
@@ -19,11 +18,12 @@ from app.core.plants.pitch import (
     REFERENCE,
     STATES,
     STEP_S,
+    SYSTEM,
     rollout,
     transitions,
 )
 from app.core.policy import Gains, is_finite, shortened
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Samples, Trajectory
 from app.vehicles.base import (
     FlightOptions,
     FlightRecord,

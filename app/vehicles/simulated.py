@@ -5,10 +5,20 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from app.core.control.fixed_point import INT32_MAX, INT32_MIN, fix
-from app.core.control.vertical_loop import ALT, CLIMB, POSITION_BITS, RATE_HZ, SPEED_BITS, STEP_S, THROTTLE
+from app.core.control.paparazzi import (
+    ALT,
+    CLIMB,
+    INT32_MAX,
+    INT32_MIN,
+    POSITION_BITS,
+    RATE_HZ,
+    SPEED_BITS,
+    STEP_S,
+    THROTTLE,
+    fix,
+)
 from app.core.policy import Gains, shortened
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest
 from app.vehicles.errors import VehicleError
 from app.vehicles.holding import accept_gains

@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.vertical_loop import RATE_HZ, STEP_S
+from app.core.control.paparazzi import RATE_HZ, STEP_S
 from app.core.errors import Problem
+from app.core.formatting import percent
 from app.core.policy import Gains
-from app.core.wording import percent
 from app.vehicles.base import Vehicle, VehicleOption
 from app.vehicles.disturbances import gusts, streams
 from app.vehicles.kernels import (
@@ -59,7 +59,7 @@ class TwinFlight:
     """A simulation by the protocol of `app.vehicles.simulated`.
 
     `options` are those of the kind, complete. What differs between flights depends on `seed` alone; after `MAX_STEPS`
-    its gusts come again. `autopilot` is the loop's memory, the state of app.core.control.vertical_loop first.
+    its gusts come again. `autopilot` is the loop's memory, the state of app.core.control.paparazzi first.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:

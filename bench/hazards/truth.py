@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from bench.hazards.cases import ABORT, FOR_GOOD_S, Case
 from bench.hazards.expectations import EXPECTED, HARMLESS, LEADS
 from bench.hazards.hostility import PILOTS

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import minimize
 
-from app.core.checking import check_definition
 from app.core.definition import Definition, Flight, OptionValue, StopRule
-from app.core.gate import check_policy
 from app.core.policy import Vector
-from app.core.predictions import prediction_of
-from app.core.proposing import next_proposal
-from app.core.strategies import STRATEGIES
+from app.core.tuning.definition_checks import check_definition
+from app.core.tuning.gate import check_policy
+from app.core.tuning.predictions import prediction_of
+from app.core.tuning.proposals import next_proposal
+from app.core.tuning.strategies import STRATEGIES
 from bench.targets.flying import EXPERIMENT, SPACE, Method, Tuning
 
 if TYPE_CHECKING:

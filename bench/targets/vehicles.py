@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 from scipy.stats import qmc
 
-from app.core.descent import minimise_in_box
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains, Vector
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.trajectory import Samples, Trajectory
+from app.core.tuning.trust_region import minimise_in_box
 from app.vehicles.base import OptionValue
 from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, JsbsimFlight
 from app.vehicles.kernels import ALTITUDE, Rows

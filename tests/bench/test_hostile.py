@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.simdrone.faults import FAULTS
 from bench.hazards.cases import SAFE, TUNED, Case, Mishap
 from bench.hazards.expectations import EXPECTED

@@ -5,7 +5,7 @@ import pytest
 from app.campaigns.headless import CampaignListener, HeadlessTrial, fly_campaign
 from app.core.definition import Definition, StopRule
 from bench.targets.vehicles import noise_free_error, population
-from tests.core.flying import compiled_only
+from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
 

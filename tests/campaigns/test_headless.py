@@ -6,8 +6,8 @@ from app.campaigns import headless
 from app.campaigns.headless import CampaignListener, fly_campaign
 from app.core.definition import Definition, StopRule
 from app.core.experiments.base import Experiment
-from app.core.glitches import Glitch
-from app.core.trajectory import Trajectory
+from app.core.records.glitches import Glitch
+from app.core.records.trajectory import Trajectory
 
 SPIKE = Glitch(kind="acceleration", start_s=1.0, end_s=1.1, sentence="The altitude jumps.")
 

@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from app.campaigns import landscapes
 from app.campaigns.tasks import LandscapeJob
-from app.core.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import plan_grid, predict_points
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner

@@ -152,7 +152,7 @@ def test_gains_of_ones_own_are_judged_without_searching_the_model_again(
     def searched(*_: object) -> None:
         raise AssertionError("the start gains are stored with the first proposal")
 
-    monkeypatch.setattr("app.core.starting.model_optimum", searched)
+    monkeypatch.setattr("app.core.tuning.corrected_model.model_optimum", searched)
     trial = create_trial(client, campaign["id"], gains={**gains, "kp": gains["kp"] + 10})
     assert trial["gate"]["passed"]
 

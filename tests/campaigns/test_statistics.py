@@ -21,7 +21,7 @@ from tests.builders import (
     problems_of,
     run_jobs,
 )
-from tests.core.flying import TAKEOFF, TWIN
+from tests.core.tuning.flying import TAKEOFF, TWIN
 
 LONG = {"strategy": "manual", "stop": {"kind": "budget", "max_flights": 50}}
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}

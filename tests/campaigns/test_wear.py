@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.db.session import Database
 from app.vehicles.base import FlightRecord
 from tests.builders import create_ready_campaign, get, land, lift_off, run_jobs
-from tests.core.flying import TAKEOFF, TWIN, compiled_only
+from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only
 
 pytestmark = compiled_only
 

@@ -54,7 +54,7 @@ def test_a_user_without_a_home_gets_no_cache(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_each_state_of_the_sources_has_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "control").mkdir()
-    (tmp_path / "plants").mkdir()
+    (tmp_path / "models").mkdir()
     source = tmp_path / "control" / "loop.py"
     monkeypatch.setattr(kernels, "_HERE", tmp_path)
     names = []

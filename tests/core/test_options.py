@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.core.options import Option
+from app.core.definition import Option
 
 NUMBER = Option(name="noise", title="Noise", default=0.5, unit="rad", lower=0.0, upper=1.0)
 COUNT = Option(name="seed", title="Seed", default=1, lower=0)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from app.core.errors import GainsError
 from app.core.experiments.takeoff import Takeoff
-from tests.core.bowl import QuadraticExperiment
+from tests.core.tuning.bowl import QuadraticExperiment
 
 SPACE = Takeoff().space
 GOOD = {"kp": 283, "ki": 13, "kd": 82}

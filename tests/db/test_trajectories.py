@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.common.errors import StorageError
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.db.trajectories import pack, unpack
 from tests.builders import create_climb
 

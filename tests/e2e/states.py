@@ -26,7 +26,7 @@ from app.campaigns.trials.schemas import Classification, NewTrial
 from app.common.errors import StorageError
 from app.common.settings import Settings
 from app.controller_checks import service as controller_checks
-from app.core.landscape import plan_grid, predict_points
+from app.core.tuning.landscape import plan_grid, predict_points
 from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registration

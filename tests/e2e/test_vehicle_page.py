@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.builders import csv_of
-from tests.core.flying import TAKEOFF, TWIN
+from tests.core.tuning.flying import TAKEOFF, TWIN
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
 from tests.e2e.test_pages import THEMES, show, violations

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.landscape import Landscape, Slice
+from app.core.tuning.landscape import Landscape, Slice
 from app.figures.landscape import LandscapeFigure, Search, Tried, lowest, scale_of
 from tests.figures.builders import flight, history, proposal, trace
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.common.errors import StorageError
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.flights.record_spool import RESERVED_BYTES, Spool
 from app.vehicles.base import FlightRecord
 

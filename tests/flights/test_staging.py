@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 from app.common.data_folder import telemetry_log
 from app.common.errors import ConflictError
 from app.common.settings import Settings
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.db.models import FlightRow
 from app.db.session import Database
 from app.db.types import utc_now

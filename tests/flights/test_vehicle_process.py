@@ -12,7 +12,6 @@ from types import SimpleNamespace
 import pytest
 
 from app.common.states import ActKind
-from app.fleet.pipe import PipeClosedError, WorkerPipe
 from app.flights import vehicle_process as seat_module
 from app.flights.process_messages import (
     CancelFlight,
@@ -32,6 +31,7 @@ from app.flights.process_messages import (
     VehicleRequest,
 )
 from app.flights.vehicle_process import VehicleProcess
+from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.vehicles.base import FlightOptions, Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import Message

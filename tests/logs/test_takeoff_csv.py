@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from app.core.errors import TrajectoryError
-from app.core.metrics import require_scorable
+from app.core.records.metrics import require_scorable
 from app.logs.takeoff_csv import MAX_ROWS, read_takeoff_csv
 from tests.vehicles.flying import TAKEOFF
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from app.reproductions.f16_campaigns import BEST_ERROR, showcase, study
-from tests.core.flying import compiled_only
+from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
 

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 MULTIPLY = """
-import app.core.calibration
+import app.core.tuning.calibration
 import numpy as np
 matrix = np.ones((700, 700))
 matrix @ matrix

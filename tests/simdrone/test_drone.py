@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.core.control.vertical_loop import RATE_HZ
+from app.core.control.paparazzi import RATE_HZ
 from app.core.errors import InputError
 from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, new_body, throttle_command
 from app.simdrone.drone import LARGEST_LAG_S

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.core.control.vertical_loop import ALT
+from app.core.control.paparazzi import ALT
 from app.simdrone.body import vertical_command
 from app.vehicles.open import check_options
 from app.vehicles.twin import TwinFlight

@@ -10,7 +10,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest, Vehicle
 from app.vehicles.open import VEHICLE_KINDS, open_vehicle
 

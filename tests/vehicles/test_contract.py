@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.core.errors import GainsError, InputError
-from app.core.trajectory import CHANNEL_UNITS, Trajectory
+from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.vehicles.base import FlightOptions, Sample, StopRequest, Vehicle
 from app.vehicles.errors import VehicleError
 from app.vehicles.open import VEHICLE_KINDS, open_vehicle

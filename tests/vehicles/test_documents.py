@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.trajectory import CHANNEL_UNITS
+from app.core.records.trajectory import CHANNEL_UNITS
 from app.vehicles.base import OptionValue
 from app.vehicles.open import VEHICLE_KINDS
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from app.core.control.vertical_loop import ALT
+from app.core.control.paparazzi import ALT
 from app.core.errors import InputError
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.vehicles.base import OptionValue
 from app.vehicles.jsbsim.flight import JsbsimFlight, new_aircraft
 from app.vehicles.open import check_options

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 
 from app.campaigns.schemas import Definition, Sort
 from app.common.states import CampaignState, JobState, Outcome, TrialState, VehicleState
-from app.core.trajectory import CHANNEL_UNITS
+from app.core.records.trajectory import CHANNEL_UNITS
 from tests.runtime.processes import Serving, environment
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "api.md"

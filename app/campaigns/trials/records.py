@@ -29,11 +29,10 @@ from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTI
 from app.core.errors import TrajectoryError
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
-from app.core.glitches import find_glitches, repaired
 from app.core.policy import Gains
-from app.core.stopping import landing_battery_v
-from app.core.thinning import select_samples
-from app.core.trajectory import Trajectory
+from app.core.records.glitches import find_glitches, repaired
+from app.core.records.trajectory import Trajectory, select_samples
+from app.core.tuning.stop_rules import landing_battery_v
 from app.db import trajectories
 from app.db.models import CampaignRow, TrialRow
 from app.db.types import utc_now

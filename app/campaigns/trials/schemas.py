@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
-from app.core.statistics import Verdict
+from app.core.statistics.comparisons import Verdict
 
 Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000)]
 

@@ -27,8 +27,8 @@ from app.common.state_machine import check_action, check_version
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.experiments import experiment_of
-from app.core.gate import GateResult, check_policy, require_flyable
 from app.core.policy import Gains
+from app.core.tuning.gate import GateResult, check_policy, require_flyable, space_of
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -70,7 +70,7 @@ def check_flown_gains(session: Session, campaign: CampaignRow, flown: Gains) -> 
 def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
     """The gains, complete and in order, and the gate's result."""
     definition = definition_of(campaign)
-    experiment, space = experiment_of(definition), proposals.space_of(definition)
+    experiment, space = experiment_of(definition), space_of(definition)
     gains = space.complete(asked)
     flown = history.flown_gains(history.trials_of(session, campaign.id))
     searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
@@ -122,7 +122,7 @@ def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[
     best = dict(now.winner.gains)
     if variant == "repeat":
         return best
-    space = proposals.space_of(definition_of(campaign))
+    space = space_of(definition_of(campaign))
     proposed = space.vector(proposals.require_fresh_proposal(session, campaign).gains)
     half = space.mapping(space.nearest((space.vector(best) + proposed) / 2.0))
     if half == best or np.array_equal(space.vector(half), proposed):

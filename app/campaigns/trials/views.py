@@ -20,11 +20,10 @@ from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTI
 from app.core.definition import Flight
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter
+from app.core.formatting import percent
 from app.core.policy import Gains
-from app.core.statistics import Group, PooledScatter, compare, groups_of, pool_scatter
-from app.core.thinning import select_samples
-from app.core.trajectory import CHANNEL_UNITS, Trajectory
-from app.core.wording import percent
+from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
+from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 

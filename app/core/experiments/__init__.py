@@ -8,8 +8,7 @@ from app.core.definition import Definition, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.experiments.takeoff import Takeoff
-from app.core.experiments.takeoff_copters import TAKEOFF_ARDUPILOT, TAKEOFF_PX4
+from app.core.experiments.takeoff import TAKEOFF_ARDUPILOT, TAKEOFF_PX4, Takeoff
 
 _ALL: Final[tuple[Experiment, ...]] = (Takeoff(), TAKEOFF_ARDUPILOT, TAKEOFF_PX4, PitchTracking())
 

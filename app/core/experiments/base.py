@@ -1,18 +1,133 @@
-"""Interface of an experiment. A new one needs one file and one line in the registry."""
+"""Interface of an experiment. A new one needs one file and one line in the registry.
+
+One check of a policy before its flight, and its result.
+
+Deterministic points that fill a box evenly.
+
+Probability distribution of a model's parameters.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from dataclasses import dataclass, field, replace
+from itertools import count as numbers_from
+from itertools import islice
+from typing import Final, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.checks import Check, Envelope
-from app.core.definition import OptionValue
-from app.core.options import Option
-from app.core.policy import PolicySpace, Vector
-from app.core.spread import ParameterDistribution
-from app.core.trajectory import Samples, Trajectory
+from app.core.definition import Option, OptionValue
+from app.core.policy import Gains, PolicySpace, Vector
+from app.core.records.trajectory import Samples, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Result of one check: the worst value, in the same measure as the limit, and the gain that caused it.
+
+    `case` names the simulated case of the worst value. `offer` holds the nearest value of each refused gain that would
+    pass, if there is one; in the gate's result, a value that passes all checks with such a limit.
+    """
+
+    name: str
+    passed: bool
+    sentence: str
+    worst: float
+    limit: float
+    gain: str = ""
+    case: str = ""
+    offer: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Envelope:
+    """Limits of a model run: it may rise to `ceiling_m` (m), and may be aborted to `safe_gains` at any instant."""
+
+    ceiling_m: float
+    safe_gains: Gains
+
+
+def halton(dimensions: int, count: int) -> NDArray[np.float64]:
+    """The first points of the Halton sequence in the unit cube, shape (count, dimensions).
+
+    Coordinate d of point i is the radical inverse of i in base p, the d-th prime: its digits reversed behind the point
+    (Halton, 1960). The same numbers as `scipy.stats.qmc.Halton(dimensions, scramble=False)`, a package that takes
+    longer to import than a proposal takes to compute.
+    """
+    points = np.zeros((count, dimensions))
+    for dimension, base in enumerate(_primes(dimensions)):
+        remaining, digit_value = np.arange(count), 1.0 / base
+        while remaining.any():
+            remaining, digit = np.divmod(remaining, base)
+            points[:, dimension] += digit * digit_value
+            digit_value /= base
+    return points
+
+
+def _primes(count: int) -> list[int]:
+    """The first prime numbers."""
+    return list(islice((n for n in numbers_from(2) if all(n % divisor for divisor in range(2, n))), count))
+
+
+WIDEST_SD: Final = 2.0
+"""Truncation of the samples, in standard deviations from the mean."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterDistribution:
+    """A normal distribution over the model's parameters, in the order of `model_parameters`.
+
+    Truncated at two standard deviations along its principal axes, and at the parameters' own limits. `origin` names its
+    source.
+    """
+
+    mean: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    origin: str
+
+    def sample(self, experiment: "ModelledExperiment", count: int) -> "Matrix":
+        """The mean, then `count` − 1 quasi-random models, shape (count, m); deterministic."""
+        unit = halton(len(self.mean), count)[1:]
+        return np.vstack((self._models(experiment, np.full((1, len(self.mean)), 0.5)), self._models(experiment, unit)))
+
+    def draw_random(self, experiment: "ModelledExperiment", count: int, seed: int) -> "Matrix":
+        """Random models from the same distribution, shape (count, m)."""
+        return self._models(experiment, np.random.default_rng(seed).random((count, len(self.mean))))
+
+    def _models(self, experiment: "ModelledExperiment", unit: "Matrix") -> "Matrix":
+        """Models from uniformly distributed numbers in 0 … 1, shape (k, m)."""
+        from scipy.special import ndtri
+
+        variances, axes = np.linalg.eigh(np.array(self.covariance))
+        sd = np.sqrt(np.maximum(variances, 0.0))
+        edge = 0.5 - 0.5 * _PROBABILITY_WITHIN
+        normal = ndtri(edge + unit * _PROBABILITY_WITHIN)
+        lower = [parameter.lower for parameter in experiment.model_parameters]
+        upper = [parameter.upper for parameter in experiment.model_parameters]
+        return np.asarray(np.clip(np.array(self.mean) + (normal * sd) @ axes.T, lower, upper))
+
+
+_PROBABILITY_WITHIN: Final = 0.9544997361036416
+
+
+NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="nothing: there is no model")
+
+
+def prior_distribution(experiment: "Experiment") -> ParameterDistribution:
+    """Distribution given by the data sheet: each parameter within `known_within` of its nominal value.
+
+    Empty without a model.
+    """
+    modelled = experiment.modelled
+    if modelled is None:
+        return NO_PARAMETERS
+    sd: Vector = np.array([parameter.known_within for parameter in modelled.model_parameters]) / WIDEST_SD
+    return ParameterDistribution(
+        mean=tuple(float(value) for value in modelled.nominal_model),
+        covariance=tuple(tuple(row) for row in np.diag(sd**2).tolist()),
+        origin="the data sheet",
+    )
+
 
 Matrix = NDArray[np.float64]
 

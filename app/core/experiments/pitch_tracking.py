@@ -5,15 +5,21 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.core.checks import Check, Envelope
-from app.core.definition import OptionValue
-from app.core.experiments.base import Matrix, ModelParameter, Scatter, SimplexSearch, informed_parameters
-from app.core.metrics import mean_absolute_error, require_scorable
-from app.core.options import Option, with_defaults
-from app.core.plants.f16 import ELEMENTS, perturbed
-from app.core.plants.pitch import (
+from app.core.definition import Option, OptionValue, with_defaults
+from app.core.experiments.base import (
+    Check,
+    Envelope,
+    Matrix,
+    ModelParameter,
+    ParameterDistribution,
+    Scatter,
+    SimplexSearch,
+    informed_parameters,
+)
+from app.core.models.f16 import (
     ALTITUDE,
     ANGLE_OF_ATTACK,
+    ELEMENTS,
     ELEVATOR,
     LARGEST_ERROR_RAD,
     PITCH,
@@ -23,13 +29,14 @@ from app.core.plants.pitch import (
     STATES,
     STEP_S,
     THRUST,
+    perturbed,
     track,
     track_batch,
     transitions,
 )
 from app.core.policy import Gain, PolicySpace, Vector
-from app.core.spread import ParameterDistribution
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.metrics import mean_absolute_error, require_scorable
+from app.core.records.trajectory import Samples, Trajectory
 
 WINDOW_S: Final = 60.0
 OUTPUT: Final = "pitch_error_rad"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from app.core.control.vertical_loop import RATE_HZ, STEP_S
+from app.core.control.paparazzi import RATE_HZ, STEP_S
 from app.vehicles.disturbances import gusts, streams
 from app.vehicles.errors import VehicleError
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, Integers, Rows, control
@@ -65,7 +65,7 @@ class JsbsimFlight:
     """A simulation by the protocol of `app.vehicles.simulated`.
 
     `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone; after `MAX_STEPS` they
-    come again. `autopilot` is the loop's memory, the state of app.core.control.vertical_loop first.
+    come again. `autopilot` is the loop's memory, the state of app.core.control.paparazzi first.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:

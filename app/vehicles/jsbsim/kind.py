@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from app.core.errors import Problem
+from app.core.formatting import percent
 from app.core.policy import Gains
-from app.core.wording import percent
 from app.vehicles.base import Vehicle, VehicleOption
 from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, MASS_KG, JsbsimFlight
 from app.vehicles.kernels import COMMAND_SIZE

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.vehicles.base import Ending
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.machine import Trial

@@ -6,10 +6,10 @@ from typing import Final, Literal
 
 import numpy as np
 
-from app.core.aligning import Alignment, align, compare, resample
 from app.core.errors import TrajectoryError
-from app.core.metrics import MAX_GAP_S
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.alignment import Alignment, align, compare, resample
+from app.core.records.metrics import MAX_GAP_S
+from app.core.records.trajectory import Samples, Trajectory
 from app.vehicles.base import OptionValue
 
 Scored = Literal["vehicle", "mocap"]

@@ -6,9 +6,9 @@ from fastapi.testclient import TestClient
 
 from app.campaigns import computation, proposals
 from app.core.experiments import get_experiment
-from app.core.glitches import find_glitches
-from app.core.spread import prior_distribution
-from app.core.trajectory import Trajectory
+from app.core.experiments.base import prior_distribution
+from app.core.records.glitches import find_glitches
+from app.core.records.trajectory import Trajectory
 from app.db.models import CampaignRow, ProposalRow, VehicleRow
 from app.db.session import Database
 from app.vehicles.base import FlightRecord

@@ -5,9 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.core.control.fixed_point import INT32_MAX
-from app.core.control.replay import INPUTS, OUTPUTS, LoopTrace, replay_trace
-from app.core.control.vertical_loop import FULL_THRUST, VerticalLoop
+from app.core.control.paparazzi import FULL_THRUST, INPUTS, INT32_MAX, OUTPUTS, LoopTrace, VerticalLoop, replay_trace
 from app.logs.loop_trace import read_loop_trace
 
 TRACES = sorted((Path(__file__).parents[2] / "data" / "vertical_loop").glob("*.csv.gz"))

@@ -1,16 +1,14 @@
 import numpy as np
 import pytest
 
-from app.core.checks import Envelope
 from app.core.errors import TrajectoryError
 from app.core.experiments import get_experiment
+from app.core.experiments.base import Envelope, prior_distribution
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.plants.f16 import A, B, perturbed
-from app.core.plants.pitch import transitions
-from app.core.spread import prior_distribution
-from app.core.strategies.simplex import model_optimum
-from app.core.trajectory import CHANNEL_UNITS, Trajectory
-from tests.core.flying import compiled_only
+from app.core.models.f16 import A, B, perturbed, transitions
+from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
+from app.core.tuning.corrected_model import model_optimum
+from tests.core.tuning.flying import compiled_only
 
 TRUTH = PitchTracking({"perturbation": 0.0})
 HAND = TRUTH.space.default

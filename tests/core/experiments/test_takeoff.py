@@ -12,7 +12,7 @@ import pytest
 from app.core.errors import InputError, TrajectoryError
 from app.core.experiments import EXPERIMENTS, get_experiment
 from app.core.experiments.takeoff import Takeoff
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 
 TAKEOFF = Takeoff()
 TWIN_MODEL = np.array([0.61, 0.3, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.core.experiments.takeoff import Takeoff
-from app.core.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.limits import Limits
 from app.vehicles.mavlink.machine import Plan, Trial, advance, begin

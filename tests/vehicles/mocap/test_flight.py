@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.core.experiments.takeoff import Takeoff
-from app.core.glitches import find_glitches
+from app.core.records.glitches import find_glitches
 from app.vehicles.base import FlightRecord, OptionValue
 from app.vehicles.errors import VehicleError
 from app.vehicles.mavlink.kind import MAVLINK

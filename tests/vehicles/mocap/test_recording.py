@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from app.core.experiments.takeoff import Takeoff
-from app.core.glitches import find_glitches
-from app.core.trajectory import Samples, Trajectory
+from app.core.records.glitches import find_glitches
+from app.core.records.trajectory import Samples, Trajectory
 from app.vehicles.mocap.recording import add_secondary_altitude
 
 ZERO_S = 700.0

@@ -1,0 +1,382 @@
+"""Check of the replica against a log of the vertical loop that was sampled far below its 512 Hz.
+
+The check has two parts. A sample contains the inputs of its own commands, so the commands must follow exactly, apart
+from one step of 1/512 s between fields that were collected around a step boundary. The reference and the integrator
+evolve between samples; they are simulated from the command on and compared within the stated tolerances.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.control import paparazzi as loop
+from app.core.policy import Gains
+from app.core.records.trajectory import Samples
+
+FIELDS: Final = (
+    "z_sp", "zd_sp", "z", "zd", "zdd", "z_ref", "zd_ref", "zdd_ref",
+    "adapt_X", "adapt_P", "adapt_Xmeas", "z_sum_err", "ff_cmd", "fb_cmd", "thrust",
+)  # fmt: skip
+GAINS: Final = ("kp", "ki", "kd")
+
+STALE_FIELDS: Final = ("state", "reference", "integrator")
+COMMANDS: Final = ("ff_cmd", "fb_cmd", "thrust")
+SIMULATED: Final = ("z_ref", "zd_ref", "zdd_ref", "z_sum_err")
+
+TIME_TOLERANCE_S: Final = 0.02
+TOLERANCES: Final[Mapping[str, float]] = MappingProxyType(
+    {"z_ref": 0.01, "zd_ref": 0.02, "zdd_ref": 0.1, "z_sum_err": 0.02}
+)
+"""Largest differences beyond those explained by 20 ms of time uncertainty, in m, m/s and m/s²; for the integrator as a
+share of its largest value."""
+
+UNITS: Final[Mapping[str, float]] = MappingProxyType({"z_ref": 1 / 256, "zd_ref": 1 / 2**19, "zdd_ref": 1 / 2**10})
+"""Size of one count of each reference, in m, m/s and m/s²."""
+_FIT_S: Final = 2.0
+_ROUNDING: Final = 1
+_TILT_ROUNDING: Final = 3
+_NEAR: Final = 4
+_FEWEST_TO_INFER: Final = 20
+_MAX_TO_INFER: Final = 2000
+_MAX_STEPS: Final = loop.RATE_HZ * 120
+
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopLog:
+    """Samples of the loop.
+
+    `time_s` has shape (n,) and increases; `values` has shape (n, 15) in the order of `FIELDS`, 32-bit integers with the
+    loop's own fractions, z down; n ≥ 1.
+    """
+
+    time_s: Samples
+    values: Counts
+
+    def __getitem__(self, name: str) -> Counts:
+        return self.values[:, FIELDS.index(name)]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def idle(self) -> NDArray[np.bool_]:
+        """Samples in which the loop only tracks the vehicle and commands nothing itself, shape (n,)."""
+        idle: NDArray[np.bool_] = (self["z_ref"] == self["z"]) & (self["zd_ref"] == self["zd"]) & (self["zdd_ref"] == 0)
+        return idle
+
+
+@dataclass(frozen=True, slots=True)
+class CommandCheck:
+    """Result of checking each sample's commands against the sample itself.
+
+    `exact` samples agree to the last bit; `tilted` of these with a tilt of up to `largest_tilt_deg`. `stale` counts the
+    samples that agree only if the named fields are one step old or new. `different` samples have no explanation;
+    `first_different_s` is the time of the first.
+    """
+
+    rows: int
+    exact: int
+    tilted: int
+    largest_tilt_deg: float
+    stale: Mapping[str, int]
+    different: int
+    first_different_s: float | None
+
+    @property
+    def passed(self) -> bool:
+        return self.rows > 0 and not self.different
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationCheck:
+    """Largest differences between log and simulation over `duration_s` from the command on, as in `TOLERANCES`."""
+
+    command_s: float
+    duration_s: float
+    rows: int
+    largest_difference: Mapping[str, float]
+
+    @property
+    def passed(self) -> bool:
+        return all(value <= TOLERANCES[name] for name, value in self.largest_difference.items())
+
+
+@dataclass(frozen=True, slots=True)
+class Overlay:
+    """Recorded and replicated signals of the same samples, for plotting.
+
+    `time_s` has shape (n,); `recorded` and `replica` hold each signal by name, shape (n,). `differs` marks the samples
+    without an explanation.
+    """
+
+    time_s: Samples
+    recorded: Mapping[str, Counts]
+    replica: Mapping[str, Samples | Counts]
+    differs: Mapping[str, NDArray[np.bool_]]
+
+
+def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
+    """Compare ff_cmd, fb_cmd and thrust of every active sample with the values computed from the sample itself."""
+    return compare_commands(log, gains)[0]
+
+
+def compare_commands(log: LoopLog, gains: Gains) -> tuple[CommandCheck, Overlay]:
+    """As `check_commands`, and return both sides of `COMMANDS` for every active sample."""
+    active = ~log.idle
+    sample = LoopLog(log.time_s[active], log.values[active])
+    tilt = _tilts_deg(sample)
+    replica = _replica_commands(sample, gains, tilt)
+    sums = sample["thrust"] == np.clip(sample["ff_cmd"] + sample["fb_cmd"], 0, loop.FULL_THRUST)
+    exact = np.isfinite(tilt) & (replica["fb_cmd"] == sample["fb_cmd"]) & sums
+    left = ~exact
+    stale: dict[str, int] = {}
+    for fields in STALE_FIELDS:
+        explained = left & sums & _stale(sample, gains, fields)
+        stale[fields] = int(explained.sum())
+        left &= ~explained
+    tilted = exact & (tilt > 0.0)
+    check = CommandCheck(
+        rows=len(sample),
+        exact=int(exact.sum()),
+        tilted=int(tilted.sum()),
+        largest_tilt_deg=float(tilt[tilted].max()) if tilted.any() else 0.0,
+        stale=stale,
+        different=int(left.sum()),
+        first_different_s=float(sample.time_s[left][0]) if left.any() else None,
+    )
+    recorded = {name: sample[name] for name in COMMANDS}
+    differs = {name: left & (replica[name] != recorded[name]) for name in COMMANDS}
+    return check, Overlay(sample.time_s, recorded, replica, differs)
+
+
+def check_simulation(log: LoopLog) -> SimulationCheck | None:
+    """Simulate the reference and the integrator from the first command that lasts two seconds.
+
+    None if there is none: the loop is active from the first sample on, never, or only briefly.
+    """
+    found = compare_simulation(log)
+    return None if found is None else found[0]
+
+
+def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
+    """As `check_simulation`, and return both sides of `SIMULATED` for every sample after the command.
+
+    NaN where the integrator is not active.
+    """
+    found = _first_command(log)
+    if found is None:
+        return None
+    first, last = found
+    part = LoopLog(log.time_s[first : last + 1], log.values[first : last + 1])
+    reference = _simulated_reference(part)
+    steps, offset_s = _aligned(part, reference)
+    outside: dict[str, Samples] = {
+        name: np.float64(unit) * _outside(part[name], reference[:, place], steps)
+        for place, (name, unit) in enumerate(UNITS.items())
+    }
+    integrator = _simulated_integrator(part, reference[:, 0], steps)
+    largest = max(float(np.abs(part["z_sum_err"][1:][np.isfinite(integrator)]).max(initial=0.0)), 1.0)
+    outside["z_sum_err"] = np.nan_to_num(np.abs(part["z_sum_err"][1:] - integrator) / largest)
+    check = SimulationCheck(
+        command_s=float(part.time_s[0]) + offset_s,
+        duration_s=float(part.time_s[-1] - part.time_s[0]),
+        rows=len(part) - 1,
+        largest_difference={name: float(values.max()) for name, values in outside.items()},
+    )
+    overlay = Overlay(
+        part.time_s[1:],
+        {name: part[name][1:] for name in SIMULATED},
+        {**{name: reference[steps, place] for place, name in enumerate(UNITS)}, "z_sum_err": integrator},
+        {name: values > TOLERANCES[name] for name, values in outside.items()},
+    )
+    return check, overlay
+
+
+def infer_gains(log: LoopLog) -> dict[str, float] | None:
+    """Infer the integer gains from the log.
+
+    They are those that reproduce the feedback of more samples than any neighbours, and of most samples. The search
+    starts near a least squares fit on the three errors. None if the flight cannot distinguish neighbouring gains.
+    """
+    active = np.flatnonzero(~log.idle)
+    if len(active) < _FEWEST_TO_INFER:
+        return None
+    active = active[:: max(1, len(active) // _MAX_TO_INFER)]
+    sample = LoopLog(log.time_s[active], log.values[active])
+    ez, ev = _errors(sample)
+    parts = np.column_stack([-ez / 2**7, -sample["z_sum_err"] / 2**16, -ev / 2**16, np.ones(len(sample))])
+    fitted = np.linalg.lstsq(parts, sample["fb_cmd"].astype(np.float64), rcond=None)[0][:3]
+    if not (np.abs(fitted) < 2**20).all():
+        return None
+    around = product(*(range(round(each) - _NEAR, round(each) + _NEAR + 1) for each in fitted.tolist()))
+    candidates = [dict(zip(GAINS, map(float, each), strict=True)) for each in around if min(each) >= 0]
+    followed = [int((_feedback(each, ez, ev, sample["z_sum_err"]) == sample["fb_cmd"]).sum()) for each in candidates]
+    most = max(followed, default=0)
+    unique = followed.count(most) == 1 and most > len(sample) / 2
+    return candidates[followed.index(most)] if unique else None
+
+
+def _wrap32(values: Counts) -> Counts:
+    return ((values + 2**31) & 0xFFFFFFFF) - 2**31
+
+
+def _errors(sample: LoopLog) -> tuple[Counts, Counts]:
+    ez = np.clip(_wrap32(sample["z_ref"] - sample["z"]), -loop.POSITION_ERROR_MAX, loop.POSITION_ERROR_MAX)
+    ev = np.clip(_wrap32(sample["zd_ref"] - sample["zd"]), -loop.SPEED_ERROR_MAX, loop.SPEED_ERROR_MAX)
+    return ez, ev
+
+
+def _feedback(gains: Gains, ez: Counts, ev: Counts, z_sum_err: Counts) -> Counts:
+    kp, ki, kd = (int(gains[name]) for name in GAINS)
+    return _wrap32((_wrap32(-kp * ez) >> 7) + (_wrap32(-kd * ev) >> 16) + (_wrap32(-ki * z_sum_err) >> 16))
+
+
+def _replica_commands(sample: LoopLog, gains: Gains, tilt_deg: Samples) -> dict[str, Counts]:
+    """Commands of the replica for every sample, shape (n,) each; at the sample's tilt if a tilt explains it."""
+    level = np.array([loop.feed_forward(value, loop.LEVEL) for value in sample["zdd_ref"].tolist()], dtype=np.int64)
+    forward = np.where(np.isfinite(tilt_deg), sample["ff_cmd"], level)
+    back = _feedback(gains, *_errors(sample), sample["z_sum_err"])
+    return {"ff_cmd": forward, "fb_cmd": back, "thrust": np.clip(forward + back, 0, loop.FULL_THRUST)}
+
+
+def _tilts_deg(sample: LoopLog) -> Samples:
+    """Tilt with which ff_cmd follows from zdd_ref, shape (n,): 0 for level, NaN if no tilt up to 60° explains it."""
+    tilts = np.full(len(sample), np.nan)
+    for row, (zdd_ref, ff_cmd) in enumerate(zip(sample["zdd_ref"].tolist(), sample["ff_cmd"].tolist(), strict=True)):
+        level = loop.feed_forward(zdd_ref, loop.LEVEL)
+        if level == ff_cmd:
+            tilts[row] = 0.0
+        elif ff_cmd:
+            about = level * loop.LEVEL // ff_cmd
+            for r33 in range(about - _TILT_ROUNDING, about + _TILT_ROUNDING + 1):
+                if loop.LEVEL // 2 <= r33 <= loop.LEVEL and loop.feed_forward(zdd_ref, r33) == ff_cmd:
+                    tilts[row] = np.degrees(np.arccos(r33 / loop.LEVEL))
+    return tilts
+
+
+def _stale(sample: LoopLog, gains: Gains, fields: str) -> NDArray[np.bool_]:
+    """Samples whose ff_cmd and fb_cmd follow once these fields are taken one step older or newer, shape (n,).
+
+    A step changes a position by its speed, rounded to a count, a speed by exactly its acceleration, and the integrator
+    by its error.
+    """
+    found = np.zeros(len(sample), dtype=np.bool_)
+    slack = _feed_forward_change(sample) if fields == "reference" else np.zeros(len(sample), dtype=np.int64)
+    for direction in (-1, 1):
+        for rounding in (-1, 0, 1):
+            moved = sample.values.copy()
+            if fields == "integrator":
+                moved[:, FIELDS.index("z_sum_err")] += direction * _errors(sample)[0] + rounding
+            else:
+                suffix = "_ref" if fields == "reference" else ""
+                z, zd, zdd = (f"{name}{suffix}" for name in ("z", "zd", "zdd"))
+                moved[:, FIELDS.index(z)] += direction * (sample[zd] >> 20) + rounding
+                moved[:, FIELDS.index(zd)] += direction * sample[zdd]
+            other = LoopLog(sample.time_s, moved)
+            back = np.abs(sample["fb_cmd"] - _feedback(gains, *_errors(other), other["z_sum_err"]))
+            found |= back <= _ROUNDING
+    return found & (_forward_difference(sample) <= slack)
+
+
+def _forward_difference(sample: LoopLog) -> Counts:
+    level = np.array([loop.feed_forward(value, loop.LEVEL) for value in sample["zdd_ref"].tolist()], dtype=np.int64)
+    return np.where(np.isfinite(_tilts_deg(sample)), 0, np.abs(sample["ff_cmd"] - level))
+
+
+def _feed_forward_change(sample: LoopLog) -> Counts:
+    """How far ff_cmd moves in one step: 2ζω and ω² are both 3 per s, one count of acceleration is 0.63 of thrust."""
+    change = 3.1 / loop.RATE_HZ * (np.abs(sample["zdd_ref"]) + np.abs(sample["zd_ref"]) / 2**9)
+    return np.ceil(0.63 * change).astype(np.int64) + _ROUNDING
+
+
+def _first_command(log: LoopLog) -> tuple[int, int] | None:
+    """Index of the last sample before the reference starts to move, and of the last one with the same set point."""
+    idle = log.idle
+    for first in np.flatnonzero(idle[:-1] & ~idle[1:]).tolist():
+        same = (log["z_sp"] == log["z_sp"][first + 1]) & ~idle
+        same &= log.time_s <= log.time_s[first] + _MAX_STEPS / loop.RATE_HZ
+        broken = np.flatnonzero(~same[first + 1 :])
+        last = first + int(broken[0]) if broken.size else len(log) - 1
+        if log.time_s[last] - log.time_s[first] >= _FIT_S:
+            return first, last
+    return None
+
+
+def _simulated_reference(part: LoopLog) -> Counts:
+    """z_ref, zd_ref and zdd_ref of every step from the command on, at rest before it: shape (steps, 3)."""
+    replica = loop.VerticalLoop()
+    replica.start(int(part["z"][0]), int(part["zd"][0]))
+    target, z, zd = -int(part["z_sp"][1]), int(part["z"][0]), int(part["zd"][0])
+    rest = round((part.time_s[1] - part.time_s[0] + 2 * TIME_TOLERANCE_S) * loop.RATE_HZ)
+    rows = [(z, zd, 0)] * rest
+    for _ in range(round((part.time_s[-1] - part.time_s[0] + 2 * TIME_TOLERANCE_S) * loop.RATE_HZ)):
+        replica.step(loop.ALT, target, 0, 0, 0, z, zd, loop.LEVEL, False)
+        rows.append((replica.z_ref, replica.zd_ref, replica.zdd_ref))
+    return np.array(rows, dtype=np.int64)
+
+
+def _aligned(part: LoopLog, reference: Counts) -> tuple[NDArray[np.int64], float]:
+    """Align the simulation with the log.
+
+    Returns the simulated step of each sample after the command, shape (n − 1,), and the time from the last sample at
+    rest to the command: where the references agree best over the first two seconds.
+    """
+    interval = part.time_s[1] - part.time_s[0]
+    rest = round((interval + 2 * TIME_TOLERANCE_S) * loop.RATE_HZ)
+    since = np.round((part.time_s[1:] - part.time_s[0]) * loop.RATE_HZ).astype(np.int64)
+    early = since <= _FIT_S * loop.RATE_HZ
+    latest = round((interval + TIME_TOLERANCE_S) * loop.RATE_HZ)
+    shifts = range(-round(TIME_TOLERANCE_S * loop.RATE_HZ), latest + 1)
+
+    def distance(shift: int) -> float:
+        steps = np.clip(since[early] + rest - shift, 0, len(reference) - 1)
+        return float(np.abs(part["zd_ref"][1:][early] - reference[steps, 1]).mean())
+
+    best = min(shifts, key=distance)
+    return np.clip(since + rest - best, 0, len(reference) - 1), best / loop.RATE_HZ
+
+
+def _outside(logged: Counts, simulated: Counts, steps: NDArray[np.int64]) -> Counts:
+    """How far the samples after the command lie outside the simulated range within 20 ms of them, shape (n − 1,)."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    window = 2 * round(TIME_TOLERANCE_S * loop.RATE_HZ) + 1
+    low = minimum_filter1d(simulated, window, mode="nearest")[steps]
+    high = maximum_filter1d(simulated, window, mode="nearest")[steps]
+    outside: Counts = np.maximum(np.maximum(low - logged[1:], logged[1:] - high), 0)
+    return outside
+
+
+def _simulated_integrator(part: LoopLog, z_ref: Counts, steps: NDArray[np.int64]) -> Samples:
+    """Summed error of the samples after the command, shape (n − 1,), from the first one with an active integrator.
+
+    NaN before that sample, and everywhere if the integrator is never active. The position between samples is
+    interpolated from positions and speeds. Of several samples in the same step only the first has a value; the others
+    are NaN.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    summed = np.full(len(steps), np.nan)
+    working = np.flatnonzero(part["z_sum_err"][1:])
+    begin = int(working[0]) if working.size else len(steps)
+    since, first = np.unique(steps[begin:], return_index=True)
+    if len(since) < 2:
+        return summed
+    rows = begin + 1 + first
+    position = CubicHermiteSpline(since, part["z"][rows], part["zd"][rows] / 2**20)
+    each = np.arange(since[0], since[-1] + 1)
+    error = np.clip(z_ref[each] - position(each), -loop.POSITION_ERROR_MAX, loop.POSITION_ERROR_MAX)
+    total, now = np.empty(len(each)), float(part["z_sum_err"][rows[0]])
+    for step, value in enumerate(error.tolist()):
+        if step:
+            now = min(max(now + value, -loop.ERROR_SUM_MAX), loop.ERROR_SUM_MAX)
+        total[step] = now
+    summed[rows - 1] = total[since - since[0]]
+    return summed

@@ -1,0 +1,319 @@
+"""Simulated takeoffs with a gain set, on the exact replica, over the vehicle's parameter distribution, with aborts.
+
+Mass has no parameter of its own: it changes the ratio of thrust to weight, as the hover throttle does, whose
+distribution covers both.
+
+A late release from the ground is not simulated: it overshoots with any integrating gains, and the vehicle's own check
+for a timely lift-off protects against it.
+
+Exact check whether a product of the vertical loop can wrap at 32 bits.
+
+The loop multiplies each gain by a limited error: kp by the position error (±10 m), kd by the speed error (±10 m/s), ki
+by the sum of position errors (±2 000 000). A gain is safe if its product with the limit fits into 32 signed bits.
+Nothing after the products can wrap: after shifting, three 32-bit products sum to less than 2²⁴ + 2¹⁶, and the
+feed-forward adds at most 8640.
+
+A refused gain is simulated on the replica from starts that drive the errors to their limits, until its product wraps:
+stuck on the ground, where the sum grows by 3 m per step, and with the estimate frozen at some time of the climb.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from app.core.control.paparazzi import (
+    ERROR_SUM_MAX,
+    INT32_MAX,
+    POSITION_BITS,
+    POSITION_ERROR_MAX,
+    RATE_HZ,
+    SPEED_ERROR_MAX,
+    STATE_SIZE,
+    STEP_S,
+)
+from app.core.experiments.base import Check
+from app.core.formatting import percent
+from app.core.models.vertical import MEASUREMENT_DELAY_S, START_LATENCY_S, Counts
+from app.core.models.vertical_hazards import (
+    DISTANCE_LAST_M,
+    DISTANCE_MIDDLE_M,
+    FALLEN_STEP,
+    HIGHEST_M,
+    HIGHEST_STEP,
+    REPORT_SIZE,
+    SWING_LAST_M_S,
+    SWING_MIDDLE_M_S,
+    TOUCH_DOWN_M_S,
+    find_wraps,
+    fly_all_with_aborts,
+)
+from app.core.policy import Vector
+from app.core.records.trajectory import Samples
+
+if TYPE_CHECKING:
+    from app.core.experiments.base import Matrix, ModelParameter
+
+
+MODELS: Final = 32
+"""Number of simulated vehicles: the likely one, and quasi-random ones around it."""
+
+ABORTS_BETWEEN_S: Final = (0.3, 1.0, 1.7, 2.6, 4.0, 8.0, 32.0)
+"""Every takeoff is aborted once in each of these intervals, at a different time on every vehicle."""
+
+LARGEST_TOUCH_DOWN_M_S: Final = 2.5
+SMALLEST_SWING_M_S: Final = 0.1
+"""A climb rate that swings by less counts as at rest."""
+UNDAMPED: Final = 0.95
+"""An oscillation must decay by more than 5 % from the middle third of the flight to the last."""
+
+_GOLDEN: Final = 0.6180339887498949
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Takeoffs of one gain set: models (k, m), abort steps (k, a), and the kernels' reports (k, 7) and (k, a, 2)."""
+
+    models: "Matrix"
+    abort_steps: Counts
+    reports: "Matrix"
+    aborts: Samples
+
+
+def abort_steps(models: int) -> Counts:
+    """Abort times in steps, shape (models, 6), increasing in each row; they cover each interval evenly."""
+    edges = np.array(ABORTS_BETWEEN_S)
+    shares = (np.arange(models)[:, np.newaxis] + 1.0) * _GOLDEN % 1.0
+    return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
+
+
+def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, target: int, steps: int) -> Runs:
+    """Simulate a takeoff to `target` (8 fractional bits) on each model, and its aborts to `safe_gains`."""
+    reports = np.empty((len(models), REPORT_SIZE))
+    aborts = np.empty((*aborts_at.shape, 2))
+    scratch, curves = np.empty((2, STATE_SIZE), dtype=np.int64), np.empty((4, steps))
+    fly_all_with_aborts(gains, models, target, safe_gains, aborts_at, scratch, curves, reports, aborts)
+    return Runs(models, aborts_at, reports, aborts)
+
+
+def check_flights(
+    gains: Counts,
+    safe_gains: Counts,
+    baseline: bool,
+    parameters: Sequence["ModelParameter"],
+    models: "Matrix",
+    ceiling_m: float,
+    target: int,
+    steps: int,
+) -> tuple[Check, ...]:
+    """Check altitude, divergence, oscillation and aborts of one gain set over `models`, shape (k, m).
+
+    A `baseline` is never refused for its altitude. An abort switches to the safe gains: what these would do by
+    themselves on the same vehicle is not held against the gains under test.
+    """
+    aborts_at = abort_steps(len(models))
+    runs = fly_runs(gains, safe_gains, models, aborts_at, target, steps)
+    own = runs
+    limits = np.array([ceiling_m, LARGEST_TOUCH_DOWN_M_S])
+    if (runs.aborts > limits).any() and not np.array_equal(gains, safe_gains):
+        own = fly_runs(safe_gains, safe_gains, models, aborts_at, target, steps)
+    return (
+        _altitude(runs, parameters, ceiling_m, baseline),
+        _divergence(runs, parameters, target / (1 << POSITION_BITS)),
+        _oscillation(runs, parameters),
+        _abort("abort altitude", "m", HIGHEST_M, runs, own, parameters, ceiling_m),
+        _abort("abort touch-down", "m/s", TOUCH_DOWN_M_S, runs, own, parameters, LARGEST_TOUCH_DOWN_M_S),
+    )
+
+
+def divergence_distance(reports: "Matrix", set_point_m: float) -> Vector:
+    """Distance from the set point of each flight that fell back to the ground or still moves away at its end.
+
+    Zero for the others: (k, 7) → (k,).
+    """
+    middle, last = reports[:, DISTANCE_MIDDLE_M], reports[:, DISTANCE_LAST_M]
+    moves_away = (last > middle) & (last > 0.5 * set_point_m)
+    return np.where(reports[:, FALLEN_STEP] >= 0.0, set_point_m, np.where(moves_away, last, 0.0))
+
+
+def undamped_swing(reports: "Matrix") -> Vector:
+    """Swing of the climb rate in the last third of each flight, m/s, if it has not decayed since the middle third.
+
+    Zero if it has, or if the vehicle is at rest: (k, 7) → (k,).
+    """
+    middle, last = reports[:, SWING_MIDDLE_M_S], reports[:, SWING_LAST_M_S]
+    return np.where((middle > 0.0) & (last >= UNDAMPED * middle), last, 0.0)
+
+
+def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: float, baseline: bool) -> Check:
+    worst = int(np.argmax(runs.reports[:, HIGHEST_M]))
+    highest_m = float(runs.reports[worst, HIGHEST_M])
+    case = _case(parameters, runs.models[worst], float(runs.reports[worst, HIGHEST_STEP]), "highest")
+    passed = baseline or highest_m <= ceiling_m
+    sentence = f"The highest of {len(runs.models)} simulated takeoffs rises to {highest_m:.2f} m, " + (
+        f"with {case}; at most {ceiling_m:g} m is allowed."
+        if not passed
+        else f"{ceiling_m:g} m is allowed."
+        if highest_m <= ceiling_m
+        else f"beyond {ceiling_m:g} m; these are the gains that every flight is compared with, and they may fly."
+    )
+    return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
+
+
+def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float) -> Check:
+    distances = divergence_distance(runs.reports, set_point_m)
+    worst = int(np.argmax(distances))
+    distance_m, fallen_step = float(distances[worst]), float(runs.reports[worst, FALLEN_STEP])
+    if distance_m == 0.0:
+        sentence = "No simulated takeoff falls back to the ground or moves away from the set point at its end."
+        return Check("divergence", True, sentence, worst=0.0, limit=0.0)
+    fallen = fallen_step >= 0.0
+    case = _case(parameters, runs.models[worst], fallen_step, "on the ground again") if fallen else ""
+    case = case or _case(parameters, runs.models[worst])
+    did = "falls back to the ground" if fallen else f"is {distance_m:.2f} m from the set point and moves away"
+    return Check("divergence", False, f"A simulated takeoff {did}, with {case}.", distance_m, 0.0, case=case)
+
+
+def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
+    swings = undamped_swing(runs.reports)
+    worst = int(np.argmax(swings))
+    swing_m_s = float(swings[worst])
+    if swing_m_s <= SMALLEST_SWING_M_S:
+        sentence = "Every simulated takeoff comes to rest, or swings less and less."
+        return Check("oscillation", True, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S)
+    case = _case(parameters, runs.models[worst])
+    before_m_s = float(runs.reports[worst, SWING_MIDDLE_M_S])
+    sentence = (
+        f"The climb rate swings by {swing_m_s:.2f} m/s in the last third of a simulated takeoff, after "
+        f"{before_m_s:.2f} m/s in the third before: it does not decay, with {case}."
+    )
+    return Check("oscillation", False, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S, case=case)
+
+
+def _abort(
+    name: str, unit: str, place: int, runs: Runs, own: Runs, parameters: Sequence["ModelParameter"], limit: float
+) -> Check:
+    """Check the abort that exceeds `limit`, or the safe gains' own result on the same vehicle, the most."""
+    of_safe_gains = own.aborts[:, :, place].max(axis=1)
+    if place == HIGHEST_M:
+        of_safe_gains = np.maximum(of_safe_gains, own.reports[:, HIGHEST_M])
+    limits = np.maximum(limit, of_safe_gains)[:, np.newaxis]
+    values = runs.aborts[:, :, place]
+    excess = values - limits
+    run, instant = divmod(int(np.argmax(excess)), excess.shape[1])
+    value, allowed = float(values[run, instant]), float(limits[run, 0])
+    passed = bool(value <= allowed)
+    case = _case(parameters, runs.models[run], float(runs.abort_steps[run, instant]), "aborted")
+    what = "rises to" if place == HIGHEST_M else "meets the ground at"
+    why = "" if allowed == limit else ", which is what the safe gains themselves come to"
+    sentence = f"After an abort the vehicle {what} {value:.2f} {unit} in the worst case; {allowed:.2f} {unit} is "
+    sentence += f"allowed{why}." if passed else f"allowed{why}: {case}."
+    return Check(name, passed, sentence, worst=value, limit=allowed, case=case)
+
+
+def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
+    """Description of the vehicle, and the time of the event, counted from the command."""
+    return ", ".join(_words(parameters, model, step, event))
+
+
+def _words(parameters: Sequence["ModelParameter"], model: Vector, step: float | None, event: str) -> Iterator[str]:
+    for parameter, value in zip(parameters, model.tolist(), strict=True):
+        if value or parameter.nominal:
+            unit = f" {parameter.unit}" if parameter.unit in {"s", "1/s", "m"} else ""
+            yield f"{parameter.title.lower()} {value:.2g}{unit}"
+    if step is not None:
+        yield f"{event} at {model[START_LATENCY_S] + step * STEP_S:.1f} s"
+
+
+LONGEST_S: Final = 32.6
+_STARTS: Final = (
+    ("stuck on the ground", 0.0),
+    *((f"the estimate frozen {instant:g} s after the start", instant) for instant in (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """A product of the loop: its gain, the error that multiplies it, and the limit of that error."""
+
+    gain: str
+    error: str
+    limiter: str
+    largest_error: int
+
+    @property
+    def largest_safe_gain(self) -> int:
+        """Largest absolute gain whose product cannot wrap."""
+        return INT32_MAX // self.largest_error
+
+
+PRODUCTS: Final = (
+    Product("kp", "position error", "±10 m", POSITION_ERROR_MAX),
+    Product("ki", "sum of errors", "±2 000 000", ERROR_SUM_MAX),
+    Product("kd", "speed error", "±10 m/s", SPEED_ERROR_MAX),
+)
+"""In the order of the loop's gains."""
+
+
+def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, ...]:
+    """Return a refusal for each gain that can wrap, or one passed check.
+
+    `counts` are kp, ki, kd; `model` is the likely vehicle, on which refused gains are simulated; `target` is the
+    altitude, 8 fractional bits.
+    """
+    gains = [int(count) for count in counts]
+    refused = [place for place, product in enumerate(PRODUCTS) if abs(gains[place]) > product.largest_safe_gain]
+    if refused:
+        return tuple(_refusals(refused, gains, _first_wraps(counts, model, target)))
+    worst, place = max((abs(gains[place]) * product.largest_error, place) for place, product in enumerate(PRODUCTS))
+    product = PRODUCTS[place]
+    sentence = (
+        f"No product can wrap: the largest, {product.gain}·({product.error}) with its limiter at {product.limiter}, "
+        f"is {percent(worst / INT32_MAX)} of what 32 bits hold."
+    )
+    return (Check("wrapping", True, sentence, worst=float(worst), limit=float(INT32_MAX)),)
+
+
+def _first_wraps(counts: Counts, model: Vector, target: int) -> Counts:
+    """Step and product at which each gain first wraps in each start, shape (starts, 3, 2); step −1 if it does not."""
+    found = np.empty((len(_STARTS), len(PRODUCTS), 2), dtype=np.int64)
+    instantly = model.copy()
+    instantly[MEASUREMENT_DELAY_S] = 0.0
+    steps, state = round(LONGEST_S * RATE_HZ), np.empty(STATE_SIZE, dtype=np.int64)
+    for start, (_, frozen_after_s) in enumerate(_STARTS):
+        find_wraps(counts, instantly, target, round(frozen_after_s * RATE_HZ), steps, state, found[start])
+    return found
+
+
+def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[Check]:
+    for place in refused:
+        product, offered = PRODUCTS[place], PRODUCTS[place].largest_safe_gain
+        worst = abs(gains[place]) * product.largest_error
+        case, told = _wrap_case(product, wraps[:, place])
+        sentence = (
+            f"{product.gain}·({product.error}) can reach {_grouped(worst)} and wrap: 32 bits hold "
+            f"{_grouped(INT32_MAX)}, and full up turns into full down. {told} "
+            f"The largest {product.gain} that cannot wrap is {offered}."
+        )
+        offer = {product.gain: offered if gains[place] > 0 else -offered}
+        yield Check(
+            "wrapping", False, sentence, float(worst), float(INT32_MAX), gain=product.gain, case=case, offer=offer
+        )
+
+
+def _wrap_case(product: Product, wraps: Counts) -> tuple[str, str]:
+    """The first start in which the product wraps, in short; and a sentence that adds in how many others it wraps."""
+    wrapped = [
+        (name, step, value) for (name, _), (step, value) in zip(_STARTS, wraps.tolist(), strict=True) if step >= 0
+    ]
+    if not wrapped:
+        case = f"{product.error} at its limiter, {product.limiter}"
+        return case, f"It wraps with the {case}."
+    name, step, value = wrapped[0]
+    case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {_grouped(value)}"
+    return case, f"Simulated {case}; so it does in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts."
+
+
+def _grouped(value: int) -> str:
+    return f"{value:,}".replace(",", " ")

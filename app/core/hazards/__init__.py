@@ -1,1 +1,0 @@
-"""Hazards of a takeoff: products that wrap (`wrapping`), and simulated flights that go wrong (`flights`)."""

@@ -1,0 +1,1 @@
+"""Flight records: the trajectory, its alignment, its glitches, and errors computed from it."""

@@ -1,0 +1,240 @@
+"""Glitch detection: jumps that no vehicle can fly, frozen samples, gaps, and disagreement between two sources.
+
+Only the scored output is checked, from the command to the end of the scored window. The raw record is never altered:
+`repaired` returns a copy. Constant samples on the ground are not frozen. Constant samples in the air count as frozen
+only with further evidence: the climb rate shows that the vehicle moved, the output jumps at their end, or the climb
+rate is constant too, which never happens in flight.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.records.metrics import MAX_GAP_S
+from app.core.records.trajectory import Samples, Trajectory
+
+
+class ScoredOutput(Protocol):
+    """What is read of an experiment: the name of its scored output, and the times (s) at which it is scored."""
+
+    @property
+    def output(self) -> str: ...
+    @property
+    def grid_s(self) -> Samples: ...
+
+
+Kind = Literal["acceleration", "frozen", "gap", "disagreement"]
+
+
+@dataclass(frozen=True, slots=True)
+class Glitch:
+    """`start_s` is the time of the last good sample before the glitch, `end_s` of the first good one after it."""
+
+    kind: Kind
+    start_s: float
+    end_s: float
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Physics:
+    """Physical limits of an output, in its unit.
+
+    The largest acceleration, the smallest jump distinguishable from noise, the deviation from the start that means the
+    vehicle is airborne, the channel of its rate, and a second source of the same quantity.
+    """
+
+    largest_acceleration: float
+    smallest_jump: float
+    off_the_ground: float
+    rate: str
+    second: str
+    unit: str
+
+
+_PHYSICS: Final[Mapping[str, _Physics]] = MappingProxyType(
+    {
+        "altitude_m": _Physics(
+            largest_acceleration=30.0,
+            smallest_jump=0.1,
+            off_the_ground=0.1,
+            rate="climb_rate_m_s",
+            second="altitude_2_m",
+            unit="m",
+        )
+    }
+)
+"""30 m/s² upward takes a thrust of four times the weight; downward, gravity alone gives a third of it. Outputs without
+an entry, such as a pitch error, are checked for gaps only."""
+
+_FROZEN_S: Final = 0.3
+_AROUND_S: Final = 0.15
+"""Half width of the window in which the speed around a sample is measured."""
+_SD_OF_MEDIAN: Final = 1.4826
+"""Ratio of a normal distribution's standard deviation to its median absolute deviation."""
+_OUT_OF_NOISE: Final = 7.0
+_LONGEST_EXCURSION_S: Final = 1.5
+"""Two jumps that cancel each other within this time are one glitch, with everything between them."""
+_DISAGREEMENT: Final = 0.25
+_DISAGREEMENT_S: Final = 0.1
+_STAMP_RESOLUTION_S: Final = 1e-5
+
+Marks = list[tuple[int, int]]
+"""Glitches as pairs of sample indices: the last good one before, and the first good one after."""
+
+
+def find_glitches(experiment: ScoredOutput, trajectory: Trajectory) -> tuple[Glitch, ...]:
+    """Find the glitches of a record, ordered by time.
+
+    A record without the scored output, or whose times do not increase, has none: scoring reports what is wrong with it.
+    """
+    if experiment.output not in trajectory.channels or not _sound(trajectory, experiment.output):
+        return ()
+    scored = (trajectory.time_s >= 0.0) & (trajectory.time_s <= experiment.grid_s[-1] + MAX_GAP_S)
+    if np.count_nonzero(scored) < 3:
+        return ()
+    time_s = trajectory.time_s[scored]
+    channels = {name: values[scored] for name, values in trajectory.channels.items() if len(values) == len(scored)}
+    gaps = [(int(i), int(i) + 1) for i in np.flatnonzero(np.diff(time_s) > MAX_GAP_S + _STAMP_RESOLUTION_S)]
+    found = [_gap(time_s, first, last) for first, last in gaps]
+    if physics := _PHYSICS.get(experiment.output):
+        values = channels[experiment.output]
+        excess = _excess(time_s, values, physics)
+        frozen = _frozen(time_s, values, channels.get(physics.rate), excess, physics)
+        found.extend(_held(time_s, values, physics, mark) for mark in frozen)
+        jumps = [mark for mark in _jumps(time_s, excess) if _apart(mark, [*gaps, *frozen])]
+        found.extend(_jumped(time_s, values, physics, mark) for mark in jumps)
+        if physics.second in channels:
+            found.extend(_disagreements(time_s, values, channels[physics.second], physics))
+    return tuple(sorted(found, key=lambda glitch: (glitch.start_s, glitch.kind)))
+
+
+def repaired(experiment: ScoredOutput, trajectory: Trajectory, glitches: tuple[Glitch, ...]) -> Trajectory:
+    """A copy of the record with the scored output interpolated linearly across each glitch.
+
+    The line runs from the last good sample before the glitch to the first one after it.
+    """
+    values = trajectory[experiment.output].copy()
+    time_s = trajectory.time_s
+    for glitch in glitches:
+        bad = (time_s > glitch.start_s) & (time_s < glitch.end_s)
+        good = ~bad
+        if bad.any() and good.any():
+            values[bad] = np.interp(time_s[bad], time_s[good], values[good])
+    return replace(trajectory, channels={**trajectory.channels, experiment.output: values})
+
+
+def _sound(trajectory: Trajectory, output: str) -> bool:
+    time_s, values = trajectory.time_s, trajectory[output]
+    return (
+        len(values) == len(time_s)
+        and bool(np.isfinite(values).all() and np.isfinite(time_s).all())
+        and bool((np.diff(time_s) > 0.0).all())
+    )
+
+
+def _apart(mark: tuple[int, int], others: Marks) -> bool:
+    return all(mark[1] < first or mark[0] > last for first, last in others)
+
+
+def _gap(time_s: Samples, first: int, last: int) -> Glitch:
+    missing_s = time_s[last] - time_s[first]
+    sentence = f"No samples for {missing_s:.2f} s after {time_s[first]:.2f} s."
+    return Glitch("gap", float(time_s[first]), float(time_s[last]), sentence)
+
+
+def _held(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int, int]) -> Glitch:
+    first, last = mark
+    sentence = (
+        f"The same {values[first]:.2f} {physics.unit} for {time_s[last - 1] - time_s[first]:.2f} s from "
+        f"{time_s[first]:.2f} s on: nothing in the air holds so still."
+    )
+    return Glitch("frozen", float(time_s[first]), float(time_s[last]), sentence)
+
+
+def _jumped(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int, int]) -> Glitch:
+    first, last = mark
+    lasts = "" if last == first + 1 else f", and back {time_s[last] - time_s[first]:.2f} s later"
+    sentence = (
+        f"A jump by {values[first + 1] - values[first]:+.2f} {physics.unit} at {time_s[first + 1]:.2f} s{lasts}: "
+        f"no thrust accelerates a vehicle so."
+    )
+    return Glitch("acceleration", float(time_s[first]), float(time_s[last]), sentence)
+
+
+def _excess(time_s: Samples, values: Samples, physics: _Physics) -> Samples:
+    """How far each step exceeds what the speed around it explains, shape (n − 1,); zero within the allowed range.
+
+    The speed is the median of the steps within 0.15 s (of two on either side, where samples are sparser), and may
+    change by the largest acceleration over that window. In a noisy record a jump must also exceed the noise of the
+    steps.
+    """
+    from scipy.ndimage import median_filter
+
+    duration_s, step = np.diff(time_s), np.diff(values)
+    reach = max(2, round(_AROUND_S / float(np.median(duration_s))))
+    beyond = step - median_filter(step / duration_s, size=2 * reach + 1, mode="nearest") * duration_s
+    window_s = np.maximum(duration_s, reach * float(np.median(duration_s)))
+    noise = _SD_OF_MEDIAN * float(np.median(np.abs(beyond)))
+    allowed = max(physics.smallest_jump, _OUT_OF_NOISE * noise) + physics.largest_acceleration * window_s * duration_s
+    return np.where(np.abs(beyond) > allowed, beyond, 0.0)
+
+
+def _jumps(time_s: Samples, excess: Samples) -> Marks:
+    """Jumps, each from the sample before to the one after; jumps that cancel each other are merged into one."""
+    steps = np.flatnonzero(excess).tolist()
+    marks: Marks = []
+    while steps:
+        first = steps.pop(0)
+        gone, last = float(excess[first]), first
+        for place, step in enumerate(steps):
+            if time_s[step + 1] - time_s[first] > _LONGEST_EXCURSION_S:
+                break
+            gone += float(excess[step])
+            if abs(gone) < 0.5 * abs(float(excess[first])):
+                last, steps = step, steps[place + 1 :]
+                break
+        marks.append((first, last + 1))
+    return marks
+
+
+def _frozen(time_s: Samples, values: Samples, rate: Samples | None, excess: Samples, physics: _Physics) -> Marks:
+    """Runs of one constant value in the air during which the vehicle moved."""
+    marks: Marks = []
+    for first, last in _runs(np.diff(values) == 0.0):
+        held_s = time_s[last] - time_s[first]
+        in_the_air = values[first] > values[0] + physics.off_the_ground
+        if held_s < _FROZEN_S or not in_the_air:
+            continue
+        during = slice(first, last + 1)
+        moved = rate is not None and abs(float(np.trapezoid(rate[during], time_s[during]))) > physics.smallest_jump
+        rate_held = rate is not None and not np.ptp(rate[during])
+        jumped = last < len(excess) and excess[last] != 0.0
+        if moved or rate_held or jumped:
+            marks.append((first, min(last + 1, len(values) - 1)))
+    return marks
+
+
+def _disagreements(time_s: Samples, values: Samples, second: Samples, physics: _Physics) -> Iterator[Glitch]:
+    """Intervals in which two sources differ by more than their usual offset (that of their datums)."""
+    apart = values - second
+    apart = np.abs(apart - np.median(apart))
+    for first, last in _runs((apart > _DISAGREEMENT)[1:]):
+        before, after = first, min(last + 1, len(values) - 1)
+        if time_s[after] - time_s[before] < _DISAGREEMENT_S:
+            continue
+        sentence = (
+            f"Two sources are up to {apart[before + 1 : last + 1].max():.2f} {physics.unit} further apart than "
+            f"otherwise, {time_s[before]:.2f} … {time_s[after]:.2f} s."
+        )
+        yield Glitch("disagreement", float(time_s[before]), float(time_s[after]), sentence)
+
+
+def _runs(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and past-the-end index of each run of true flags; the flags have shape (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
+    return ((int(first), int(last)) for first, last in edges.reshape(-1, 2))

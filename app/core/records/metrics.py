@@ -1,0 +1,79 @@
+"""Performance measures of recorded flights, on the samples' own time stamps."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from app.core.errors import Problem, TrajectoryError
+from app.core.records.trajectory import Samples, Trajectory
+
+MAX_GAP_S: Final = 0.25
+_STAMP_RESOLUTION_S: Final = 1e-5
+"""Stored time stamps are single precision: 4 µs at half a minute."""
+
+SetPoint = Callable[[Samples], Samples]
+
+
+def mean_absolute_error(time_s: Samples, values: Samples, set_point: SetPoint, start_s: float, stop_s: float) -> float:
+    """Trapezoidal mean of |set point − value| over [start_s, stop_s], on the samples' own time stamps, shape (n,).
+
+    The ends are interpolated; outside the samples the nearest value holds.
+    """
+    inside = (time_s > start_s) & (time_s < stop_s)
+    instants = np.concatenate(([start_s], time_s[inside], [stop_s]))
+    first, last = np.interp((start_s, stop_s), time_s, values)
+    deviations = np.abs(set_point(instants) - np.concatenate(([first], values[inside], [last])))
+    return float(np.trapezoid(deviations, instants)) / (stop_s - start_s)
+
+
+def require_scorable(
+    trajectory: Trajectory, channel: str, start_s: float, stop_s: float, *, accept_gaps: bool = False
+) -> None:
+    """Raise TrajectoryError unless `channel` can be scored over [start_s, stop_s].
+
+    The channel must exist and be finite, time stamps must increase, and samples must be at most 0.25 s apart anywhere
+    in the window, ends included; `accept_gaps` allows gaps inside the record.
+    """
+    problem = _problem(trajectory, channel) or _uncovered(trajectory.time_s, start_s, stop_s)
+    if problem is None and not accept_gaps:
+        problem = _gap(trajectory.time_s, start_s, stop_s)
+    if problem is not None:
+        raise TrajectoryError(
+            "This flight cannot be scored.",
+            problems=(problem,),
+            hint="Record it again, or class the flight as invalid; the raw record is kept.",
+        )
+
+
+def _problem(trajectory: Trajectory, channel: str) -> Problem | None:
+    time_s = trajectory.time_s
+    if channel not in trajectory.channels:
+        return Problem(channel, f"is not among the recorded channels ({', '.join(trajectory.channels)})")
+    values = trajectory[channel]
+    if len(values) != len(time_s):
+        return Problem(channel, f"has {len(values)} samples, the time stamps are {len(time_s)}")
+    for name, column in (("time_s", time_s), (channel, values)):
+        if not np.isfinite(column).all():
+            return Problem(name, f"is not a finite number at sample {int(np.argmin(np.isfinite(column)))}")
+    if (np.diff(time_s) <= 0.0).any():
+        late = int(np.argmax(np.diff(time_s) <= 0.0)) + 1
+        return Problem("time_s", f"must rise, but is {time_s[late]:g} s after {time_s[late - 1]:g} s at sample {late}")
+    return None
+
+
+def _uncovered(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
+    if not time_s.size or time_s[0] > start_s + MAX_GAP_S or time_s[-1] < stop_s - MAX_GAP_S:
+        covered = f"{time_s[0]:g} … {time_s[-1]:g} s" if time_s.size else "nothing"
+        return Problem("time_s", f"must cover {start_s:g} … {stop_s:g} s from the command on, got {covered}")
+    return None
+
+
+def _gap(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
+    first = max(int(np.searchsorted(time_s, start_s, side="right")) - 1, 0)
+    last = int(np.searchsorted(time_s, stop_s, side="left"))
+    gaps = np.diff(time_s[first : last + 1])
+    if gaps.size and gaps.max() > MAX_GAP_S + _STAMP_RESOLUTION_S:
+        at = first + int(np.argmax(gaps))
+        return Problem("time_s", f"has a gap of {gaps.max():.3g} s after {time_s[at]:.3f} s, more than {MAX_GAP_S:g} s")
+    return None

@@ -1,0 +1,116 @@
+"""Trajectories: the samples of a flight or a model run.
+
+Reduction of samples for plotting.
+
+Records keep their peaks and shape (MinMaxLTTB, Van Der Donckt et al., 2023); smooth curves keep the samples at which
+they bend (Ramer, 1972; Douglas and Peucker, 1973).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Samples = NDArray[np.float64]
+
+CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "altitude_m": "m",
+        "altitude_2_m": "m",
+        "altitude_m_lower": "m",
+        "altitude_m_upper": "m",
+        "climb_rate_m_s": "m/s",
+        "set_point_m": "m",
+        "reference_m": "m",
+        "thrust": "1",
+        "feed_forward": "1",
+        "feedback": "1",
+        "battery_v": "V",
+        "pitch_error_rad": "rad",
+        "pitch_error_rad_lower": "rad",
+        "pitch_error_rad_upper": "rad",
+        "pitch_reference_rad": "rad",
+        "pitch_rad": "rad",
+        "pitch_rate_rad_s": "rad/s",
+        "angle_of_attack_rad": "rad",
+        "altitude_change_m": "m",
+        "speed_change_m_s": "m/s",
+        "thrust_change_n": "N",
+        "elevator_rad": "rad",
+    }
+)
+"""Known channels and their units.
+
+Thrust and its two parts are shares of full command (the autopilot's 9600 counts). Those of an aircraft in flight (angle
+of attack, altitude and speed change, pitch, thrust change, elevator) are deviations from trimmed flight.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Samples of one flight, altitude up, time in seconds since the command (earlier samples are negative).
+
+    `time_s` has shape (n,) and increases strictly; every channel has shape (n,). `source` names what measured it
+    (`jsbsim`, `twin`, `csv`, …), `clock` the origin of the time stamps (`simulation`, `vehicle`, `ground`).
+    """
+
+    time_s: Samples
+    channels: Mapping[str, Samples]
+    source: str
+    clock: str
+
+    def __getitem__(self, channel: str) -> Samples:
+        return self.channels[channel]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def as_stored(self) -> "Trajectory":
+        """The trajectory as the database returns it: every number rounded to single precision."""
+        return Trajectory(
+            _single(self.time_s),
+            {name: _single(values) for name, values in self.channels.items()},
+            self.source,
+            self.clock,
+        )
+
+
+def _single(values: Samples) -> Samples:
+    return values.astype(np.float32).astype(np.float64)
+
+
+Indices = NDArray[np.uint64]
+
+
+def select_samples(time_s: Samples, values: Samples, points: int) -> Indices:
+    """Indices of at most `points` samples, shape (k,), in order, including the first and the last."""
+    if len(time_s) <= points:
+        return np.arange(len(time_s), dtype=np.uint64)
+    from tsdownsample import MinMaxLTTBDownsampler
+
+    downsampler = MinMaxLTTBDownsampler()  # type: ignore[no-untyped-call]  # the library has no types
+    chosen: Indices = downsampler.downsample(np.ascontiguousarray(time_s), np.ascontiguousarray(values), n_out=points)
+    return chosen
+
+
+def select_bends(time_s: Samples, values: Samples, tolerance: float) -> Indices:
+    """Indices of samples, shape (k,), in order, whose polyline passes every other sample within `tolerance`.
+
+    `tolerance` is in the unit of the values. The first and the last sample are included. The times must increase.
+    """
+    if len(time_s) < 3:
+        return np.arange(len(time_s), dtype=np.uint64)
+    needed = {0, len(time_s) - 1}
+    spans = [(0, len(time_s) - 1)]
+    while spans:
+        first, last = spans.pop()
+        ends = [first, last]
+        off = np.abs(values[first:last] - np.interp(time_s[first:last], time_s[ends], values[ends]))
+        furthest = first + int(np.argmax(off))
+        if off[furthest - first] > tolerance:
+            needed.add(furthest)
+            spans += [(first, furthest), (furthest, last)]
+    return np.array(sorted(needed), dtype=np.uint64)

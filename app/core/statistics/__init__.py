@@ -1,0 +1,1 @@
+"""Statistics of flights: comparison of gain sets, and drift."""

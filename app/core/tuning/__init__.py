@@ -1,0 +1,1 @@
+"""The tuning method: calibration, corrected model, predictions, gate, strategies, stop rules and proposals."""

@@ -1,0 +1,237 @@
+"""Decides whether further steps can be distinguished from noise, and whether the winner is better than the first gains.
+
+There are two phases. *Steps* are worth flying while the predicted improvement is at least what the remaining flights
+could distinguish from noise. After that, the winner and the baseline (the first flight's gains) are flown again in turn
+until the difference is decided. The confidence allows for the number of policies from which the winner was chosen, and
+for every repeated comparison. Gains outside the campaign's bounds, flown by overruling a refusal, would be refused
+again and are left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from app.core.definition import Definition, Flight, format_gains
+from app.core.experiments.base import Experiment
+from app.core.formatting import percent, plus_minus, short
+from app.core.statistics.comparisons import (
+    Comparison,
+    Group,
+    PooledScatter,
+    compare,
+    groups_of,
+    pool_scatter,
+    select_winner,
+    smallest_difference,
+)
+from app.core.tuning.strategy import Proposal
+
+SCATTER_NOT_KNOWN: Final = (
+    "How much flights scatter was never measured under this autopilot, so nobody can say whether that is more than "
+    "chance: fly one of the gain sets again."
+)
+
+_CONFIRMATION_FLIGHTS: Final = 2
+"""Flights reserved for repeating the winner and the baseline."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonState:
+    """Comparison of the flights so far; at least one is valid.
+
+    `baseline` is the group of the first valid flight, `winner` the best policy; `comparison` of the two is None while
+    they are the same.
+    """
+
+    groups: tuple[Group, ...]
+    scatter: PooledScatter
+    baseline: Group
+    winner: Group
+    comparison: Comparison | None
+
+    @property
+    def looks(self) -> int:
+        """Number of comparisons since both policies were repeated; 0 before."""
+        if min(self.winner.size, self.baseline.size) < 2:
+            return 0
+        return self.winner.size + self.baseline.size - 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Confirmation:
+    """What to fly next: the strategy's step, the winner again, the baseline again, or nothing more, and why."""
+
+    phase: Literal["step", "repeat", "baseline", "decided"]
+    why: str
+
+
+def compare_winner(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> ComparisonState | None:
+    """Groups, scatter and winner of the flights; None before the first valid flight.
+
+    Under the stop rule `noise` the confidence allows for repeated comparisons; under the other rules, which do not
+    decide by it, only for the choice among the policies.
+    """
+    groups = groups_of(flights)
+    if not groups:
+        return None
+    scatter = pool_scatter(groups, experiment.scatter)
+    baseline, winner = groups[0], select_winner(groups, scatter)
+    bare = ComparisonState(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=None)
+    if winner is baseline:
+        return bare
+    comparison = compare(
+        winner,
+        baseline,
+        scatter,
+        definition.stop.confidence,
+        candidates=len(groups) - 1,
+        looks=bare.looks if definition.stop.kind == "noise" else 0,
+    )
+    return ComparisonState(groups=groups, scatter=scatter, baseline=baseline, winner=winner, comparison=comparison)
+
+
+def standing_within_bounds(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight]
+) -> ComparisonState | None:
+    """The comparison among gains inside the bounds, which may be flown again. None if there are none."""
+    return compare_winner(definition, experiment, _inside(definition, experiment, flights))
+
+
+def confirm(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], proposal: Proposal
+) -> Confirmation:
+    """Choose the next flight under the stop rule `noise`. At least one valid flight must lie inside the bounds.
+
+    A proposal of kind `manual` predicts no improvement and counts as worth a flight until the flights run short.
+    """
+    inside = _inside(definition, experiment, flights)
+    now = compare_winner(definition, experiment, inside)
+    assert now is not None
+    found = _next(definition, experiment, now, definition.stop.max_flights - len(flights), proposal)
+    return replace(found, why=f"{found.why} {_left_out(flights, inside)}".strip())
+
+
+def _inside(definition: Definition, experiment: Experiment, flights: Sequence[Flight]) -> Sequence[Flight]:
+    space = experiment.space.narrowed(definition.bounds)
+    return [
+        flight
+        for flight in flights
+        if all(gain.refusal_by_bounds(flight.gains[gain.name]) is None for gain in space.gains)
+    ]
+
+
+def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:
+    within = {flight.number for flight in inside}
+    out = [str(flight.number) for flight in flights if flight.number not in within]
+    if not out:
+        return ""
+    do = ("Flight", "lies", "takes") if len(out) == 1 else ("Flights", "lie", "take")
+    return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} no part."
+
+
+def _next(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> Confirmation:
+    if now.winner is now.baseline:
+        return _confirm_baseline(definition, experiment, now, left, proposal)
+    if left <= 0:
+        return Confirmation(phase="decided", why=verdict_sentence(experiment, now))
+    if now.winner.size < 2 and left > _CONFIRMATION_FLIGHTS and _is_worth_a_step(definition, now, left, proposal):
+        return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
+    return _flown_again(experiment, now)
+
+
+def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
+    """The winner compared with the first gains, in a sentence."""
+    if now.comparison is None:
+        return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
+    unit, said = experiment.error_unit, now.comparison
+    pair = f"{format_gains(now.winner.gains)} against the first flight's {format_gains(now.baseline.gains)}"
+    if said.confidence is None or said.standard_error is None:
+        return f"Not known yet: {pair}, {short(abs(said.difference))} {unit} {_direction(said)}. {SCATTER_NOT_KNOWN}"
+    amount = plus_minus(abs(said.difference), said.standard_error, unit)
+    if said.verdict == "unresolved":
+        return (
+            f"Unresolved: {pair}, {amount} {_direction(said)}, {percent(said.confidence)} confidence. {_deciding(said)}"
+        )
+    return (
+        f"{said.verdict.capitalize()} with {_percent(said.confidence)} confidence: {pair}, {amount} {_direction(said)}."
+    )
+
+
+def _confirm_baseline(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> Confirmation:
+    if left > 0 and _is_worth_a_step(definition, now, left, proposal):
+        return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
+    tried = len(now.groups) - 1
+    found = f"None of the other sets flown, {tried}, is better." if tried else "No other set was flown."
+    promise = _describe_improvement(definition, experiment, now, left, proposal)
+    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {promise}".strip())
+
+
+def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
+    said = now.comparison
+    assert said is not None
+    sentence = verdict_sentence(experiment, now)
+    if now.looks and said.verdict != "unresolved":
+        return Confirmation(phase="decided", why=sentence)
+    if now.winner.size <= now.baseline.size:
+        why = f"The winner, {format_gains(now.winner.gains)}, is flown again, to see whether it is better or was lucky."
+        return Confirmation(phase="repeat", why=f"{why} {sentence}")
+    why = (
+        f"The first flight's gains, {format_gains(now.baseline.gains)}, are flown again under the winner's conditions."
+    )
+    return Confirmation(phase="baseline", why=f"{why} {sentence}")
+
+
+def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:
+    if proposal.kind == "manual":
+        return True
+    return proposal.kind != "none" and _predicted_improvement(now, proposal) >= _detectable_difference(
+        definition, now, left
+    )
+
+
+def _predicted_improvement(now: ComparisonState, proposal: Proposal) -> float:
+    return 0.0 if proposal.predicted_error is None else now.winner.mean - proposal.predicted_error
+
+
+def _detectable_difference(definition: Definition, now: ComparisonState, left: int) -> float:
+    return smallest_difference(now.scatter, now.winner.size, left, definition.stop.confidence)
+
+
+def _describe_improvement(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> str:
+    unit = experiment.error_unit
+    if proposal.kind in {"none", "manual"} or left <= 0:
+        return "The strategy offers nothing more." if proposal.kind == "none" else ""
+    told = _detectable_difference(definition, now, left)
+    promised = _predicted_improvement(now, proposal)
+    relation = "at least" if promised >= told else "below"
+    return (
+        f"The next step promises {short(promised)} {unit} less, {relation} the {short(told)} {unit} that "
+        f"{_flights(left)} could tell from noise with {percent(definition.stop.confidence)} confidence."
+    )
+
+
+def _direction(said: Comparison) -> str:
+    return "lower" if said.difference < 0.0 else "higher"
+
+
+def _percent(confidence: float) -> str:
+    return f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1)
+
+
+def _deciding(said: Comparison) -> str:
+    if said.further is None:
+        return "Not even 100 further flights would decide it."
+    return (
+        f"If the difference stays, {_flights(said.further.total)} more would decide it: {said.further.first} of the "
+        f"winner, {said.further.second} of the first gains."
+    )
+
+
+def _flights(count: int) -> str:
+    return f"{count} flight" if count == 1 else f"{count} flights"

@@ -1,0 +1,127 @@
+"""Validation of a campaign's definition, before it is frozen."""
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+from app.core.definition import Definition, StopRule, problems_of_options
+from app.core.errors import InputError, Problem
+from app.core.experiments import EXPERIMENTS
+from app.core.policy import PolicySpace
+from app.core.tuning.strategies import STRATEGIES
+
+MAX_FLIGHTS: Final = 200
+MAX_IMPROVEMENT: Final = 0.5
+MIN_CEILING_M: Final = 3.2
+MAX_CEILING_M: Final = 100.0
+MIN_CONFIDENCE: Final = 0.5
+
+
+def check_definition(definition: Definition) -> None:
+    """Raise InputError naming every field that cannot be used."""
+    if problems := problems_of(definition):
+        raise InputError(
+            "This campaign definition cannot be used.",
+            problems=problems,
+            hint="Correct the named fields and try again; nothing was changed.",
+        )
+
+
+def problems_of(definition: Definition) -> tuple[Problem, ...]:
+    """All problems of the definition, each with its field (`stop.max_flights`, `bounds.kp`, …)."""
+    return (
+        *_names(definition),
+        *_options(definition),
+        *_fit(definition),
+        *_policy(definition),
+        *_fractions(definition),
+        *_stop(definition.stop),
+        *_seed(definition.seed),
+    )
+
+
+def _names(definition: Definition) -> Iterator[Problem]:
+    if definition.experiment not in EXPERIMENTS:
+        yield Problem("experiment", f"must be one of {', '.join(EXPERIMENTS)}, got {definition.experiment!r}")
+    if definition.strategy not in STRATEGIES:
+        yield Problem("strategy", f"must be one of {', '.join(STRATEGIES)}, got {definition.strategy!r}")
+
+
+def _options(definition: Definition) -> Iterator[Problem]:
+    if definition.strategy in STRATEGIES:
+        strategy = STRATEGIES[definition.strategy]
+        yield from problems_of_options(definition.options, strategy.options, field="options", owner=strategy.name)
+    if definition.experiment in EXPERIMENTS:
+        experiment = EXPERIMENTS[definition.experiment]
+        yield from problems_of_options(
+            definition.experiment_options, experiment.options, field="experiment_options", owner=experiment.name
+        )
+
+
+def _fit(definition: Definition) -> Iterator[Problem]:
+    if definition.strategy not in STRATEGIES or definition.experiment not in EXPERIMENTS:
+        return
+    strategy = STRATEGIES[definition.strategy]
+    if EXPERIMENTS[definition.experiment].modelled is None:
+        yield from _without_model(definition)
+    elif strategy.experiments and definition.experiment not in strategy.experiments:
+        yield Problem("strategy", f"{strategy.name!r} works with {', '.join(strategy.experiments)} only")
+
+
+def _without_model(definition: Definition) -> Iterator[Problem]:
+    lacks = f"there is no model of what the gains of {definition.experiment!r} do"
+    if STRATEGIES[definition.strategy].needs_model:
+        by_hand = ", ".join(repr(name) for name, strategy in STRATEGIES.items() if not strategy.needs_model)
+        yield Problem("strategy", f"{definition.strategy!r} finds gains on a model, and {lacks}: choose {by_hand}")
+    if definition.start.kind == "simplex":
+        yield Problem("start.kind", f"'simplex' searches on a model, and {lacks}: choose 'default' or 'given'")
+
+
+def _policy(definition: Definition) -> tuple[Problem, ...]:
+    if definition.experiment not in EXPERIMENTS:
+        return ()
+    try:
+        space = EXPERIMENTS[definition.experiment].space.narrowed(definition.bounds)
+        _check_start(definition, space)
+    except InputError as error:
+        return error.problems
+    return ()
+
+
+def _check_start(definition: Definition, space: PolicySpace) -> None:
+    start = definition.start
+    brings_gains = start.kind in {"given", "campaign"}
+    if brings_gains != (start.gains is not None):
+        needed = f"are needed with start.kind {start.kind!r}"
+        reason = needed if start.gains is None else f"do not go with start.kind {start.kind!r}"
+        raise InputError("The start cannot be used.", hint="", problems=(Problem("start.gains", reason),))
+    if (start.kind == "campaign") != (start.donor is not None):
+        reason = "is needed with start.kind 'campaign', and goes with no other"
+        raise InputError("The start cannot be used.", hint="", problems=(Problem("start.donor", reason),))
+    if start.kind != "simplex":
+        space.check(start.gains or space.mapping(space.default), field="start.gains")
+
+
+def _fractions(definition: Definition) -> Iterator[Problem]:
+    for name in ("first_step_fraction", "step_fraction"):
+        value = getattr(definition, name)
+        if not 0.0 < value <= 1.0:
+            yield Problem(name, f"must be above 0 and at most 1, got {value:g}")
+    if not (math.isfinite(definition.ceiling_m) and MIN_CEILING_M <= definition.ceiling_m <= MAX_CEILING_M):
+        yield Problem("ceiling_m", f"must lie in {MIN_CEILING_M:g} … {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}")
+
+
+def _stop(rule: StopRule) -> Iterator[Problem]:
+    if not 1 <= rule.max_flights <= MAX_FLIGHTS:
+        yield Problem("stop.max_flights", f"must lie in 1 … {MAX_FLIGHTS}, got {rule.max_flights}")
+    if not (math.isfinite(rule.improvement) and 0.0 <= rule.improvement <= MAX_IMPROVEMENT):
+        yield Problem("stop.improvement", f"must lie in 0 … {MAX_IMPROVEMENT:g}, got {rule.improvement:g}")
+    if not MIN_CONFIDENCE <= rule.confidence < 1.0:
+        yield Problem("stop.confidence", f"must be at least {MIN_CONFIDENCE:g} and below 1, got {rule.confidence:g}")
+    if rule.min_battery_v is not None and not (math.isfinite(rule.min_battery_v) and rule.min_battery_v > 0.0):
+        yield Problem("stop.min_battery_v", f"must be above 0 V, got {rule.min_battery_v:g}")
+
+
+def _seed(seed: int) -> Iterator[Problem]:
+    if seed < 0:
+        yield Problem("seed", f"must not be negative, got {seed}")

@@ -1,0 +1,236 @@
+"""The gate's verdict on one policy.
+
+Limits of a campaign's vehicle, shared by strategies and the gate.
+
+Limits on gains: what a controller can hold, the campaign's bounds, and its step limit.
+
+Handling of refusals: how they are reported, and who may overrule them.
+
+Gate check of a step before it is proposed.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from app.core.definition import Definition, Flight, was_flown
+from app.core.errors import GainsError, Problem
+from app.core.experiments import experiment_of
+from app.core.experiments.base import Check, Envelope, Experiment, ModelledExperiment, ParameterDistribution
+from app.core.formatting import percent
+from app.core.policy import Gain, Gains, PolicySpace, Vector
+from app.core.tuning.calibration import known_distribution
+from app.core.tuning.corrected_model import start_gains
+
+
+def envelope_of(definition: Definition, experiment: Experiment) -> Envelope:
+    """The campaign's ceiling and safe gains: the vehicle's own, or else the experiment's default gains."""
+    own = definition.safe_gains
+    safe_gains = experiment.space.mapping(experiment.space.default) if own is None else own
+    return Envelope(ceiling_m=definition.ceiling_m, safe_gains=safe_gains)
+
+
+NUMBERS: Final = "numbers"
+"""Name of the check that cannot be overruled."""
+
+
+def check_numbers(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
+    """Return a refusal for each gain that is not finite, or not a 32-bit integer where the controller needs one."""
+    return tuple(
+        Check(
+            NUMBERS, False, f"{gain.name} {reason}.", worst=_outside(gain, gains[gain.name]), limit=0.0, gain=gain.name
+        )
+        for gain in space.gains
+        if (reason := gain.refusal_by_controller(gains[gain.name])) is not None
+    )
+
+
+def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
+    """Return a refusal for each gain outside its bounds, or one passed check."""
+    refused = tuple(
+        Check(
+            "bounds",
+            False,
+            f"{gain.name} {reason}.",
+            worst=_outside(gain, gains[gain.name]),
+            limit=0.0,
+            gain=gain.name,
+            offer={gain.name: min(max(gains[gain.name], gain.lower), gain.upper)},
+        )
+        for gain in space.gains
+        if (reason := gain.refusal_by_bounds(gains[gain.name])) is not None
+    )
+    return refused or (Check("bounds", True, "Every gain lies within its bounds.", worst=0.0, limit=0.0),)
+
+
+def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
+    """Check the largest change of a gain from the nearest of `references`, a share of its range, against `fraction`."""
+    nearest = min(references, key=lambda reference: max(space.change(gains, reference).values()))
+    name, worst = max(space.change(gains, nearest).items(), key=lambda item: item[1])
+    base = space.vector(nearest)
+    low, high = space.reachable(base, fraction)
+    vector = space.vector(gains)
+    passed = worst <= fraction or bool(((low <= vector) & (vector <= high)).all())
+    sentence = (
+        f"The largest change, of {name}, is {percent(worst, 1)} of its range; "
+        f"{'at most' if passed else 'only'} {percent(fraction)} is allowed from {origin}."
+    )
+    beyond = {} if passed else space.mapping(space.nearest(vector.clip(low, high)))
+    offer = {gain: value for gain, value in beyond.items() if value != gains[gain]}
+    return Check("step", passed, sentence, worst=worst, limit=fraction, gain="" if passed else name, offer=offer)
+
+
+def jointly_offered(gains: Gains, checks: Sequence[Check]) -> tuple[Check, ...]:
+    """The same checks, with each offer replaced by one that passes all of them together.
+
+    Every offer is the requested value clipped to a limit; the one furthest from the request satisfies all limits.
+    """
+    offers: dict[str, float] = {}
+    for name, value in (item for check in checks for item in check.offer.items()):
+        offers[name] = max(offers.get(name, gains[name]), value, key=lambda offer: abs(offer - gains[name]))
+    return tuple(replace(check, offer={name: offers[name] for name in check.offer}) for check in checks)
+
+
+def _outside(gain: Gain, value: float) -> float:
+    """How far a gain lies outside its bounds, as a share of its range; infinite if it is pinned or not finite."""
+    beyond = max(gain.lower - value, value - gain.upper, 0.0)
+    if beyond == 0.0:
+        return 0.0
+    return beyond / gain.span if gain.span and math.isfinite(value) else math.inf
+
+
+WAIVED_AFTER_VALID_FLIGHT: Final = frozenset({"altitude", "divergence"})
+"""Checks of simulated takeoffs that do not refuse gains flown before."""
+
+
+@dataclass(frozen=True, slots=True)
+class GateResult:
+    """Verdict on one policy; each check has its worst value and the case that caused it."""
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        return all(check.passed for check in self.checks)
+
+    @property
+    def refusals(self) -> tuple[Check, ...]:
+        return tuple(check for check in self.checks if not check.passed)
+
+    @property
+    def overrulable(self) -> bool:
+        """Whether a controller can hold these gains at all."""
+        return not any(check.name == NUMBERS for check in self.checks)
+
+
+def check_policy(
+    definition: Definition,
+    experiment: Experiment,
+    space: PolicySpace,
+    gains: Gains,
+    flights: Sequence[Flight],
+    *,
+    start: Gains | None = None,
+    spread: ParameterDistribution | None = None,
+) -> GateResult:
+    """Check a complete set of gains (every name of `space`).
+
+    Checks the numbers, the campaign's bounds, its step limit, and the experiment's hazards if it has a model. Gains of
+    a valid flight of this campaign may fly again even if simulated takeoffs exceed the altitude or diverge, because the
+    flight is better evidence. Pure; takes a tenth of a second for a takeoff.
+
+    `space` is the experiment's, narrowed to the campaign's bounds. Before the first valid flight a gain may change by
+    `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from any valid flight.
+    `start` gives the start gains if they are known, because the search on the model is slow. `spread` gives the
+    vehicle's parameter distribution, for `flights` without their records.
+    """
+    if numbers := check_numbers(space, gains):
+        return GateResult(numbers)
+    hazards = _hazards(
+        definition, experiment, space, gains, known_distribution(experiment, flights) if spread is None else spread
+    )
+    if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
+        hazards = tuple(_flown_before(check) for check in hazards)
+    limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
+    return GateResult(jointly_offered(gains, (*limits, *hazards)))
+
+
+def _hazards(
+    definition: Definition, experiment: Experiment, space: PolicySpace, gains: Gains, spread: ParameterDistribution
+) -> tuple[Check, ...]:
+    modelled = experiment.modelled
+    if modelled is None:
+        return ()
+    return modelled.hazards(space.vector(gains), spread, envelope_of(definition, experiment))
+
+
+def _flown_before(check: Check) -> Check:
+    """The check's result for gains that a valid flight of the campaign has flown."""
+    if check.passed or check.name not in WAIVED_AFTER_VALID_FLIGHT:
+        return check
+    sentence = f"{check.sentence} But a flight of this campaign flew these gains to its end, so they may fly again."
+    return replace(check, passed=True, sentence=sentence)
+
+
+def _step(
+    definition: Definition,
+    experiment: Experiment,
+    space: PolicySpace,
+    gains: Gains,
+    flights: Sequence[Flight],
+    start: Gains | None,
+) -> Check:
+    flown = [flight.gains for flight in flights if flight.outcome == "valid"]
+    if flown:
+        return check_step(space, gains, flown, definition.step_fraction, "a flown set")
+    origin = start_gains(definition, experiment, space) if start is None else start
+    fraction = definition.first_step_fraction
+    return check_step(space, gains, [origin], fraction, "the start gains until a flight has shown more")
+
+
+def space_of(definition: Definition) -> PolicySpace:
+    """The policy space of a campaign, within its bounds."""
+    return experiment_of(definition).space.narrowed(definition.bounds)
+
+
+def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = False) -> str:
+    """Return the reason to record with the flight: `overrule` if it lets refused gains fly, else empty.
+
+    On a simulated vehicle an operator may overrule a refusal with a reason, for example to fly the paper's gains (ki =
+    1356 can wrap); on a real one nobody can. Numbers that the controller cannot hold are never overruled. Raises
+    GainsError naming every refusal with its gain and, if there is one, a value that would pass.
+    """
+    if overrule and is_real:
+        raise GainsError(
+            "Nobody can overrule the gate on a real vehicle.",
+            hint="Fly these gains on its simulation, or choose gains that the gate lets pass.",
+            problems=(Problem("overrule", "is only for simulated vehicles"),),
+        )
+    if gate.passed or (overrule and gate.overrulable):
+        return "" if gate.passed else overrule
+    raise GainsError("The gate refuses these gains.", hint=_hint(gate, is_real), problems=problems_of_gate(gate))
+
+
+def problems_of_gate(gate: GateResult) -> tuple[Problem, ...]:
+    """Every refusal with its field: `gains.ki`, or `gains` if no single gain is the cause."""
+    return tuple(
+        Problem(f"gains.{check.gain}" if check.gain else "gains", check.sentence, check.offer)
+        for check in gate.refusals
+    )
+
+
+def _hint(gate: GateResult, is_real: bool) -> str:
+    offers = {name: value for check in gate.refusals for name, value in check.offer.items()}
+    offered = ", ".join(f"{name} = {value:g}" for name, value in offers.items())
+    nearest = f"The nearest that these checks let pass: {offered}. " if offered else ""
+    choose = "Choose milder gains, or clone the campaign with wider limits."
+    may_overrule = "" if is_real or not gate.overrulable else " On a simulated vehicle you may overrule with a reason."
+    return f"{nearest}{choose}{may_overrule}"
+
+
+def allows(
+    definition: Definition, experiment: ModelledExperiment, gains: Vector, spread: ParameterDistribution
+) -> bool:
+    """Whether gains of shape (n,) pass the experiment's hazard checks over the vehicle's parameter distribution."""
+    return all(check.passed for check in experiment.hazards(gains, spread, envelope_of(definition, experiment)))

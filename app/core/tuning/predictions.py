@@ -1,0 +1,314 @@
+"""Uncertainty of a prediction: its interval and band before the flight, and the track record afterwards.
+
+A bias-corrected model ŷ = model(gains; p) + (measured − model(flown gains; p)) is run for a sample of likely parameter
+sets p (from the priors of a fit), each with its own bias. The mean and standard deviation of their errors represent the
+model uncertainty. With the flight-to-flight scatter σ (`app.core.statistics.comparisons`), which affects both the new
+flight and the n flights of the base,
+
+    interval = mean ± t(ν) · f · √(σ² (1 + 1/n) + sd²),    widened to contain the predicted error itself.
+
+The band has the same form at every instant, with σ converted to the output offset that costs σ. The factor f adapts to
+experience: f² = (ν₀ + Σ z²)/(ν₀ + k), where z are the k earlier prediction errors in units of their own intervals and
+ν₀ = 4. An uncorrected model (first flight, simplex) has no base: the term 1/n and the bias are omitted.
+
+Predictions of a calibrated model: a flight's curve with a band, and its error with an interval.
+
+The remaining bias acts inside the loop: the disturbances of the best flight relative to its own calibrated model are
+applied to the new gains as well, so that gains which reject gusts are credited for it. If the record lacks the climb
+rate or the thrust command, the bias is added outside the loop, and fades with the distance from the flown gains.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from app.core.definition import Flight, Prediction
+from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, ParameterDistribution
+from app.core.models.vertical import ENTERED
+from app.core.policy import PolicySpace, Vector
+from app.core.records.trajectory import Samples, Trajectory
+from app.core.statistics.comparisons import Group, PooledScatter, groups_of
+from app.core.tuning.calibration import Calibration
+from app.core.tuning.corrected_model import resample_to_grid
+from app.core.tuning.strategy import Explanation, Interval, Kind, Proposal, band_channels
+
+CONFIDENCE: Final = 0.9
+MODELS: Final = 16
+_PRIOR_WEIGHT: Final = 4.0
+_DISAGREEMENTS: Final = 3
+_TINY: Final = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackRecord:
+    """How well earlier predictions held.
+
+    `inside` of `of` flights lay in their interval. Of the flights that were predicted to change the error, `agreeing`
+    changed it in the predicted direction and `disagreeing` in the other.
+    """
+
+    inside: int
+    of: int
+    agreeing: int
+    disagreeing: int
+    trustworthy: bool
+    sentence: str
+
+    @property
+    def share(self) -> float | None:
+        """Share of flights inside their interval; None before the first flight with an interval."""
+        return self.inside / self.of if self.of else None
+
+
+def track_record(flights: Sequence[Flight]) -> TrackRecord:
+    """Compute the track record of the predictions that the flights carry.
+
+    The direction counts where new gains were predicted to change the best error before them; repeated gains predict no
+    change. The predictions are not trustworthy once at least three flights went in the other direction, and more than
+    went in the predicted one.
+    """
+    inside = of = agreeing = disagreeing = 0
+    best: float | None = None
+    seen: set[frozenset[tuple[str, float]]] = set()
+    for flight in flights:
+        if flight.outcome != "valid" or flight.error is None:
+            continue
+        told, gains = flight.predicted, frozenset(flight.gains.items())
+        if told is not None and told.lower is not None and told.upper is not None:
+            of += 1
+            inside += told.lower <= flight.error <= told.upper
+        if told is not None and best is not None and gains not in seen:
+            agreed = (told.error - best) * (flight.error - best)
+            agreeing += agreed > 0.0
+            disagreeing += agreed < 0.0
+        best = flight.error if best is None else min(best, flight.error)
+        seen.add(gains)
+    trustworthy = not (disagreeing >= _DISAGREEMENTS and disagreeing > agreeing)
+    return TrackRecord(
+        inside=inside,
+        of=of,
+        agreeing=agreeing,
+        disagreeing=disagreeing,
+        trustworthy=trustworthy,
+        sentence=_sentence(inside, of, agreeing, disagreeing, trustworthy),
+    )
+
+
+def prediction_of(proposal: Proposal) -> Prediction | None:
+    """The prediction stored with a flight of the proposal, for later comparison."""
+    if proposal.predicted_error is None:
+        return None
+    interval = proposal.interval
+    return Prediction(
+        error=proposal.predicted_error,
+        lower=None if interval is None else interval.lower,
+        upper=None if interval is None else interval.upper,
+    )
+
+
+def with_interval(
+    experiment: ModelledExperiment,
+    space: PolicySpace,
+    flights: Sequence[Flight],
+    proposal: Proposal,
+    scatter: PooledScatter,
+    *,
+    base: Flight | None,
+) -> Proposal:
+    """Add the interval and band to a proposal; one that has an interval, or predicts nothing, is returned unmodified.
+
+    `base` is the flight whose bias corrects the prediction, None for the uncorrected model.
+    """
+    from scipy.special import stdtrit
+
+    if proposal.interval is not None or proposal.predicted is None or proposal.predicted_error is None:
+        return proposal
+    outputs = _sample_outputs(experiment, space, space.vector(proposal.gains), base)
+    repeats = next((group.size for group in groups_of(flights) if base and base.number in group.numbers), 0)
+    noise = scatter.sigma**2 * (1.0 + (1.0 / repeats if repeats else 0.0))
+    reach = float(stdtrit(scatter.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * interval_scale(flights)
+    errors, curve = experiment.errors(outputs), proposal.predicted[experiment.output]
+    half = reach * float(np.sqrt(noise + np.var(errors, ddof=1)))
+    offset = noise / offset_sensitivity(experiment) ** 2
+    band = reach * np.sqrt(offset + np.var(outputs, axis=0, ddof=1))
+    middle = np.mean(outputs, axis=0)
+    edges = (np.minimum(curve, middle - band), np.maximum(curve, middle + band))
+    centre = float(np.mean(errors))
+    return replace(
+        proposal,
+        interval=_interval(min(proposal.predicted_error, centre - half), max(proposal.predicted_error, centre + half)),
+        predicted=_with_band(proposal.predicted, experiment.output, *edges),
+    )
+
+
+def repeat_proposal(
+    experiment: Experiment,
+    flights: Sequence[Flight],
+    group: Group,
+    scatter: PooledScatter,
+    kind: Kind,
+    why: Explanation,
+) -> Proposal:
+    """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval if it is known."""
+    measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
+    curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
+    bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
+    if not scatter.known:
+        return bare
+    half = scatter.half_width(1.0 + 1.0 / group.size, CONFIDENCE)
+    offset = half / offset_sensitivity(experiment)
+    return replace(
+        bare,
+        predicted=_with_band(
+            curve, experiment.output, curve[experiment.output] - offset, curve[experiment.output] + offset
+        ),
+        interval=_interval(group.mean - half, group.mean + half),
+    )
+
+
+def interval_scale(flights: Sequence[Flight]) -> float:
+    """The factor f: above 1 if earlier prediction errors exceeded their intervals, below 1 if they were smaller."""
+    from scipy.special import ndtri
+
+    half_width = float(ndtri(0.5 + CONFIDENCE / 2))
+    squares = [
+        ((2.0 * flight.error - told.lower - told.upper) / max(told.upper - told.lower, _TINY) * half_width) ** 2
+        for flight in flights
+        if flight.error is not None
+        and (told := flight.predicted) is not None
+        and told.lower is not None
+        and told.upper is not None
+    ]
+    return float(np.sqrt((_PRIOR_WEIGHT + sum(squares)) / (_PRIOR_WEIGHT + len(squares))))
+
+
+def _with_band(curve: Trajectory, output: str, lower: Samples, upper: Samples) -> Trajectory:
+    """A predicted curve with the two edges of its band added as channels."""
+    edges = dict(zip(band_channels(output), (lower, upper), strict=True))
+    return replace(curve, channels={**curve.channels, **edges})
+
+
+def _interval(lower: float, upper: float) -> Interval:
+    """The interval, cut off at zero: an error is never negative."""
+    return Interval(lower=max(lower, 0.0), upper=upper, confidence=CONFIDENCE)
+
+
+def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: Vector, base: Flight | None) -> Matrix:
+    """Outputs of these gains on the sampled models, shape (k, n), each with its own bias if there is a base."""
+    parameters = experiment.model_parameters
+    prior = ParameterDistribution(
+        mean=tuple(parameter.prior_mean for parameter in parameters),
+        covariance=tuple(map(tuple, np.diag([parameter.prior_sd**2 for parameter in parameters]).tolist())),
+        origin="the priors of a fit",
+    )
+    models = prior.sample(experiment, MODELS)
+    proposed = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
+    if base is None:
+        return proposed
+    flown = experiment.outputs(np.tile(space.vector(base.gains), (MODELS, 1)), models)
+    return np.asarray(proposed - flown + resample_to_grid(experiment, base))
+
+
+def offset_sensitivity(experiment: Experiment) -> float:
+    """Error caused by a constant offset of one unit of the output: 1 for a mean, the window for an integral."""
+    return float(experiment.errors(experiment.set_point(experiment.grid_s)[np.newaxis] + 1.0)[0])
+
+
+def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:
+    if not of and not agreeing + disagreeing:
+        return "No flight has put a prediction to the test yet."
+    parts = [f"{inside} of {of} flights lay in their predicted interval"] if of else []
+    if agreeing + disagreeing:
+        parts.append(f"{agreeing} of {agreeing + disagreeing} changed the error in the predicted direction")
+    ending = "" if trustworthy else "; the gradient is not trustworthy: flights keep going the other way"
+    return f"{', '.join(parts)}{ending}."
+
+
+_AT_ONCE: Final = 8
+"""Number of gain sets simulated together, limited because their curves are held in memory."""
+_MODEL_ERROR: Final = 0.02
+"""Relative error of even the best simple model."""
+_GUST_VARIATION: Final = 0.5
+"""Relative variation of the error caused by gusts between flights."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPrediction:
+    """Prediction of a flight: its curve with a band, and its error with an interval.
+
+    `models` are the models used, (k, m), with their `errors` (k,).
+    """
+
+    trajectory: Trajectory
+    error: float
+    interval: Interval
+    models: Matrix
+    errors: Vector
+
+
+def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> FlightPrediction:
+    """Predict a flight with `gains`, shape (n,); `base` is the best of the calibrated flights."""
+    from scipy.special import ndtri
+
+    experiment = calibration.experiment
+    bias = remaining_bias(calibration, base, gains)
+    models = calibration.plausible(runs=MODELS, next_flight=True)
+    clean = experiment.outputs(np.tile(gains, (MODELS, 1)), models)
+    outputs = clean + bias
+    errors = experiment.errors(outputs)
+    weather = _GUST_VARIATION * float(np.mean(errors - experiment.errors(clean)))
+    error = float(np.mean(errors))
+    sd = float(np.sqrt(np.var(errors) + weather**2 + (_MODEL_ERROR * error) ** 2))
+    curve = outputs.mean(axis=0)
+    noise = float(np.sqrt(np.mean(bias**2)))
+    reach = float(ndtri(0.5 + CONFIDENCE / 2.0))
+    half = reach * np.sqrt(outputs.var(axis=0) + noise**2)
+    lower, upper = band_channels(experiment.output)
+    channels = {experiment.output: curve, lower: curve - half, upper: curve + half}
+    return FlightPrediction(
+        trajectory=Trajectory(experiment.grid_s, channels, "model", "simulation"),
+        error=error,
+        interval=Interval(lower=max(error - reach * sd, 0.0), upper=error + reach * sd, confidence=CONFIDENCE),
+        models=models,
+        errors=errors,
+    )
+
+
+def predict_errors(calibration: Calibration, base: Flight, gains: Matrix) -> Vector:
+    """Errors as predicted by `predict_flight` for many gain sets, a few at a time: (c, n) → (c,)."""
+    experiment = calibration.experiment
+    models = calibration.plausible(runs=MODELS, next_flight=True)
+    errors = np.empty(len(gains))
+    for first in range(0, len(gains), _AT_ONCE):
+        some = gains[first : first + _AT_ONCE]
+        clean = experiment.outputs(np.repeat(some, MODELS, axis=0), np.tile(models, (len(some), 1)))
+        beyond = np.repeat(remaining_biases(calibration, base, some), MODELS, axis=0)
+        errors[first : first + len(some)] = experiment.errors(clean + beyond).reshape(-1, MODELS).mean(axis=1)
+    return errors
+
+
+def remaining_bias(calibration: Calibration, base: Flight, gains: Vector) -> Samples:
+    """Expected deviation of a flight with `gains`, shape (n,), from the calibrated model, on the grid."""
+    return np.asarray(remaining_biases(calibration, base, gains[np.newaxis])[0])
+
+
+def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> Matrix:
+    """The same for many gain sets: (c, n) → (c, samples)."""
+    experiment = calibration.experiment
+    flown = experiment.space.vector(base.gains)
+    own = calibration.own_models[calibration.numbers.index(base.number)]
+    disturbances = experiment.disturbances(base.trajectory.as_stored(), flown, own)
+    if disturbances is None:
+        return np.stack([calibration.residual * _similarity(experiment, some, flown) for some in gains])
+    calm = np.zeros_like(disturbances)
+    calm[:, ENTERED] = disturbances[:, ENTERED]
+    disturbed, undisturbed = (experiment.disturbed_outputs(gains, own, acting) for acting in (disturbances, calm))
+    beyond: Matrix = disturbed - undisturbed
+    return beyond
+
+
+def _similarity(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:
+    """1 at the flown gains, 0.6 at a distance of one scale."""
+    return float(np.exp(-0.5 * np.sum(((gains - flown) / experiment.space.scale) ** 2)))

@@ -1,0 +1,200 @@
+"""Computes the next gain set from a campaign's frozen definition and its flights: a pure function.
+
+The recommended next action, shown beside the strategy's proposal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from app.core.definition import Definition, Flight, format_gains
+from app.core.experiments import experiment_of
+from app.core.experiments.base import Experiment, ModelledExperiment
+from app.core.formatting import short
+from app.core.policy import PolicySpace
+from app.core.statistics.comparisons import Group, groups_of, pool_scatter
+from app.core.tuning.calibration import known_distribution
+from app.core.tuning.confirmation import Confirmation, compare_winner, confirm, standing_within_bounds
+from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
+from app.core.tuning.gate import GateResult, check_policy
+from app.core.tuning.predictions import repeat_proposal, track_record, with_interval
+from app.core.tuning.stop_rules import StopVerdict
+from app.core.tuning.strategies import STRATEGIES
+from app.core.tuning.strategies.manual import propose as by_hand
+from app.core.tuning.strategy import Explanation, Kind, Proposal
+from app.core.tuning.transfer import Transfer, transfer
+
+_ORIGIN = {
+    "default": "the experiment's default gains",
+    "simplex": "the nominal model's optimum, found by Nelder–Mead from the default gains",
+    "given": "the gains given in the campaign's definition",
+    "campaign": "the best gains of the campaign that this one starts from",
+}
+
+
+def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flight | None = None) -> Proposal:
+    """Compute the next proposal. The same definition and flights give the same proposal, bit for bit on one machine.
+
+    `definition` must be free of problems (`app.core.tuning.definition_checks`). `flights` are the valid and aborted
+    ones, in order; their trajectories are used as stored, in single precision. Without a valid flight the start gains
+    are proposed. `donor` is the flight named by `definition.start.donor`: required with start kind `campaign`, and not
+    allowed with others.
+
+    Every proposal that predicts an error has an interval and a band; without a model there is no prediction. Under the
+    stop rule `noise` the proposal may repeat the winner or the first gains, or be of kind `none` once no further step
+    can be distinguished from noise.
+    """
+    chosen = experiment_of(definition)
+    space = chosen.space.narrowed(definition.bounds)
+    experiment = chosen.modelled
+    if experiment is None:
+        return _manual_proposal(definition, chosen, space, flights)
+    warm = None if donor is None else transfer(definition, experiment, flights, donor)
+    if warm is not None:
+        experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
+    if not _has_flown(flights):
+        return _start(definition, experiment, space, flights, donor)
+    scatter = pool_scatter(groups_of(flights), experiment.scatter)
+    strategy = STRATEGIES[definition.strategy]
+    proposal = strategy.propose(definition, experiment, space, flights)
+    number = proposal.explanation.base_flight if strategy.corrects_model else None
+    base = next((flight for flight in flights if flight.number == number), None)
+    proposal = with_interval(experiment, space, flights, proposal, scatter, base=base)
+    return _with_notes(_confirmed(definition, experiment, space, flights, proposal), flights, warm)
+
+
+def _has_flown(flights: Sequence[Flight]) -> bool:
+    return any(flight.outcome == "valid" for flight in flights)
+
+
+def _manual_proposal(
+    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
+    """Without a model: propose the start gains, then the operator's own; nothing is predicted."""
+    if _has_flown(flights):
+        proposal = by_hand(definition, experiment, space, flights)
+        return _confirmed(definition, experiment, space, flights, proposal)
+    gains = start_gains(definition, experiment, space)
+    summary = (
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); there is no model of this "
+        "vehicle's controller to predict it with."
+    )
+    lesson = "What these gains do, for the others to be measured against."
+    explanation = Explanation(summary=summary, lesson=lesson)
+    return Proposal(kind="start", gains=gains, predicted=None, predicted_error=None, explanation=explanation)
+
+
+def _start(
+    definition: Definition,
+    experiment: ModelledExperiment,
+    space: PolicySpace,
+    flights: Sequence[Flight],
+    donor: Flight | None,
+) -> Proposal:
+    gains = start_gains(definition, experiment, space)
+    model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
+    trajectory, error = model.predict(space.vector(gains))
+    teller = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
+    summary = (
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {teller} "
+        f"predicts {short(error)} {experiment.error_unit}."
+    )
+    lesson = "How far this vehicle is from the model." if donor is None else "Whether the two vehicles are alike."
+    start = Proposal(
+        kind="start",
+        gains=gains,
+        predicted=trajectory,
+        predicted_error=error,
+        explanation=Explanation(summary=summary, lesson=lesson),
+    )
+    return with_interval(experiment, space, flights, start, pool_scatter((), experiment.scatter), base=None)
+
+
+def _confirmed(
+    definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight], proposal: Proposal
+) -> Proposal:
+    """Apply the stop rule `noise` to the strategy's proposal.
+
+    The proposal is kept if a step is still worth a flight. Otherwise it is replaced by the flight that the confirmation
+    requires, or by kind `none` if the gate refuses that flight.
+    """
+    now = standing_within_bounds(definition, experiment, flights) if definition.stop.kind == "noise" else None
+    if now is None:
+        return proposal
+    wanted = confirm(definition, experiment, flights, proposal)
+    if wanted.phase == "step":
+        notes = (*proposal.explanation.notes, *filter(None, (wanted.why,)))
+        return replace(proposal, explanation=replace(proposal.explanation, notes=notes))
+    spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
+
+    def again(group: Group, kind: Kind, why: Explanation) -> Proposal:
+        return replace(repeat_proposal(experiment, flights, group, now.scatter, kind, why), spread=spread)
+
+    if wanted.phase == "decided":
+        return again(now.winner, "none", Explanation(summary=wanted.why))
+    group = now.winner if wanted.phase == "repeat" else now.baseline
+    gate = check_policy(definition, experiment, space, group.gains, flights, spread=spread)
+    if not gate.passed:
+        return again(now.winner, "none", Explanation(summary=f"{wanted.why} {_refused(group, gate)}"))
+    lesson = "Whether the winner is better than the first gains."
+    return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
+
+
+def _refused(group: Group, gate: GateResult) -> str:
+    reasons = " ".join(check.sentence for check in gate.refusals)
+    return f"But {format_gains(group.gains)} cannot be flown again, the gate refuses them: {reasons}"
+
+
+def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:
+    record = track_record(flights)
+    notes = (
+        *proposal.explanation.notes,
+        *((warm.sentence,) if warm is not None and warm.sentence else ()),
+        *((record.sentence,) if record.of or record.agreeing or record.disagreeing else ()),
+    )
+    return replace(proposal, explanation=replace(proposal.explanation, notes=notes))
+
+
+AdviceKind = Literal["step", "repeat", "baseline", "stop"]
+
+_MANUAL_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Advice:
+    """What to do next, with which gains, and why. Kind `baseline` is the first flight, or a repeat with its gains."""
+
+    kind: AdviceKind
+    gains: dict[str, float]
+    why: str
+
+
+def advise(
+    definition: Definition,
+    experiment: Experiment,
+    flights: Sequence[Flight],
+    proposal: Proposal,
+    said: StopVerdict,
+) -> Advice:
+    """Recommend the next action.
+
+    Under the stop rule `noise` the proposal already contains the recommendation. Under the other rules the advice is
+    only a recommendation: it advises against a step whose effect flights cannot distinguish from noise. Only gains
+    within the bounds are recommended, except when one of the other rules stops the campaign: that advice names the best
+    of all flights.
+    """
+    tells_noise = definition.stop.kind == "noise"
+    now = (compare_winner if said.stop and not tells_noise else standing_within_bounds)(definition, experiment, flights)
+    if said.stop:
+        return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=said.why)
+    if now is None or tells_noise:
+        kind = _MANUAL_KINDS.get(proposal.kind, "step")
+        return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)
+    confirmation = confirm(definition, experiment, flights, proposal)
+    kind = _kind(confirmation)
+    chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}
+    return Advice(kind=kind, gains=dict(chosen.get(kind, now.winner.gains)), why=confirmation.why)
+
+
+def _kind(confirmation: Confirmation) -> AdviceKind:
+    return "stop" if confirmation.phase == "decided" else confirmation.phase

@@ -1,0 +1,132 @@
+"""Stop rules: when a campaign ends automatically."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from app.core.definition import Definition, Flight, StopRule
+from app.core.formatting import percent
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.strategy import Kind, Proposal
+
+Reason = Literal["not improving", "flight budget", "nothing better", "told from noise", "battery low"]
+
+FAILURES_ALLOWED: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopVerdict:
+    """Whether to stop, and why.
+
+    `why` is a sentence in both cases. `failures` counts the scored flights in a row, up to the last, without enough
+    improvement; `threshold` is the error that the next flight must stay below to count as an improvement.
+    """
+
+    stop: bool
+    reason: Reason | None
+    why: str
+    failures: int
+    threshold: float | None
+
+
+def evaluate_stop_rule(
+    definition: Definition, flights: Sequence[Flight], proposal: Proposal, *, battery_v: float | None = None
+) -> StopVerdict:
+    """Apply the campaign's stop rule to its flights and the proposal computed from them.
+
+    `battery_v` is the voltage, V, at which the last flight ended, whether or not that flight counts.
+    """
+    return decide_stop(
+        definition.stop,
+        [flight.error for flight in flights],
+        proposal.kind,
+        battery_v=battery_v,
+        because=proposal.explanation.summary,
+    )
+
+
+def landing_battery_v(record: Trajectory) -> float | None:
+    """Battery voltage at the end of a flight, V; None if not recorded."""
+    return _battery_v(record, -1)
+
+
+def starting_battery_v(record: Trajectory) -> float | None:
+    """Battery voltage at the start of a flight, V; None if not recorded."""
+    return _battery_v(record, 0)
+
+
+def _battery_v(record: Trajectory, sample: int) -> float | None:
+    recorded = record.channels.get("battery_v")
+    return float(recorded[sample]) if recorded is not None and len(recorded) else None
+
+
+def decide_stop(
+    rule: StopRule,
+    errors: Sequence[float | None],
+    proposal_kind: Kind | None = None,
+    *,
+    battery_v: float | None = None,
+    because: str = "",
+) -> StopVerdict:
+    """Apply a stop rule to the errors of the flights so far, in order.
+
+    None stands for a flight without an error (aborted): it counts towards the budget, but not as an improvement or a
+    failure. `battery_v` is the voltage at which the last flight ended.
+
+    `paper` is the paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the
+    best so far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error is
+    neither an improvement on anything nor a failure. `noise` never stops on errors: the proposals schedule the flights
+    that decide, and kind `none` ends the campaign, with `because` (its explanation) as the reason. `budget` counts
+    flights only.
+    """
+    best: float | None = None
+    failures = 0
+    for error in errors:
+        if error is None:
+            continue
+        improves = best is None or error < (1.0 - rule.improvement) * best
+        failures = 0 if improves else failures + 1
+        best = error if best is None else min(error, best)
+    threshold = None if best is None or rule.kind == "noise" else (1.0 - rule.improvement) * best
+    reason = _reason(rule, len(errors), failures, proposal_kind, battery_v)
+    return StopVerdict(
+        stop=reason is not None,
+        reason=reason,
+        why=_sentence(rule, reason, len(errors), failures, battery_v, because),
+        failures=failures,
+        threshold=threshold,
+    )
+
+
+def _reason(
+    rule: StopRule, flights: int, failures: int, proposal_kind: Kind | None, battery_v: float | None
+) -> Reason | None:
+    if rule.kind == "noise" and proposal_kind == "none" and flights < rule.max_flights:
+        return "told from noise"
+    if flights >= rule.max_flights:
+        return "flight budget"
+    if rule.kind == "paper" and failures >= FAILURES_ALLOWED:
+        return "not improving"
+    if rule.kind == "paper" and proposal_kind == "none":
+        return "nothing better"
+    if rule.min_battery_v is not None and battery_v is not None and battery_v < rule.min_battery_v:
+        return "battery low"
+    return None
+
+
+def _sentence(
+    rule: StopRule, reason: Reason | None, flights: int, failures: int, battery_v: float | None, because: str
+) -> str:
+    by = f"more than {percent(rule.improvement)}"
+    if reason is None and rule.kind == "paper" and failures:
+        return f"The last flight did not improve by {by} on the best before it; one more such flight ends it."
+    if reason is None:
+        return f"{rule.max_flights - flights} of {rule.max_flights} flights are left."
+    sentences: dict[Reason, str] = {
+        "flight budget": f"All {rule.max_flights} flights of the budget are flown.",
+        "not improving": f"The last {failures} flights in a row did not improve by {by} on the best before them.",
+        "nothing better": "The model finds nothing better than the best flight.",
+        "told from noise": "",
+        "battery low": f"The last flight ended at {battery_v or 0.0:.2f} V; {rule.min_battery_v} V is the least.",
+    }
+    return f"{sentences[reason]} {because if rule.kind == 'noise' else ''}".strip()

@@ -1,0 +1,190 @@
+"""Fit the model to all flights, then choose its optimal gains.
+
+The choice is the robust optimum over a few plausible models (`hedging`), inside a trust region around the best flight
+(`trust`). A step that the gate would refuse is halved until it passes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from app.core.definition import Definition, Flight, best_flight, format_gains, was_flown
+from app.core.experiments.base import Matrix, ModelledExperiment
+from app.core.experiments.takeoff import Takeoff
+from app.core.formatting import percent, short
+from app.core.policy import PolicySpace, Vector
+from app.core.tuning.calibration import Calibration, calibrate
+from app.core.tuning.gate import allows
+from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
+from app.core.tuning.strategy import ErrorsOf, Explanation, Kind, Proposal, Strategy
+from app.core.tuning.trust_region import Box, find_robust_optimum, merit, trust_fraction
+
+MODELS: Final = 8
+ROBUSTNESS_SD: Final = 0.75
+"""Distance of the models from the fit in the robust optimisation, in standard deviations. A larger value increases the
+error on vehicles that match the fit, a smaller one on those that do not."""
+MIN_IMPROVEMENT: Final = 0.005
+"""A step predicted to improve the error by less than this share is not worth a flight."""
+
+_HALVINGS: Final = 5
+_DIFFERENCE: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class _ChosenGains:
+    """Gains to fly, shape (n,), how they were chosen, and the unshortened optimum."""
+
+    kind: Kind
+    gains: Vector
+    optimum: Vector
+    notes: tuple[str, ...] = ()
+
+
+def propose(
+    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
+    """Propose the robust optimum of the calibrated model, within the trust region. At least one flight must be valid.
+
+    Raises TypeError for experiments other than the takeoff.
+    """
+    if not isinstance(experiment, Takeoff):
+        raise TypeError(f"calibrated works with takeoff only, not with {experiment.name}")
+    calibration = calibrate(experiment, flights)
+    fitted = [flight for flight in flights if flight.number in calibration.numbers]
+    base = best_flight(fitted)
+    models = calibration.plausible(runs=MODELS, width=ROBUSTNESS_SD)
+    fraction = min(trust_fraction(flights), definition.step_fraction)
+    box = Box(*space.reachable(space.vector(base.gains), fraction))
+    choice = _choose(definition, experiment, space, flights, calibration, base, models, box)
+    prediction = predict_flight(calibration, base, choice.gains)
+    clipped = _at_an_edge(space, box, choice.optimum)
+    explanation = Explanation(
+        summary=_summary(experiment, base, choice, prediction, len(calibration.numbers)),
+        base_flight=base.number,
+        gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
+        direction=_named(space, choice.gains - space.vector(base.gains)),
+        clipped=clipped,
+        notes=(*choice.notes, *_notes(fraction, clipped)),
+        lesson=_describe_lesson(calibration, prediction),
+        fitted=calibration.fitted,
+        trust_fraction=fraction,
+    )
+    return Proposal(
+        kind=choice.kind,
+        gains=space.mapping(choice.gains),
+        predicted=prediction.trajectory,
+        predicted_error=prediction.error,
+        explanation=explanation,
+        interval=prediction.interval,
+        spread=calibration.spread(),
+    )
+
+
+def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors predicted by the calibrated model. At least one flight must be valid."""
+    calibration = calibrate(experiment, flights)
+    base = best_flight([flight for flight in flights if flight.number in calibration.numbers])
+    return partial(predict_errors, calibration, base)
+
+
+def _choose(
+    definition: Definition,
+    takeoff: Takeoff,
+    space: PolicySpace,
+    flights: Sequence[Flight],
+    calibration: Calibration,
+    base: Flight,
+    models: Matrix,
+    box: Box,
+) -> _ChosenGains:
+    here = space.nearest(space.vector(base.gains))
+    optimum = find_robust_optimum(takeoff, box, models, here[np.newaxis])
+    now, then = merit(takeoff, np.stack((here, optimum)), models).tolist()
+    if then > (1.0 - MIN_IMPROVEMENT) * now and was_flown(space.mapping(here), flights):
+        return _ChosenGains("none", here, optimum)
+    for halvings in range(_HALVINGS):
+        gains = box.nearest(here + (optimum - here) / 2**halvings)
+        if was_flown(space.mapping(gains), [flight for flight in flights if flight.outcome == "valid"]):
+            break
+        if was_flown(space.mapping(gains), flights):
+            continue
+        if allows(definition, takeoff, gains, calibration.spread()):
+            if halvings == 0:
+                return _ChosenGains("step", gains, optimum)
+            note = (
+                f"The whole step, to {format_gains(space.mapping(optimum))}, was aborted before or the gate refuses it."
+            )
+            return _ChosenGains("shorter step", gains, optimum, (note,))
+    note = f"Every step towards {format_gains(space.mapping(optimum))} was flown before or is refused by the gate."
+    return _ChosenGains("none", here, optimum, (note,))
+
+
+def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
+    """∂merit/∂gain at the best flight by central differences; zero for a pinned gain."""
+    steps = np.diag(np.maximum(np.rint(_DIFFERENCE * takeoff.space.scale), 1.0))
+    above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
+    errors = merit(takeoff, np.concatenate((above, below)), models)
+    run = np.diag(above - below)
+    rise = errors[: len(base)] - errors[len(base) :]
+    return _named(space, np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
+
+
+def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(space.names, values, strict=True)}
+
+
+def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
+    at_edge = (gains <= box.low) | (gains >= box.high)
+    return tuple(name for name, is_there in zip(space.names, at_edge, strict=True) if is_there)
+
+
+def _summary(
+    experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, prediction: FlightPrediction, flights: int
+) -> str:
+    unit = experiment.error_unit
+    told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
+    best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
+    if choice.kind == "none":
+        return f"{told} finds nothing that is better than {best} by {percent(MIN_IMPROVEMENT, 1)} and may be flown."
+    low, high = prediction.interval.lower, prediction.interval.upper
+    assert base.error is not None
+    share = 1.0 - prediction.error / base.error
+    return (
+        f"{told} promises {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than with {best}: "
+        f"{short(prediction.error)} {unit}, with {percent(prediction.interval.confidence)} confidence within "
+        f"{short(low)} … {short(high)} {unit}."
+    )
+
+
+def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
+    kept = "What the best flight did beyond the model is kept inside the control loop."
+    limits = f"A bound or the trust region stopped {', '.join(clipped)}." if clipped else ""
+    trust = f"Steps of at most {percent(fraction)} of each range are trusted." if fraction < 1.0 else ""
+    return tuple(filter(None, (kept, limits, trust)))
+
+
+def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> str:
+    """The parameter to which the predicted error is most sensitive, as a sentence."""
+    values = prediction.models - prediction.models.mean(axis=0)
+    errors = prediction.errors - prediction.errors.mean()
+    spread = np.linalg.norm(values, axis=0)
+    shares = np.divide(np.abs(errors @ values), spread, out=np.zeros_like(spread), where=spread > 0.0)
+    most = calibration.fitted[int(np.argmax(np.round(shares, 9)))]
+    return (
+        f"Mostly {most.title.lower()}, now {most.value:.3g} ± {most.standard_error:.1g} {most.unit}: what is open in "
+        "the foretold error hangs on it more than on any other number."
+    )
+
+
+CALIBRATED: Final = Strategy(
+    name="calibrated",
+    title="Calibrated model",
+    line="Fits the model to all flights and flies its optimum, hedged over what is left open: about two flights.",
+    options=(),
+    propose=propose,
+    predict_errors=foresee,
+    experiments=("takeoff",),
+)

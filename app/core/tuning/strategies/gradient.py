@@ -1,0 +1,247 @@
+"""The paper's strategy: gradient descent on the corrected model.
+
+The base is the best flight so far. The model, corrected by it outside the loop (or inside, as an option), gives the
+gradient (central differences) and the error at every step of a geometric ladder along the negative gradient; the best
+step is flown. A flight that does not improve leaves the base and the line unchanged, and the next step is half as long.
+A step that the gate would refuse is halved in the same way.
+
+Line search: evaluates step sizes along one direction on a model.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from app.core.definition import Definition, Flight, Option, best_flight, format_gains, was_flown
+from app.core.experiments.base import ModelledExperiment
+from app.core.formatting import short
+from app.core.policy import PolicySpace, Vector
+from app.core.tuning.calibration import known_distribution
+from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
+from app.core.tuning.gate import allows
+from app.core.tuning.strategy import ErrorsOf, Explanation, LadderStep, Proposal, Strategy
+
+
+@dataclass(frozen=True, slots=True)
+class SearchLine:
+    """Flyable gains along `direction` (gains per unit of length) from `base`, each limited to `low` … `high`.
+
+    All have shape (n,).
+    """
+
+    space: PolicySpace
+    base: Vector
+    direction: Vector
+    low: Vector
+    high: Vector
+
+    def at(self, length: float) -> Vector:
+        return np.clip(self.space.nearest(self.base + length * self.direction), self.low, self.high)
+
+    def clipped(self, length: float) -> tuple[str, ...]:
+        """Gains that are limited by a bound or the step limit at this length."""
+        wanted = self.base + length * self.direction
+        wanted = np.where([gain.integer for gain in self.space.gains], np.rint(wanted), wanted)
+        stopped = (wanted < self.low) | (wanted > self.high)
+        return tuple(name for name, is_stopped in zip(self.space.names, stopped, strict=True) if is_stopped)
+
+
+def evaluate_lengths(line: SearchLine, lengths: Sequence[float], model: CorrectedModel) -> tuple[LadderStep, ...]:
+    """The model's error at each length, in the order of `lengths`."""
+    candidates = np.array([line.at(length) for length in lengths])
+    return tuple(
+        LadderStep(
+            length=length, gains=line.space.mapping(gains), predicted_error=float(error), clipped=line.clipped(length)
+        )
+        for length, gains, error in zip(lengths, candidates, model.errors(candidates), strict=True)
+    )
+
+
+SCALED_LADDER: Final = tuple(2.0**power for power in range(3, -13, -1))
+RAW_LADDER: Final = tuple(10.0 ** (tenths / 10) for tenths in range(30, -1, -1))
+"""Step lengths if a gain is an integer."""
+RAW_REAL_LADDER: Final = SCALED_LADDER
+"""Step lengths if all gains are real: a step of 1 may be far too long."""
+MIN_DIFFERENCE: Final = 2.0
+_HALVINGS: Final = 24
+_OUTSIDE: Final = "The correction is added outside the control loop, as a bias over time"
+
+
+@dataclass(frozen=True, slots=True)
+class _Metric:
+    """How step lengths are measured: the scale of each gain, shape (n,), and the ladder of lengths."""
+
+    scale: Vector
+    ladder: tuple[float, ...]
+
+
+def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vector) -> Vector:
+    """∂error/∂gain at `base`, shape (n,), by central differences.
+
+    The step to each side is the experiment's share of `scale`, at least 2 counts for integer gains, and limited by the
+    bounds; zero where the bounds pin a gain.
+    """
+    integer = np.array([gain.integer for gain in space.gains])
+    wanted = model.experiment.difference * scale
+    steps = np.where(integer, np.maximum(np.rint(wanted), MIN_DIFFERENCE), wanted)
+    above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
+    ups = np.where(np.eye(len(base), dtype=bool), above, base)
+    downs = np.where(np.eye(len(base), dtype=bool), below, base)
+    errors = model.errors(np.concatenate((ups, downs)))
+    rise, run = errors[: len(base)] - errors[len(base) :], above - below
+    return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
+
+
+def _raw_metric(space: PolicySpace) -> _Metric:
+    whole = any(gain.integer for gain in space.gains)
+    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER)
+
+
+def propose(
+    definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
+) -> Proposal:
+    """Propose the next gains on the line from the best flight. At least one flight must be valid."""
+    metric = _Metric(space.scale, SCALED_LADDER) if definition.options.get("scaled", True) else _raw_metric(space)
+    base = best_flight(flights)
+    base_gains = space.nearest(space.vector(base.gains))
+    model, correction = _corrected(definition, experiment, base)
+    slopes = gradient(model, space, base_gains, metric.scale)
+    steepness = float(np.linalg.norm(slopes * metric.scale))
+    direction = -slopes * metric.scale**2 / (steepness or 1.0)
+    line = SearchLine(space, base_gains, direction, *space.reachable(base_gains, definition.step_fraction))
+    ladder = evaluate_lengths(line, metric.ladder, model)
+    best = min(ladder, key=lambda step: step.predicted_error)
+    now = float(model.errors(base_gains[np.newaxis])[0])
+    spread = known_distribution(experiment, flights)
+
+    def passes(gains: Vector) -> bool:
+        return allows(definition, experiment, gains, spread)
+
+    chosen, refused = (
+        _first_allowed_step(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
+    )
+    explanation = Explanation(
+        summary=_summary(experiment, base, best, chosen, len(ladder), refused),
+        base_flight=base.number,
+        gradient=_named(space, slopes),
+        direction=_named(space, direction),
+        ladder=ladder,
+        chosen_length=chosen.length if chosen else None,
+        clipped=chosen.clipped if chosen else (),
+        notes=(correction, *_notes(chosen, refused)),
+    )
+    gains = space.mapping(base_gains) if chosen is None else chosen.gains
+    trajectory, error = model.predict(space.vector(gains))
+    return Proposal(
+        kind="none" if chosen is None else "step" if chosen is best else "shorter step",
+        gains=gains,
+        predicted=trajectory,
+        predicted_error=error,
+        explanation=explanation,
+        spread=spread,
+    )
+
+
+def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+    """The errors of the model corrected by the best flight. At least one flight must be valid."""
+    return _corrected(definition, experiment, best_flight(flights))[0].errors
+
+
+def _first_allowed_step(
+    line: SearchLine,
+    best: LadderStep,
+    flights: Sequence[Flight],
+    model: CorrectedModel,
+    passes: Callable[[Vector], bool],
+) -> tuple[LadderStep | None, tuple[LadderStep, ...]]:
+    """Halve the best step until it was not flown yet and passes the gate; also return the steps that did not pass.
+
+    Gains already flown did not improve on the base, which is the best of all flights. None once a step rounds to the
+    base.
+    """
+    refused: list[LadderStep] = []
+    for length in _halvings(best.length):
+        gains = line.at(length)
+        if np.array_equal(gains, line.base):
+            break
+        if was_flown(line.space.mapping(gains), flights):
+            continue
+        step = best if length == best.length else evaluate_lengths(line, (length,), model)[0]
+        if passes(gains):
+            return step, tuple(refused)
+        refused.append(step)
+    return None, tuple(refused)
+
+
+def _halvings(length: float) -> Iterator[float]:
+    return (length / 2**halvings for halvings in range(_HALVINGS))
+
+
+def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(space.names, values, strict=True)}
+
+
+def _summary(
+    experiment: ModelledExperiment,
+    base: Flight,
+    best: LadderStep,
+    chosen: LadderStep | None,
+    tried: int,
+    refused: Sequence[LadderStep],
+) -> str:
+    unit = experiment.error_unit
+    origin = f"The best flight so far is {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}."
+    if chosen is None:
+        may = " and may be flown" if refused else ""
+        return f"{origin} Along its gradient the corrected model finds nothing better that was not flown yet{may}."
+    if chosen is best:
+        return (
+            f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
+            f"{chosen.length:.4g} promises most: {short(chosen.predicted_error)} {unit}."
+        )
+    why = "is refused by the gate" if refused else "did not improve on it"
+    return (
+        f"{origin} The longer step along the same line {why}, so the next one goes less far, "
+        f"{chosen.length:.4g} instead of {best.length:.4g}; predicted {short(chosen.predicted_error)} {unit}."
+    )
+
+
+def _corrected(definition: Definition, experiment: ModelledExperiment, base: Flight) -> tuple[CorrectedModel, str]:
+    """The corrected model, and a sentence about how it is corrected."""
+    if definition.options.get("bias") != "inside":
+        return correct_by_bias(experiment, base), f"{_OUTSIDE}."
+    if (inside := correct_in_loop(experiment, base)) is not None:
+        return inside, "The correction is added to the state in every step, inside the control loop."
+    missing = f"flight {base.number} was recorded without all of its state and its command"
+    return correct_by_bias(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
+
+
+def _notes(chosen: LadderStep | None, refused: Sequence[LadderStep]) -> tuple[str, ...]:
+    stopped = f"A bound or the step limit stopped {', '.join(chosen.clipped)}." if chosen and chosen.clipped else ""
+    shortened = f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}." if refused else ""
+    return tuple(filter(None, (stopped, shortened)))
+
+
+GRADIENT: Final = Strategy(
+    name="gradient",
+    title="Gradient on the corrected model",
+    line="The paper's method: the model, corrected by the best flight, gives the direction and the step.",
+    options=(
+        Option(
+            name="scaled",
+            title="Measure each gain in its own scale (off: raw counts, as the paper)",
+            default=True,
+            choices=(True, False),
+        ),
+        Option(
+            name="bias",
+            title="Where the flight corrects the model: outside the control loop, or inside where its command is known",
+            default="outside",
+            choices=("outside", "inside"),
+        ),
+    ),
+    propose=propose,
+    predict_errors=foresee,
+)

@@ -1,0 +1,135 @@
+"""The two-part comparison of the replica with a log of the loop far below its rate."""
+
+import io
+
+import numpy as np
+import pytest
+
+from app.core.control.loop_log import FIELDS, LoopLog, check_commands, check_simulation, infer_gains
+from app.logs.paparazzi import read_loop_log
+from tests.logs.paparazzi_flights import Flight, data_of
+
+DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
+TUNED = {"kp": 1624, "ki": 1356, "kd": 195}
+
+
+def log_of(flight: Flight) -> LoopLog:
+    return read_loop_log(io.BytesIO(data_of(flight).encode()))[0]
+
+
+def changed(log: LoopLog, name: str, rows: slice, by: int) -> LoopLog:
+    values = log.values.copy()
+    values[rows, FIELDS.index(name)] += by
+    return LoopLog(log.time_s, values)
+
+
+@pytest.mark.parametrize("gains", [DEFAULT, TUNED])
+def test_every_command_follows_to_the_last_bit(gains: dict[str, int]) -> None:
+    log = log_of(Flight(gains))
+    checked = check_commands(log, gains)
+    assert (checked.exact, checked.different, set(checked.stale.values())) == (checked.rows, 0, {0})
+    assert checked.rows == int((~log.idle).sum()) == 669
+    assert checked.passed
+
+
+def test_a_state_sampled_a_step_after_its_commands_is_told_apart_from_a_difference() -> None:
+    checked = check_commands(log_of(Flight(TUNED, stale=True)), TUNED)
+    assert checked.passed
+    assert checked.stale["state"] > 10
+    assert checked.exact + sum(checked.stale.values()) == checked.rows
+
+
+def test_other_gains_than_flown_are_noticed_and_the_flown_ones_named() -> None:
+    log = log_of(Flight(DEFAULT))
+    checked = check_commands(log, {"kp": 300, "ki": 13, "kd": 82})
+    assert checked.different > 500
+    assert not checked.passed
+    assert checked.first_different_s is not None
+    assert infer_gains(log) == DEFAULT
+
+
+@pytest.mark.parametrize("name", ["ff_cmd", "fb_cmd", "thrust"])
+def test_a_single_command_that_is_off_is_found(name: str) -> None:
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    checked = check_commands(changed(log, name, slice(150, 151), 40), DEFAULT)
+    assert checked.different == 1
+    assert checked.first_different_s == log.time_s[150]
+
+
+def test_feed_forward_under_a_tilt_follows_with_that_tilt() -> None:
+    checked = check_commands(log_of(Flight(DEFAULT, tilt=16300, fly_s=8.0)), DEFAULT)
+    assert checked.passed
+    assert checked.tilted > 100
+    assert checked.largest_tilt_deg == pytest.approx(np.degrees(np.arccos(16300 / 16384)), abs=0.3)
+
+
+@pytest.mark.parametrize("every", [5, 26, 103])
+def test_reference_and_integrator_are_simulated_again_from_the_command(every: int) -> None:
+    checked = check_simulation(log_of(Flight(DEFAULT, every=every)))
+    assert checked is not None
+    assert checked.passed
+    assert checked.command_s == pytest.approx(15.0, abs=0.003)
+    assert checked.duration_s > 33.9
+    assert checked.largest_difference["z_ref"] == 0.0
+    assert checked.largest_difference["z_sum_err"] < 0.001
+
+
+def test_time_stamps_that_jitter_are_within_the_tolerance() -> None:
+    log = log_of(Flight(TUNED))
+    jitter_s = np.random.default_rng(3).uniform(-0.008, 0.008, len(log))
+    checked = check_simulation(LoopLog(log.time_s + jitter_s, log.values))
+    assert checked is not None
+    assert checked.passed
+
+
+@pytest.mark.parametrize(("name", "by"), [("z_ref", 30), ("zd_ref", 80_000), ("zdd_ref", 900), ("z_sum_err", 40_000)])
+def test_a_reference_or_an_integrator_that_goes_another_way_is_found(name: str, by: int) -> None:
+    log = changed(log_of(Flight(DEFAULT)), name, slice(300, 400), by)
+    checked = check_simulation(log)
+    assert checked is not None
+    assert not checked.passed
+    assert max(checked.largest_difference, key=lambda each: checked.largest_difference[each] > 0) == name
+
+
+def test_a_log_that_begins_in_the_air_is_not_simulated() -> None:
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    flying = ~log.idle
+    assert check_simulation(LoopLog(log.time_s[flying], log.values[flying])) is None
+
+
+def test_the_integrator_is_held_against_a_log_that_says_a_step_twice_too() -> None:
+    log = log_of(Flight(DEFAULT))
+    rows = np.sort(np.append(np.arange(len(log)), 300))
+    time_s = log.time_s[rows]
+    time_s[301] += 1e-5
+    twice = LoopLog(time_s, log.values[rows])
+    checked, other = (check_simulation(each) for each in (twice, changed(twice, "z_sum_err", slice(400, 500), 40_000)))
+    assert checked is not None
+    assert checked.largest_difference["z_sum_err"] < 0.001
+    assert other is not None
+    assert not other.passed
+
+
+def test_an_integrator_that_never_works_has_nothing_to_be_compared() -> None:
+    """A vehicle that does not notice that it flies."""
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    values = log.values.copy()
+    values[:, FIELDS.index("z_sum_err")] = 0
+    checked = check_simulation(LoopLog(log.time_s, values))
+    assert checked is not None
+    assert checked.largest_difference["z_sum_err"] == 0.0
+
+
+def test_a_flight_too_calm_to_tell_gains_apart_tells_none() -> None:
+    log = log_of(Flight(DEFAULT))
+    hover = log.time_s > 40.0
+    assert infer_gains(LoopLog(log.time_s[hover], log.values[hover])) is None
+
+
+def test_neither_do_a_handful_of_samples_or_commands_beyond_any_gains() -> None:
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    first = int(np.flatnonzero(~log.idle)[0])
+    assert infer_gains(LoopLog(log.time_s[: first + 19], log.values[: first + 19])) is None
+    values = log.values.copy()
+    values[:, FIELDS.index("fb_cmd")] *= 2**16
+    assert infer_gains(LoopLog(log.time_s, values)) is None

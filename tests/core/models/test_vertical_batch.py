@@ -1,0 +1,66 @@
+"""Takeoffs flown side by side, against the same takeoffs flown one by one."""
+
+import numpy as np
+
+from app.core.control.paparazzi import POSITION_BITS, STATE_SIZE, fix
+from app.core.experiments.base import Matrix, ParameterDistribution
+from app.core.experiments.takeoff import Takeoff
+from app.core.models.vertical import HOVER_THROTTLE, MEASUREMENT_DELAY_S, Counts, decay, rollouts
+from app.core.models.vertical_batch import BATCH_WIDTH, are_exact, fly_batch
+
+TARGET = fix(3.0, POSITION_BITS)
+SAMPLES = 2000
+"""Past the second in which the loop finds out that it flies."""
+
+
+def models(count: int) -> Matrix:
+    """Every parameter at work."""
+    parameters = Takeoff().model_parameters
+    covariance = np.diag([parameter.prior_sd**2 for parameter in parameters])
+    spread = ParameterDistribution(
+        mean=tuple(parameter.prior_mean + 0.5 * parameter.prior_sd for parameter in parameters),
+        covariance=tuple(tuple(row) for row in covariance.tolist()),
+        origin="",
+    )
+    return spread.draw_random(Takeoff(), count, seed=1)
+
+
+def gain_sets(count: int) -> Counts:
+    return np.random.default_rng(2).integers((100, 0, 30), (4000, 1073, 409), size=(count, 3))
+
+
+def one_by_one(gains: Counts, each: Matrix) -> Matrix:
+    altitude = np.empty((len(gains), SAMPLES))
+    rollouts(gains, each, TARGET, np.empty(STATE_SIZE, dtype=np.int64), altitude, np.empty((5, 0)))
+    return altitude
+
+
+def test_side_by_side_is_bit_for_bit_one_by_one() -> None:
+    gains, each = gain_sets(BATCH_WIDTH + 2), models(BATCH_WIDTH + 2)
+    assert np.array_equal(fly_batch(gains, each, TARGET, SAMPLES), one_by_one(gains, each))
+
+
+def test_gains_whose_products_wrap_fly_as_the_autopilot_wraps_them() -> None:
+    gains, each = gain_sets(3), models(3)
+    gains[1] = (1600, 1023, 3000)
+    assert are_exact(gains).tolist() == [True, False, True]
+    assert np.array_equal(fly_batch(gains, each, TARGET, SAMPLES), one_by_one(gains, each))
+
+
+def test_a_vehicle_too_fast_for_the_loops_integers_is_flown_again_alone() -> None:
+    gains, each = gain_sets(2), models(2)
+    each[0, HOVER_THROTTLE] = 1e-4
+    curves = fly_batch(gains, each, TARGET, SAMPLES)
+    assert curves[0].max() > 1000.0
+    assert np.array_equal(curves, one_by_one(gains, each))
+
+
+def test_a_measurement_delay_beyond_what_lanes_remember_is_flown_alone() -> None:
+    gains, each = gain_sets(2), models(2)
+    each[1, MEASUREMENT_DELAY_S] = 0.2
+    assert np.array_equal(fly_batch(gains, each, TARGET, SAMPLES), one_by_one(gains, each))
+
+
+def test_the_decay_with_height_is_the_exponential_function() -> None:
+    distances = np.linspace(0.0, 80.0, 400)
+    assert np.allclose([decay(x) for x in distances.tolist()], np.exp(-distances), rtol=0.0, atol=1e-13)

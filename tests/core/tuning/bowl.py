@@ -1,0 +1,98 @@
+"""An experiment whose error is known in closed form: 1 + ((a − 30)/10)² + ((b − 40)/10)² + offset, at every instant."""
+
+from collections.abc import Mapping
+from typing import Final, Self
+
+import numpy as np
+
+from app.core.definition import Flight, Option, OptionValue
+from app.core.experiments.base import (
+    Check,
+    Envelope,
+    Matrix,
+    ModelParameter,
+    ParameterDistribution,
+    Scatter,
+    SimplexSearch,
+    informed_parameters,
+)
+from app.core.policy import Gain, Gains, PolicySpace, Vector
+from app.core.records.trajectory import Samples, Trajectory
+
+OFFSET: Final = ModelParameter("offset", "Offset", "m", 0.0, -1.0, 1.0, prior_sd=0.1, known_within=0.5)
+
+
+class QuadraticExperiment:
+    """Real gain `a` and whole gain `b` in 0 … 100, of scale 10 and 5; the lowest error is at a = 30, b = 40."""
+
+    name: Final = "bowl"
+    title: Final = "Bowl"
+    output: Final = "depth"
+    integrates: Final = False
+    error_unit: Final = "m"
+    space: Final = PolicySpace(
+        (
+            Gain("a", "A", "1", lower=0, upper=100, scale=10, default=90, integer=False),
+            Gain("b", "B", "counts", lower=0, upper=100, scale=5, default=90, integer=True),
+        )
+    )
+    options: Final[tuple[Option, ...]] = ()
+    scatter: Final = Scatter(sd=0.01, degrees_of_freedom=4.0)
+    search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
+    difference: Final = 0.1
+    grid_s: Final = np.linspace(0.0, 1.0, 11)
+
+    def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:
+        self.model_parameters: Final = model_parameters
+
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        return self
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        return type(self)(informed_parameters(self.model_parameters, mean, sd))
+
+    @property
+    def modelled(self) -> Self:
+        return self
+
+    @property
+    def nominal_model(self) -> Vector:
+        return np.array([parameter.nominal for parameter in self.model_parameters])
+
+    def set_point(self, time_s: Samples) -> Samples:
+        return np.zeros_like(time_s)
+
+    def simulate(self, gains: Vector, model: Vector) -> Trajectory:
+        return Trajectory(self.grid_s, {"depth": self.outputs(gains[np.newaxis], model)[0]}, "model", "simulation")
+
+    def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
+        depth = 1.0 + ((gains[:, :1] - 30.0) / 10.0) ** 2 + ((gains[:, 1:] - 40.0) / 10.0) ** 2 + model[..., :1]
+        return np.tile(depth, (1, len(self.grid_s)))
+
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
+        return None
+
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+        raise NotImplementedError
+
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
+        return ()
+
+    def errors(self, outputs: Matrix) -> Vector:
+        return np.asarray(np.abs(outputs).mean(axis=1))
+
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
+        return float(np.abs(trajectory["depth"]).mean())
+
+
+def fly(number: int, a: float, b: float, offset: float = 0.25) -> Flight:
+    """A flight of the bowl that is `offset` deeper than its model."""
+    gains: Gains = {"a": a, "b": b}
+    trajectory = QuadraticExperiment().simulate(QuadraticExperiment.space.vector(gains), np.array([offset])).as_stored()
+    return Flight(
+        number=number,
+        gains=gains,
+        trajectory=trajectory,
+        error=QuadraticExperiment().error(trajectory),
+        outcome="valid",
+    )

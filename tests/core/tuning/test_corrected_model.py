@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
+from tests.core.tuning.bowl import QuadraticExperiment, fly
+from tests.core.tuning.flying import TAKEOFF
+from tests.core.tuning.flying import fly as take_off
+
+
+def test_the_corrected_model_reproduces_the_flight_that_corrected_it() -> None:
+    flight = take_off(1, {"kp": 283, "ki": 13, "kd": 82})
+    trajectory, error = correct_by_bias(TAKEOFF, flight).predict(TAKEOFF.space.default)
+    assert trajectory["altitude_m"] == pytest.approx(flight.trajectory["altitude_m"], abs=1e-12)
+    assert error == pytest.approx(flight.error, abs=1e-12)
+
+
+def test_a_fresh_flight_corrects_bit_for_bit_like_a_stored_one() -> None:
+    stored = fly(1, 50.0, 70)
+    noise = np.random.default_rng(7).normal(size=11)
+    fresh = Trajectory(QuadraticExperiment.grid_s, {"depth": stored.trajectory["depth"] + noise}, "model", "simulation")
+    biases = [
+        correct_by_bias(
+            QuadraticExperiment(),
+            type(stored)(number=1, gains=stored.gains, trajectory=trajectory, error=1, outcome="valid"),
+        )
+        for trajectory in (fresh, fresh.as_stored())
+    ]
+    assert np.array_equal(biases[0].bias, biases[1].bias)
+
+
+def test_flights_sampled_otherwise_are_brought_to_the_grid_and_held_beyond_their_ends() -> None:
+    flight = fly(1, 30.0, 40, offset=0.0)
+    ramp = Trajectory(np.array([0.25, 0.75]), {"depth": np.array([1.25, 1.75])}, "csv", "vehicle")
+    recorded = type(flight)(number=1, gains=flight.gains, trajectory=ramp, error=1.0, outcome="valid")
+    assert correct_by_bias(QuadraticExperiment(), recorded).bias == pytest.approx(
+        np.clip(QuadraticExperiment.grid_s, 0.25, 0.75), abs=1e-7
+    )
+
+
+def test_before_any_flight_nothing_is_corrected() -> None:
+    assert not uncorrected_model(TAKEOFF).bias.any()

@@ -1,0 +1,90 @@
+import math
+from dataclasses import replace
+
+import pytest
+
+from app.core.definition import Definition, Donor, Start, StopRule
+from app.core.errors import InputError
+from app.core.tuning.definition_checks import check_definition, problems_of
+
+GOOD = Definition()
+
+
+def test_the_default_definition_has_no_problems() -> None:
+    assert problems_of(GOOD) == ()
+    check_definition(GOOD)
+    check_definition(replace(GOOD, options={"scaled": False}, bounds={"kp": (100, 2000)}, start=Start(kind="simplex")))
+    check_definition(replace(GOOD, start=Start(kind="given", gains={"kp": 1, "ki": 2, "kd": 3})))
+
+
+@pytest.mark.parametrize(
+    ("definition", "field", "reason"),
+    [
+        (
+            replace(
+                GOOD,
+                start=Start(
+                    kind="given",
+                    gains={"kp": 1, "ki": 2, "kd": 3},
+                    donor=Donor(campaign_id=4, trial_number=1, checksum=""),
+                ),
+            ),
+            "start.donor",
+            "is needed with start.kind 'campaign', and goes with no other",
+        ),
+        (replace(GOOD, ceiling_m=101.0), "ceiling_m", "must lie in 3.2 … 100 m, got 101"),
+        (replace(GOOD, stop=StopRule(confidence=1.0)), "stop.confidence", "must be at least 0.5 and below 1, got 1"),
+        (replace(GOOD, stop=StopRule(min_battery_v=-1.0)), "stop.min_battery_v", "must be above 0 V, got -1"),
+        (
+            replace(GOOD, experiment="landing"),
+            "experiment",
+            "must be one of takeoff, takeoff-ardupilot, takeoff-px4, pitch-tracking, got 'landing'",
+        ),
+        (
+            replace(GOOD, strategy="luck"),
+            "strategy",
+            "must be one of calibrated, gradient, identified, simplex, manual, got 'luck'",
+        ),
+        (replace(GOOD, strategy="identified"), "strategy", "'identified' works with pitch-tracking only"),
+        (replace(GOOD, options={"raw": True}), "options.raw", "is not an option of gradient (it has: scaled, bias)"),
+        (
+            replace(GOOD, strategy="manual", options={"raw": 1}),
+            "options.raw",
+            "is not an option of manual (it has: none)",
+        ),
+        (replace(GOOD, options={"scaled": 1}), "options.scaled", "must be one of true, false, got 1"),
+        (replace(GOOD, bounds={"kx": (0, 1)}), "bounds.kx", "is not a gain of this experiment (kp, ki, kd)"),
+        (
+            replace(GOOD, bounds={"kp": (9, 5)}),
+            "bounds.kp",
+            "must be two numbers, the lower first, inside 0 … 4000, got 9 … 5",
+        ),
+        (replace(GOOD, bounds={"kp": (0, math.nan)}), "bounds.kp", "must be whole numbers, got 0 … nan"),
+        (replace(GOOD, bounds={"ki": (0.5, 99)}), "bounds.ki", "must be whole numbers, got 0.5 … 99"),
+        (replace(GOOD, bounds={"kp": (500, 600)}), "start.gains.kp", "must lie in 500 … 600 counts, got 283"),
+        (replace(GOOD, start=Start(kind="given")), "start.gains", "are needed with start.kind 'given'"),
+        (replace(GOOD, start=Start(gains={"kp": 1})), "start.gains", "do not go with start.kind 'default'"),
+        (
+            replace(GOOD, start=Start(kind="given", gains={"kp": 1, "ki": 2.5, "kd": 3})),
+            "start.gains.ki",
+            "must be a whole number of counts, got 2.5",
+        ),
+        (replace(GOOD, first_step_fraction=0.0), "first_step_fraction", "must be above 0 and at most 1, got 0"),
+        (replace(GOOD, step_fraction=1.5), "step_fraction", "must be above 0 and at most 1, got 1.5"),
+        (replace(GOOD, step_fraction=math.nan), "step_fraction", "must be above 0 and at most 1, got nan"),
+        (replace(GOOD, stop=StopRule(max_flights=0)), "stop.max_flights", "must lie in 1 … 200, got 0"),
+        (replace(GOOD, stop=StopRule(max_flights=201)), "stop.max_flights", "must lie in 1 … 200, got 201"),
+        (replace(GOOD, stop=StopRule(improvement=0.51)), "stop.improvement", "must lie in 0 … 0.5, got 0.51"),
+        (replace(GOOD, stop=StopRule(improvement=math.nan)), "stop.improvement", "must lie in 0 … 0.5, got nan"),
+        (replace(GOOD, seed=-1), "seed", "must not be negative, got -1"),
+    ],
+)
+def test_each_unusable_field_is_named_with_its_reason(definition: Definition, field: str, reason: str) -> None:
+    assert [(problem.field, problem.reason) for problem in problems_of(definition)] == [(field, reason)]
+
+
+def test_all_problems_are_told_at_once() -> None:
+    with pytest.raises(InputError) as refusal:
+        check_definition(replace(GOOD, strategy="luck", seed=-1, step_fraction=0.0))
+    assert [problem.field for problem in refusal.value.problems] == ["strategy", "step_fraction", "seed"]
+    assert refusal.value.hint

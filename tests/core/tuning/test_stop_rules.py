@@ -1,0 +1,112 @@
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from app.core.definition import Definition, StopRule
+from app.core.tuning.stop_rules import decide_stop, evaluate_stop_rule, landing_battery_v, starting_battery_v
+from app.core.tuning.strategy import Explanation, Proposal
+from tests.core.tuning.bowl import fly
+
+PAPER = StopRule()
+
+
+@pytest.mark.parametrize(
+    ("errors", "stop", "reason"),
+    [
+        ([], False, None),
+        ([0.3775], False, None),
+        ([0.3775, 0.2006, 0.1596, 0.1733], False, None),  # Table 1, left: run 5 was flown …
+        ([0.3775, 0.2006, 0.1596, 0.1733, 0.1521], True, "not improving"),  # … and improved by 4.7 % only
+        ([0.5102, 0.2537, 0.2265, 0.2652, 0.2483], True, "not improving"),  # Table 2, left
+        ([0.1006, 0.0966], False, None),
+        ([0.1006, 0.0966, 0.0940], True, "not improving"),  # Table 1, right, taken literally; the paper flew one more
+        ([0.1218, 0.1249, 0.1278], True, "not improving"),  # Table 2, right
+        ([0.3, 0.2, 0.1, 0.05, 0.03, 0.02, 0.01], True, "flight budget"),
+    ],
+)
+def test_the_papers_rule_on_the_papers_series(errors: list[float], stop: bool, reason: str | None) -> None:
+    judged = decide_stop(PAPER, errors)
+    assert (judged.stop, judged.reason) == (stop, reason)
+
+
+def test_an_improvement_of_exactly_the_fraction_is_not_more_than_it() -> None:
+    rule = StopRule(improvement=0.5)
+    assert decide_stop(rule, [0.5, 0.25]).failures == 1
+    assert decide_stop(rule, [0.5, 0.2499]).failures == 0
+
+
+def test_small_gains_that_add_up_do_not_count() -> None:
+    """Each flight is held against the best so far, not against the last that counted."""
+    assert decide_stop(PAPER, [1.0, 0.96, 0.93]).stop
+
+
+def test_one_success_between_failures_resets_the_count() -> None:
+    judged = decide_stop(PAPER, [1.0, 1.1, 0.9, 1.2])
+    assert (judged.stop, judged.failures) == (False, 1)
+    assert judged.threshold == pytest.approx(0.855)
+    assert "one more such flight" in judged.why
+
+
+def test_an_aborted_flight_neither_improves_nor_fails_but_uses_up_budget() -> None:
+    assert decide_stop(PAPER, [0.5, None, None]).reason is None
+    assert decide_stop(PAPER, [0.5, 0.49, None, 0.48]).reason == "not improving"
+    assert decide_stop(PAPER, [None, 0.5]).failures == 0
+    assert decide_stop(PAPER, [None]).threshold is None
+    assert decide_stop(PAPER, [None] * 7).reason == "flight budget"
+
+
+def test_a_line_without_anything_better_ends_the_paper_rule_only() -> None:
+    assert decide_stop(PAPER, [0.5], "none").reason == "nothing better"
+    assert decide_stop(PAPER, [0.5], "manual").reason is None
+    assert decide_stop(StopRule(kind="budget"), [0.5], "none").reason is None
+
+
+def test_the_budget_rule_counts_flights_only() -> None:
+    rule = StopRule(kind="budget", max_flights=4)
+    assert not decide_stop(rule, [0.5, 0.5, 0.5]).stop
+    assert decide_stop(rule, [0.5, 0.5, 0.5]).why == "1 of 4 flights are left."
+    assert decide_stop(rule, [0.5] * 4).reason == "flight budget"
+    assert "All 4 flights" in decide_stop(rule, [0.5] * 4).why
+
+
+def test_the_noise_rule_never_stops_on_errors_but_when_nothing_is_left_to_tell() -> None:
+    rule = StopRule(kind="noise", max_flights=4)
+    same = [0.5, 0.5, 0.5]
+    assert decide_stop(rule, same, "step").reason is None
+    assert decide_stop(rule, same, "step").threshold is None
+    judged = decide_stop(rule, same, "none", because="Better.")
+    assert (judged.reason, judged.why) == ("told from noise", "Better.")
+    spent = decide_stop(rule, [*same, 0.5], "none", because="Unresolved.")
+    assert (spent.reason, spent.why) == ("flight budget", "All 4 flights of the budget are flown. Unresolved.")
+
+
+@pytest.mark.parametrize("kind", ["paper", "noise", "budget"])
+def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "noise", "budget"]) -> None:
+    rule = StopRule(kind=kind, min_battery_v=10.5)
+    assert decide_stop(rule, [0.5], "step", battery_v=10.5).reason is None
+    assert decide_stop(rule, [0.5], "step").reason is None
+    low = decide_stop(rule, [0.5], "step", battery_v=10.42, because="A step.")
+    assert low.reason == "battery low"
+    assert low.why.startswith("The last flight ended at 10.42 V; 10.5 V is the least.")
+
+
+def test_the_battery_is_read_at_both_ends_of_a_record() -> None:
+    flight = fly(1, 30, 40)
+    assert (starting_battery_v(flight.trajectory), landing_battery_v(flight.trajectory)) == (None, None)
+    channels = {**flight.trajectory.channels, "battery_v": np.linspace(11.1, 10.4, len(flight.trajectory))}
+    recorded = replace(flight.trajectory, channels=channels)
+    assert starting_battery_v(recorded) == pytest.approx(11.1)
+    assert landing_battery_v(recorded) == pytest.approx(10.4)
+
+
+def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
+    proposal = Proposal(
+        kind="step", gains={}, predicted=None, predicted_error=None, explanation=Explanation(summary="A step.")
+    )
+    definition = Definition(stop=StopRule(min_battery_v=10.5))
+    for flights in ([], [fly(1, 30, 40)]):
+        assert evaluate_stop_rule(definition, flights, proposal).reason is None
+        assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.6).reason is None
+        assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.4).reason == "battery low"

@@ -1,0 +1,100 @@
+"""Warm start: vehicle B begins with what vehicle A's campaign found, where the two are alike."""
+
+from dataclasses import replace
+
+import pytest
+
+from app.core.definition import Definition, Donor, Flight, Start, StopRule
+from app.core.tuning.calibration import calibrate
+from app.core.tuning.proposals import next_proposal
+from app.core.tuning.transfer import transfer
+from tests.core.tuning import bowl
+from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
+
+TUNED: dict[str, float] = {"kp": 1600, "ki": 900, "kd": 150}
+ALIKE = (0.615, 0.2, 0.04, 0.02)
+"""Another vehicle of the twin's kind."""
+UNLIKE = (0.66, 0.0, 0.0, 0.0)
+"""One that deviates from the data sheet the other way."""
+WARM = Definition(
+    start=Start(kind="campaign", gains=TUNED, donor=Donor(campaign_id=1, trial_number=5, checksum="0")),
+    stop=StopRule(kind="budget"),
+)
+
+
+def model(*leading: float) -> list[float]:
+    """The takeoff's model with its leading parameters given."""
+    return [*leading, *TAKEOFF.nominal_model[len(leading) :].tolist()]
+
+
+def donor() -> Flight:
+    return fly(5, TUNED, model(*TWIN))
+
+
+@compiled_only
+def test_the_first_flight_is_the_others_best_and_is_expected_to_score_as_there() -> None:
+    start = next_proposal(WARM, [], donor())
+    assert (start.kind, start.gains) == ("start", TUNED)
+    assert start.predicted_error == pytest.approx(donor().error, abs=1e-9)
+    assert start.interval is not None
+    assert start.predicted_error is not None
+    assert start.predicted_error in start.interval
+    assert "the best gains of the campaign that this one starts from" in start.explanation.summary
+
+
+@compiled_only
+def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first_step() -> None:
+    first = fly(1, TUNED, model(*ALIKE))
+    found = transfer(WARM, TAKEOFF, [first], donor())
+    assert found.agreement is not None
+    assert 0.5 < found.agreement < 1.0
+    assert found.step_fraction == pytest.approx(found.agreement * WARM.step_fraction)
+    assert found.experiment.nominal_model.tolist() == calibrate(TAKEOFF, [donor()]).model.tolist()
+    assert "takes the data sheet's place" in found.sentence
+    assert f"agreement {100.0 * found.agreement:.0f}\u00a0%" in found.sentence
+    notes = next_proposal(WARM, [first], donor()).explanation.notes
+    assert found.sentence in notes
+
+
+@compiled_only
+def test_the_step_is_shortened_for_the_second_flight_only() -> None:
+    flights = [fly(1, TUNED, model(*ALIKE)), fly(2, {**TUNED, "kp": 1700}, model(*ALIKE))]
+    found = transfer(WARM, TAKEOFF, flights, donor())
+    assert found.step_fraction == WARM.step_fraction
+    assert "first step" not in found.sentence
+
+
+@compiled_only
+def test_an_unlike_vehicle_takes_nothing_over() -> None:
+    first = fly(1, TUNED, model(*UNLIKE))
+    found = transfer(WARM, TAKEOFF, [first], donor())
+    assert found.agreement is not None
+    assert found.agreement < 0.5
+    assert found.experiment is TAKEOFF
+    assert found.step_fraction == WARM.step_fraction
+    assert found.sentence.startswith("Nothing is taken over from the other vehicle: ")
+    plain = next_proposal(replace(WARM, start=Start(kind="given", gains=TUNED)), [first])
+    warm = next_proposal(WARM, [first], donor())
+    assert (warm.gains, warm.predicted_error) == (plain.gains, plain.predicted_error)
+
+
+def test_before_the_first_valid_flight_nothing_is_decided() -> None:
+    flight = bowl.fly(1, 50, 50)
+    aborted = Flight(number=1, gains=flight.gains, trajectory=flight.trajectory, error=None, outcome="aborted")
+    found = transfer(WARM, bowl.QuadraticExperiment(), [aborted], flight)
+    assert (found.agreement, found.sentence, found.step_fraction) == (None, "", WARM.step_fraction)
+
+
+def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_explains() -> None:
+    """Offsets 0.4 (A) and 0.5 (B), scatter 0.01: 1 − (0.1² − 2·0.01²)/0.5²."""
+    found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, 0.5)], bowl.fly(3, 50, 50, 0.4))
+    assert found.agreement == pytest.approx(1.0 - (0.01 - 0.0002) / 0.25, abs=1e-5)
+    assert "The other vehicle's best gains are taken over" in found.sentence
+
+
+@pytest.mark.parametrize(("theirs", "ours", "agreement"), [(0.4, 0.41, 1.0), (0.0, 0.005, 1.0), (0.4, -0.1, 0.0)])
+def test_scatter_is_no_disagreement_and_the_opposite_is_none_of_an_agreement(
+    theirs: float, ours: float, agreement: float
+) -> None:
+    found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, ours)], bowl.fly(3, 50, 50, theirs))
+    assert found.agreement == pytest.approx(agreement)
