@@ -30,7 +30,7 @@ from app.campaigns.wear import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import FigureCard, Page, figure_card
 from app.common.states import CampaignState
-from app.figures.history import Range
+from app.figures.data import Range
 from app.fleet import registration
 from app.fleet.schemas import Vehicle, VehicleEdit
 from app.web.dependencies import (

@@ -11,9 +11,8 @@ from app.campaigns import history, repository
 from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
-from app.figures.batteries import BatteriesFigure, BatteryFlight
-from app.figures.drift import CalibrationFigure, Point
 from app.figures.theme import ThemeName
+from app.figures.vehicle_wear import BatteriesFigure, BatteryFlight, CalibrationFigure, Point
 from app.fleet import service as fleet
 
 _STRATEGY: Final = "calibrated"

@@ -23,8 +23,8 @@ from app.compare.verdicts import compare_pair, list_notes, overall_verdict
 from app.core.records.trajectory import CHANNEL_UNITS, Samples
 from app.db import trajectories
 from app.figures.base import Card, card_of
-from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure
-from app.figures.history import Curve
+from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure
+from app.figures.data import Curve
 from app.figures.theme import ThemeName
 
 GRID_STEP_S: Final = 0.02

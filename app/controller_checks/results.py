@@ -14,7 +14,7 @@ from app.core.control.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE
 from app.core.control.loop_log import UNITS as REFERENCE_UNITS
 from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ
 from app.core.records.trajectory import Samples
-from app.figures.controller import Overlaid
+from app.figures.panels import Overlaid
 from app.figures.scale import thinned
 
 Kind = Literal["log", "trace"]

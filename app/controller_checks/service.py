@@ -13,7 +13,7 @@ from app.controller_checks.check import check_trace, parse_gains
 from app.controller_checks.results import FIGURES, Result, examine_content, result_of
 from app.db.models import ControllerCheckRow
 from app.figures.base import Card, card_of
-from app.figures.controller import ControllerFigure
+from app.figures.panels import ControllerFigure
 from app.figures.theme import ThemeName
 from app.logs.loop_trace import read_loop_trace
 from app.processes.sandbox import FILE, run_limited

@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Final
 
 from app.figures.base import Figure
-from app.figures.errors import ErrorsFigure
+from app.figures.data import History
+from app.figures.error_history import ErrorsFigure
 from app.figures.gains import GainsFigure
-from app.figures.history import History
 from app.figures.takeoffs import TrajectoriesFigure
 from app.figures.theme import ThemeName
 

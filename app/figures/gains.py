@@ -6,8 +6,8 @@ from typing import ClassVar
 from app.core.policy import Gain
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
-from app.figures.crowd import MANY
-from app.figures.history import History, last_number
+from app.figures.data import History, last_number
+from app.figures.many_flights import MANY
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09

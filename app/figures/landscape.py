@@ -11,8 +11,8 @@ from app.core.policy import Gain, Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, plotly_json
-from app.figures.history import FlightData, History
-from app.figures.slices import holds, is_high, numbers, padded, to_edge
+from app.figures.data import FlightData, History
+from app.figures.landscape_layout import holds, is_high, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 LONGEST_PATH: Final = 60

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from app.core.records.trajectory import Samples, select_bends, select_samples
-from app.figures.history import Range
+from app.figures.data import Range
 
 MARGIN = 0.06
 SMOOTH: Final = 1e-3

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from app.figures import theme
+from app.figures.annotations import band_traces, glitch_traces
 from app.figures.base import Card, Cell, Column, Table, plotly_json
-from app.figures.crowd import PERCENTILES, Envelope, envelope_of, envelope_traces, select_individual_flights
-from app.figures.history import Curve, FlightData, History
-from app.figures.marks import band_traces, glitch_traces
+from app.figures.data import Curve, FlightData, History
+from app.figures.many_flights import PERCENTILES, Envelope, envelope_of, envelope_traces, select_individual_flights
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 

@@ -17,8 +17,7 @@ import numpy as np
 from app.core.control.loop_log import FIELDS, GAINS, LoopLog, infer_gains
 from app.core.control.paparazzi import FULL_THRUST, INT32_MAX, INT32_MIN
 from app.core.records.trajectory import Samples
-from app.logs.contents import refused
-from app.logs.gains import PAPARAZZI_SETS
+from app.logs.base import PAPARAZZI_SETS, refused
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 MAX_COMPANION_BYTES: Final = 16 * 2**20

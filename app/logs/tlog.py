@@ -16,8 +16,7 @@ from typing import BinaryIO, Final, Protocol
 import numpy as np
 
 from app.core.records.trajectory import Samples
-from app.logs.contents import Contents, contents, refused
-from app.logs.gains import ARDUPILOT_SETS, PAPARAZZI, PAPARAZZI_SETS, PX4_SETS, names_in
+from app.logs.base import ARDUPILOT_SETS, PAPARAZZI, PAPARAZZI_SETS, PX4_SETS, Contents, contents, names_in, refused
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 _STAMP_BYTES: Final = 8

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
-from app.logs.contents import Contents, contents, refused
-from app.logs.gains import PX4_SETS, names_in
+from app.logs.base import PX4_SETS, Contents, contents, names_in, refused
 from app.logs.takeoffs import FlightLog, LogEvent, Setting, Span
 
 if TYPE_CHECKING:

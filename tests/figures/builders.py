@@ -7,7 +7,7 @@ import numpy as np
 
 from app.core.policy import Gain
 from app.figures.base import Card
-from app.figures.history import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range
+from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range
 
 TIME_S = np.linspace(0.0, 32.6, 3261)
 SET_POINT = Curve(TIME_S, np.full_like(TIME_S, 3.0))

@@ -7,7 +7,7 @@ import pytest
 
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
-from app.figures.history import Noise, Range, Repeats
+from app.figures.data import Noise, Range, Repeats
 from app.figures.theme import PALETTES, Palette, ThemeName
 from tests.figures.builders import flight, history, proposal
 

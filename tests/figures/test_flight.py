@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.figures.data import Curve
 from app.figures.flight import FlightFigure, FlightRecordData
-from app.figures.history import Curve
 from tests.figures.builders import REFERENCE, SET_POINT, TIME_S, climb, layout, trace, traces
 
 THRUST = Curve(TIME_S, np.full_like(TIME_S, 0.63))

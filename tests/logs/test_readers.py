@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.errors import TrajectoryError
-from app.logs import contents
+from app.logs import base
 from app.logs.readers import READERS, SUFFIXES, read_takeoffs
 from app.logs.takeoffs import MIN_SAMPLES
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
@@ -121,7 +121,7 @@ def test_a_log_beyond_half_a_gibibyte_is_refused_before_it_is_read(tmp_path: Pat
     path = tmp_path / "huge.bin"
     path.write_bytes(Log().content)
     with path.open("r+b") as stream:
-        stream.truncate(contents.MAX_BYTES + 1)
+        stream.truncate(base.MAX_BYTES + 1)
         stream.seek(0)
         with pytest.raises(TrajectoryError, match="is larger than 512 MiB"):
             read_takeoffs(stream)

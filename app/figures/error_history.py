@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from app.figures import theme
+from app.figures.annotations import off_scale_traces
 from app.figures.base import Card, Cell, Column, Table, plotly_json
-from app.figures.crowd import MANY
-from app.figures.history import History, Range, last_number
-from app.figures.off_scale import off_scale_traces
+from app.figures.data import History, Range, last_number
+from app.figures.many_flights import MANY
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
 from app.figures import theme
-from app.figures.history import Band, Curve, FlightData, History
+from app.figures.data import Band, Curve, FlightData, History
 from app.figures.theme import Palette
 
 MAX_INDIVIDUAL_FLIGHTS: Final = 30

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 
 from app.figures.base import card_of
-from app.figures.comparing import ComparedCurve, ComparisonData, ComparisonFigure, line_style
-from app.figures.history import Curve
+from app.figures.comparison import ComparedCurve, ComparisonData, ComparisonFigure, line_style
+from app.figures.data import Curve
 from app.figures.theme import PALETTES
 from tests.figures.builders import SET_POINT, TIME_S, climb, layout, trace, traces
 

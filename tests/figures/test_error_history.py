@@ -1,7 +1,7 @@
 import pytest
 
-from app.figures.errors import ErrorsFigure
-from app.figures.history import Noise, Range, Repeats
+from app.figures.data import Noise, Range, Repeats
+from app.figures.error_history import ErrorsFigure
 from tests.figures.builders import flight, history, layout, proposal, trace, traces
 
 TABLE_1 = [

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, literal, plotly_json
-from app.figures.history import Curve
+from app.figures.data import Curve
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 

@@ -5,7 +5,7 @@ from typing import Final
 
 from app.core.policy import Gains
 from app.core.tuning.landscape import Slice
-from app.figures.history import FlightData
+from app.figures.data import FlightData
 
 NUMBER_ROOM: Final = (0.07, 0.075)
 """Size of a flight's number, as shares of a slice's width and height."""

@@ -1,0 +1,145 @@
+"""Overlays shared by several figures: a prediction's band, and glitches.
+
+Marks of flights whose error exceeds the scale: triangles at the upper edge.
+
+This keeps the other flights readable when one is an outlier.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from app.figures import theme
+from app.figures.data import Band, Curve, FlightData, Range
+from app.figures.scale import thin_by_bends, thinned
+from app.figures.theme import Palette
+
+GLITCH_POINTS: Final = 60
+
+
+def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
+    """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
+    if band is None:
+        return []
+    quiet: dict[str, object] = {
+        "type": "scatter",
+        "mode": "lines",
+        "line": theme.line(theme.with_opacity(palette.prediction, 0.35), 0.75),
+        "hoverinfo": "skip",
+        "legendgroup": "band",
+        "legendrank": 900,
+    }
+    lower, upper = (thin_by_bends(curve.time_s, curve.values) for curve in (band.lower, band.upper))
+    return [
+        {
+            **quiet,
+            "name": "Likely, lower edge",
+            "x": lower[0],
+            "y": lower[1],
+            "showlegend": False,
+            "meta": {"role": "band", "edge": "lower"},
+        },
+        {
+            **quiet,
+            "name": "Likely",
+            "x": upper[0],
+            "y": upper[1],
+            "fill": "tonexty",
+            "fillcolor": theme.with_opacity(palette.prediction, 0.14),
+            "meta": {"role": "band", "edge": "upper"},
+        },
+    ]
+
+
+def glitch_traces(
+    palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+) -> list[dict[str, object]]:
+    """The glitches of a flight's record, over its curve: one trace, or none."""
+    if curve is None or not glitches:
+        return []
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for glitch in glitches:
+        time_s, values = _stretch(curve, glitch)
+        x, y = [*x, *time_s, None], [*y, *values, None]
+    return [
+        {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "name": f"Flight {number}, glitch",
+            "x": x[:-1],
+            "y": y[:-1],
+            "line": theme.line(palette.bad, 5),
+            "marker": {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
+            "opacity": 0.85,
+            "showlegend": False,
+            "meta": {"role": "glitch", "trial": number},
+            "hovertemplate": f"<b>Flight {number}, glitch</b><br>%{{x:.2f}} s · %{{y:.3f}} {unit}<extra></extra>",
+        }
+    ]
+
+
+def _stretch(curve: Curve, part: Range) -> tuple[list[float], list[float]]:
+    """Part of a curve, with the samples just before and after it, so that a gap is visible."""
+    first, end = part.slice_of(curve.time_s)
+    return thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)
+
+
+PRINT: Final = 0.18
+"""Width of a printed error on a phone, as a share of the axis."""
+
+
+def off_scale_traces(
+    palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
+) -> list[dict[str, object]]:
+    """Marks at height `top` of an axis that ends with flight `last`.
+
+    If there are few flights, with the errors that have room.
+    """
+    if crowded:
+        return [_together(palette, flights, top, unit)] if flights else []
+    printed = set(_with_room([flight.number for flight in flights], PRINT * last))
+    return [_alone(palette, flight, top, unit, in_print=flight.number in printed) for flight in flights]
+
+
+def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
+    """Of ascending numbers, those at least `room` away from the last one selected."""
+    free = 0.0
+    for number in numbers:
+        if number >= free:
+            free = number + room
+            yield number
+
+
+def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> dict[str, object]:
+    text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
+    return {
+        "type": "scatter",
+        "mode": "markers+text" if in_print else "markers",
+        "name": text,
+        "x": [flight.number],
+        "y": [top],
+        "text": [f"↑ {flight.error:.2f}" if in_print else ""],
+        "textposition": "bottom center",
+        "showlegend": False,
+        "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},
+        "textfont": {"color": palette.bad},
+        "cliponaxis": False,
+        "meta": {"role": "off scale", "trial": flight.number},
+        "hovertemplate": f"{text}<extra></extra>",
+    }
+
+
+def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> dict[str, object]:
+    """Many flights in one trace, without printed errors."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "Off the scale",
+        "x": [flight.number for flight in flights],
+        "y": [top] * len(flights),
+        "text": [f"{flight.error:.2f} {unit}" for flight in flights],
+        "marker": {"symbol": "triangle-up", "size": 8, "color": palette.bad},
+        "cliponaxis": False,
+        "meta": {"role": "off scale"},
+        "hovertemplate": "<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+    }
