@@ -1,7 +1,4 @@
-"""Export of a campaign: writes rows as the parts of a zip.
-
-Export of a campaign as one file, and import with new ids and every number unchanged.
-"""
+"""Export of a campaign as one file: its rows, and those of the campaigns that it starts from, as the parts of a zip."""
 
 import hashlib
 import json

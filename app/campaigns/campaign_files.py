@@ -1,6 +1,5 @@
-"""Campaign files: the fields of `POST /api/campaigns` and a description, as YAML. Errors name the line.
-
-Changes to a campaign file from the command line: `--vehicle`, `--strategy`, `--start`, `--set name=value`.
+"""Campaign files: the fields of `POST /api/campaigns` and a description, as YAML, with the command line's changes to
+them (`--vehicle`, `--strategy`, `--start`, `--set name=value`). Errors name the line.
 """
 
 from collections.abc import Mapping, Sequence

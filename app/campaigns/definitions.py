@@ -1,6 +1,5 @@
-"""Conversion of a campaign's definition: from a request to the core, into its row, and back.
-
-Donor of a warm start: a flight of another campaign, looked up when the campaign is defined.
+"""Conversion of a campaign's definition: from a request to the core, into its row, and back; with the donor of a warm
+start, a flight of another campaign, looked up when the campaign is defined.
 """
 
 import hashlib

@@ -1,6 +1,5 @@
-"""Queries on a campaign's trials: the flights that a proposal is computed from, the best trial, the stored records.
-
-State changes of trials and flights; only those in the transition tables are possible.
+"""What is read of a campaign's trials: the flights that a proposal is computed from, the best trial, the stored
+records; and the state changes of campaigns, trials and flights, only those in the transition tables.
 """
 
 import hashlib

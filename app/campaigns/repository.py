@@ -1,7 +1,4 @@
-"""Queries on campaigns and proposals.
-
-Queries on trials, flights and trajectories.
-"""
+"""Queries on campaigns, proposals, trials and flights."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,11 +1,4 @@
-"""Campaigns and their proposals over HTTP.
-
-Figures over HTTP: Plotly JSON for the browser, with the same data as a table.
-
-The error landscape of a campaign over HTTP: a figure that is computed when it is first requested.
-
-Condition of a vehicle over HTTP, from its flights: calibration and batteries.
-"""
+"""Campaigns, their proposals and figures, and the condition of a vehicle over its flights, over HTTP."""
 
 from typing import Annotated, Literal
 

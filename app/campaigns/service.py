@@ -1,8 +1,7 @@
-"""Operations on campaigns for clients: people and scripts. Proposals are in `proposing`, API views in `views`.
+"""Operations on campaigns for clients: people and scripts. Proposals are in `proposals`, API views in `views`.
 
-Promotion of a campaign's best gains to its vehicle's safe gains, once flights have shown that they are better.
-
-Creation of rehearsals: the same campaign on a simulation, for a campaign on a real vehicle.
+A rehearsal is the same campaign on a simulation, for a campaign on a real vehicle. The best gains become the vehicle's
+safe gains once flights have shown that they are better.
 """
 
 from collections.abc import Collection

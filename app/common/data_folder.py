@@ -1,7 +1,4 @@
-"""The data folder: created if missing, with a clear error if it cannot be used.
-
-Paths of flights' telemetry logs.
-"""
+"""The data folder: created if missing, with a clear error if it cannot be used. Paths of the telemetry logs in it."""
 
 import errno
 import os

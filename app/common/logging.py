@@ -1,6 +1,5 @@
-"""Logs: one JSON object per line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error.
-
-Log lines of one job, from the worker's log files.
+"""Logs: one JSON object per line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error;
+and the lines of one job, read from the worker's log files.
 """
 
 import faulthandler

@@ -1,11 +1,8 @@
-"""Common parts of the slices' request and response schemas.
+"""What the schemas and pages of several slices share: checked names and numbers, pages and their cursors, figures.
 
-Invisible characters that change how text is displayed.
-
-In a name they can rewrite a terminal's lines, or reverse text so that one name looks like another.
-
-Cursors: the position where a page ended, so that the next page begins there whatever was added or changed
-meanwhile.
+A name must not hold control characters: they can rewrite a terminal's lines, or reverse text so that one name looks
+like another. A cursor is the position where a page ended, so that the next page begins there whatever was added or
+changed meanwhile.
 """
 
 import base64

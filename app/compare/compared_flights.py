@@ -1,9 +1,4 @@
-"""The compared flights, each with its gain group, scatter and vehicle.
-
-Formatting of numbers and flights in sentences.
-
-Settings of a flight, and the differences between several flights.
-"""
+"""The compared flights, each with its gain group, scatter, vehicle and settings, and the differences between them."""
 
 import json
 from collections import Counter

@@ -1,8 +1,5 @@
-"""The frozen definition of a campaign: the fields that computations need.
-
-Settings of strategies and experiments, and validation of their values.
-
-Queries of the flight history, shared by strategies.
+"""The frozen definition of a campaign and its flights: the fields that computations need, the settings of strategies
+and experiments with their validation, and queries of the flight history.
 """
 
 import hashlib

@@ -1,9 +1,7 @@
 """Change events, written in the transaction of the change itself, so that none is lost and none is false.
 
 The web process reads them in order and publishes them to the browsers. They say that a thing changed, not its new
-state.
-
-Detects commits of other connections to the database, at the cost of one PRAGMA per poll.
+state. Commits of other processes are detected at the cost of one PRAGMA per poll.
 """
 
 import sqlite3

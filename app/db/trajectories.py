@@ -1,10 +1,9 @@
-"""Storage format of a trajectory: single-precision columns, byte-shuffled and compressed, with a version number.
+"""Trajectories in the database: single-precision columns, byte-shuffled and compressed, with a version number and a
+checksum.
 
 Version 1: the columns (time first) as little-endian float32, shape (columns, samples). The four bytes of each column's
 numbers are gathered plane by plane, because neighbouring samples share their high bytes; then zstd level 3 over all.
 The checksum is the SHA-256 of the column names, a NUL, and the plain float32 bytes.
-
-Integrity of stored flight records: every record is verified against its checksum.
 """
 
 import hashlib

@@ -1,8 +1,5 @@
-"""Overlays shared by several figures: a prediction's band, and glitches.
-
-Marks of flights whose error exceeds the scale: triangles at the upper edge.
-
-This keeps the other flights readable when one is an outlier.
+"""Overlays shared by several figures: a prediction's band, glitches, and triangles at the upper edge for flights whose
+error exceeds the scale, so that the others stay readable when one is an outlier.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,6 +1,5 @@
-"""Stacked panels: the basis of the figures for publications.
-
-A recorded vertical loop and its replica, signal by signal: the paper's Fig. 6.
+"""Stacked panels: the basis of the figures for publications, and of a recorded vertical loop beside its replica, signal
+by signal (the paper's Fig. 6).
 """
 
 from collections.abc import Sequence

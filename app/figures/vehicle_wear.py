@@ -1,6 +1,5 @@
-"""A vehicle's fitted parameters over its flights, one small panel each, with their 95 % intervals, to show wear.
-
-Voltage before and after each flight of a vehicle, by battery.
+"""Wear of a vehicle over its flights: its fitted parameters, one small panel each, with their 95 % intervals; and the
+voltage before and after each flight, by battery.
 """
 
 from collections.abc import Mapping

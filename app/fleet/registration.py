@@ -1,6 +1,5 @@
-"""Registration of vehicles, and changes of their settings.
-
-Placeholders for vehicles of other installations, for imported campaigns; they never fly from here.
+"""Registration of vehicles, and changes of their settings; placeholders for vehicles of other installations, which
+never fly from here.
 """
 
 from collections.abc import Mapping

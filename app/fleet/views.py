@@ -1,7 +1,4 @@
-"""API views of vehicles, their acts and their ledger.
-
-Capabilities of a vehicle by its kind.
-"""
+"""API views of vehicles, their acts and their gain history; what a vehicle can do, by its kind."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Live telemetry of a flight and requests to abort it, all in memory so that nothing blocks."""
+"""Requests to abort a flight, in memory so that nothing blocks."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Requests for flights, from the first to the operator's take-off request. The worker's side is in `flights`."""
+"""Requests for flights, from the first to the operator's take-off request. The worker's side is in `queue`."""
 
 from contextlib import suppress
 

@@ -1,8 +1,5 @@
-"""Distribution of events to the open event streams of the web process. For one event loop only.
-
-Present state for streams that join late: telemetry so far of each running flight, and the vehicles' status.
-
-For one event loop only.
+"""Distribution of events to the open event streams of the web process, with the present state for streams that join
+late: telemetry so far of each running flight, and the vehicles' status. For one event loop only.
 """
 
 import asyncio

@@ -1,9 +1,7 @@
-"""Live part of the web process: reads the outbox and the worker's telemetry, and feeds the event streams.
+"""Live part of the web process: publishes the outbox, in order and once, and the worker's telemetry to the event
+streams.
 
-The web process's end of the live link: stays connected while there is a worker, and sends it what cannot wait for
-the database.
-
-Reads the outbox in the web process and publishes every change, in order and once.
+It stays connected while there is a worker, and sends it what cannot wait for the database.
 """
 
 import asyncio

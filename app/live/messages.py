@@ -1,7 +1,5 @@
-"""Messages between the worker and the web process: one JSON object per line, distinguished by `type`.
-
-Address of the worker's socket: a file in the data folder, or in a short private folder when that path is too
-long.
+"""Messages between the worker and the web process: one JSON object per line, distinguished by `type`; and the address
+of the worker's socket, a file in the data folder, or in a short private folder when that path is too long.
 """
 
 import hashlib

@@ -1,7 +1,4 @@
-"""Access to the bytes of a log, memory-mapped where possible.
-
-Names of the altitude control gains of each autopilot in its logs.
-"""
+"""What every log reader needs: a log's bytes, memory-mapped where possible, and the names of each autopilot's gains."""
 
 import io
 import mmap

@@ -1,6 +1,5 @@
-"""Pool of computing processes for pure functions; a process that dies is replaced.
-
-Main function of the pool's processes. Imports very little, so that such a process starts quickly.
+"""Pool of computing processes for pure functions; a process that dies is replaced. Imports very little, so that such a
+process starts quickly.
 """
 
 import os

@@ -1,10 +1,5 @@
-"""A campaign's frozen settings, as titles and values: what was tuned, and how.
-
-Content of a report as plain data; `service` collects it, `rendering` formats it.
-
-Anomalies of a campaign, in the order of the flights.
-
-Notes and photos of the flights, limited to a file size that can still be sent.
+"""The sections of a report as plain data: the campaign's frozen settings, anomalies in the order of the flights, notes
+and photos, limited to a file size that can still be sent.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,10 +1,8 @@
-"""The paper's tables and the takeoffs behind them (its figures 7 and 11), flown again.
+"""The paper's tables and the takeoffs behind them (its figures 7 and 11), flown again through the gate of a campaign.
 
 Each table lists the gains of the paper's successive flights with the published error and a reference error, which was
 measured once on the vehicle that represents the table's: the original vertical loop closed around JSBSim for Table 1,
 the noise-free twin for Table 2.
-
-The gate of a campaign, applied to the flights of reproductions.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

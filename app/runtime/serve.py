@@ -1,8 +1,6 @@
 """`gainline serve`: the web process, with a worker beside it.
 
-The worker is started before the web application is imported, so that both start in parallel.
-
-Entry point of the worker as a child of the web process, which so need not import the worker.
+The worker is started first, from a function that imports no web application, so that both start in parallel.
 """
 
 import errno

@@ -1,6 +1,5 @@
-"""The airframe of a simulated drone: it outlives its flights, and falls when its motors stop in the air.
-
-What every autopilot of a simulated drone is to the drone around it.
+"""The airframe of a simulated drone: it outlives its flights, and falls when its motors stop in the air. And the
+interface of the autopilots that fly it.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,9 +1,8 @@
-"""Cascaded altitude controllers with the gains of ArduPilot and PX4 by their own names.
+"""Cascaded altitude controllers with the gains of ArduPilot and PX4 by their own names, and the set point that they
+follow: climb to an altitude, hold it, come down.
 
 They are not replicas: the loops have the shape of the real ones (altitude, climb rate, acceleration) and their gains
 act in the same places and units, but filters, limits and the shaping of set points are simplified.
-
-What a copter does with its height: climb to one, hold it, come down; the set point that its controller follows.
 """
 
 import math

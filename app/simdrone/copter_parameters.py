@@ -1,6 +1,5 @@
-"""Parameters of the MAVLink 2 autopilots: named, typed values, and the two ways of carrying them in a float.
-
-What is data in ArduPilot and PX4: modes, parameters, rates, words.
+"""Parameters of ArduPilot and PX4: named, typed values, the two ways of carrying them in a float, and the data in which
+the two differ: modes, rates, texts.
 """
 
 import math

@@ -1,9 +1,8 @@
-"""A simulated drone: an autopilot on its body, with what is wrong with it, from bytes to bytes.
+"""A simulated drone: an autopilot on its body, with its faults, from bytes to bytes; served on a link, or in lock-step
+with its ground side.
 
-A simulated drone and its ground side in one thread: the drone's time is the clock of both, and passes only while
-the ground waits. Whatever the machine does meanwhile, the same inputs give the same packets at the same instants.
-
-A simulated drone on a link: the loop that carries bytes and keeps vehicle time in step with the clock.
+In lock-step the drone's time is the clock of both, and passes only while the ground waits: whatever the machine does
+meanwhile, the same inputs give the same packets at the same instants.
 """
 
 import threading

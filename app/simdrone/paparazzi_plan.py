@@ -1,8 +1,8 @@
-"""The flight plan: blocks, waypoints, and how one block follows another.
+"""The flight plan of the simulated Paparazzi, its blocks and waypoints, and the settings of the AR.Drone 2 airframe, in
+order, with their values after the start.
 
-The settings of the AR.Drone 2 airframe: names as MAVLink shows them, in order, with their values after the start.
-
-A name is what 16 characters hold of the C variable's; longer ones end alike, and none of 16 characters is ever found.
+A setting's name is what 16 characters hold of the C variable's; longer ones end alike, and none of 16 characters is
+ever found.
 """
 
 import math

@@ -1,6 +1,5 @@
-"""Addresses under which other devices reach this server, and what that exposes.
-
-QR codes of addresses: as SVG for a page, as text for a terminal.
+"""Addresses under which other devices reach this server, what that exposes, and their QR codes: as SVG for a page, as
+text for a terminal.
 """
 
 import io

@@ -1,6 +1,5 @@
-"""Dependencies of routes: a session to read, a session to write, and idempotent POST requests.
-
-Uploaded flight records: spooled while they arrive, limited by the application's limit on bodies.
+"""Dependencies of routes: a session to read, a session to write, idempotent POST requests, and uploaded files, which
+are spooled while they arrive.
 """
 
 import hashlib

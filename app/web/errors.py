@@ -1,6 +1,5 @@
-"""Errors over HTTP: problem details (RFC 9457) with a hint. The only module that maps errors to status codes.
-
-The OpenAPI document: FastAPI's own, plus the problem details that every operation may answer with.
+"""Errors over HTTP: problem details (RFC 9457) with a hint, and their description in the OpenAPI document. The only
+module that maps errors to status codes.
 """
 
 import errno

@@ -1,12 +1,9 @@
-"""Headers of every response: what a page may load, and what the browser may cache.
+"""What surrounds every request and response: security and cache headers, size limits of request bodies, and the
+dashboard's scripts and styles.
 
-The dashboard's scripts and styles, compressed once and then sent from memory.
-
-When they were read and compressed for every request, the chart library alone kept the server busy for 0.1 s, just when
-a page requests its figures.
-
-Size limits of request bodies: enforced by the stated length if there is one, else as soon as the limit is
-exceeded.
+Those are compressed once and then sent from memory: compressed for every request, the chart library alone kept the
+server busy for 0.1 s, just when a page requests its figures. A body is refused by its stated length if there is one,
+else as soon as the limit is exceeded.
 """
 
 import gzip

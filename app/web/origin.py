@@ -1,11 +1,10 @@
-"""Origin and permissions of a request, from its connection, its headers, and the key that it presents.
+"""Origin and permissions of a request, from its connection, its headers, and the key that it presents; and the link,
+valid once, that gives a browser its key as a cookie.
 
 These checks address three attacks: a page of another site makes a browser send a change to a server on loopback; a
 foreign host name is pointed at this machine, so that its pages count as ours; a proxy or tunnel on this machine
 connects from loopback on behalf of remote clients. Headers alone prove nothing, so a request that commands a real
 vehicle must also present a key (`app.accounts.keyring`).
-
-Unlocking of a browser: a link that works once and sets a cookie.
 """
 
 import ipaddress

@@ -1,8 +1,7 @@
-"""Gains in an imported log, compared with those of its trial.
+"""Records of trials, in and out: import of a log, capture of a flight, score, export.
 
-Score of a flight's record: its error, its overshoot, a coarse curve.
-
-Capture of a flight: store its record, score it as stored, and classify it where the program may.
+A record is scored as it is stored, in single precision. The gains in an imported log are compared with those of its
+trial.
 """
 
 import math

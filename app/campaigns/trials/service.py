@@ -1,8 +1,6 @@
-"""Operations on trials for clients: people and scripts. The worker's side of a flight is in `flights`.
+"""Operations on trials for clients: people and scripts. The worker's side of a flight is in `app.flights.queue`.
 
-The gate before a trial, for a person's own gains and for proposals, and refusals that an operator overrules.
-
-Gains relative to the flights so far: a smaller step, the best again, the first again.
+Every gain set passes the gate before it becomes a trial; an operator may overrule some of its refusals.
 """
 
 from collections.abc import Collection

@@ -1,6 +1,5 @@
-"""API views of trials, and the sentences that describe them.
-
-Comparison of a flight's gains with the best before it and with the first, given the scatter of repeated flights.
+"""API views of trials, with the sentences that describe them and the comparison with the best before and the first,
+given the scatter of repeated flights.
 """
 
 from bisect import bisect_left

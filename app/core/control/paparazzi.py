@@ -1,13 +1,10 @@
-"""Paparazzi's rotorcraft vertical guidance of mid-2015, replicated integer for integer.
+"""Paparazzi's rotorcraft vertical guidance of mid-2015, replicated integer for integer, and the replay of a recorded
+run through it.
 
 The loop runs at 512 Hz. z points down; fractions are binary: positions 8 bits, speeds 19, accelerations 10, the cosine
-of the tilt (r33) 14. Every operation is 32-bit two's complement and wraps; only the reference altitude is 64-bit.
-`step` is the kernel, on a state array that compiled rollouts own; `VerticalLoop` is the same loop for callers in
-Python.
-
-Integer arithmetic of a 32-bit autopilot, identical in compiled and interpreted code.
-
-Replay of a recorded run of the autopilot's vertical loop through the replica.
+of the tilt (r33) 14. Every operation is 32-bit two's complement and wraps, identically in compiled and interpreted
+code; only the reference altitude is 64-bit. `step` is the kernel, on a state array that compiled rollouts own;
+`VerticalLoop` is the same loop for callers in Python.
 """
 
 import math

@@ -1,10 +1,5 @@
-"""Interface of an experiment. A new one needs one file and one line in the registry.
-
-One check of a policy before its flight, and its result.
-
-Deterministic points that fill a box evenly.
-
-Probability distribution of a model's parameters.
+"""Interface of an experiment, its model parameters and their distribution, and the result of a check of a policy. A new
+experiment needs one file and one line in the registry.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,9 +1,8 @@
-"""The paper's takeoff: from the ground to 3 m under the autopilot's vertical loop, scored by the altitude error.
+"""The paper's takeoff: from the ground to 3 m, scored by the altitude error; under Paparazzi's vertical loop, or under
+ArduCopter or PX4 with gains of their own controllers, without a model so far.
 
-The paper's takeoff under ArduCopter or PX4: gains of their own vertical controllers, without a model so far.
-
-Flown and scored like the paper's; a person or a script chooses every gain set. The ranges are those that may be written
-to such a vehicle at all: a campaign narrows them to suit its vehicle.
+The ranges of the latter are those that may be written to such a vehicle at all: a campaign narrows them to suit its
+vehicle.
 """
 
 from collections.abc import Mapping

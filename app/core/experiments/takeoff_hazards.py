@@ -1,17 +1,16 @@
-"""Simulated takeoffs with a gain set, on the exact replica, over the vehicle's parameter distribution, with aborts.
+"""Hazards of a takeoff with a gain set: simulated takeoffs, and products of the loop that can wrap at 32 bits.
 
-Mass has no parameter of its own: it changes the ratio of thrust to weight, as the hover throttle does, whose
-distribution covers both.
+Takeoffs are simulated on the exact replica, over the vehicle's parameter distribution, with aborts. Mass has no
+parameter of its own: it changes the ratio of thrust to weight, as the hover throttle does, whose distribution covers
+both.
 
 A late release from the ground is not simulated: it overshoots with any integrating gains, and the vehicle's own check
 for a timely lift-off protects against it.
 
-Exact check whether a product of the vertical loop can wrap at 32 bits.
-
-The loop multiplies each gain by a limited error: kp by the position error (±10 m), kd by the speed error (±10 m/s), ki
-by the sum of position errors (±2 000 000). A gain is safe if its product with the limit fits into 32 signed bits.
-Nothing after the products can wrap: after shifting, three 32-bit products sum to less than 2²⁴ + 2¹⁶, and the
-feed-forward adds at most 8640.
+Wrapping is checked exactly. The loop multiplies each gain by a limited error: kp by the position error (±10 m), kd by
+the speed error (±10 m/s), ki by the sum of position errors (±2 000 000). A gain is safe if its product with the limit
+fits into 32 signed bits. Nothing after the products can wrap: after shifting, three 32-bit products sum to less than
+2²⁴ + 2¹⁶, and the feed-forward adds at most 8640.
 
 A refused gain is simulated on the replica from starts that drive the errors to their limits, until its product wraps:
 stuck on the ground, where the sum grows by 3 m per step, and with the estimate frozen at some time of the climb.

@@ -1,4 +1,5 @@
-"""Linear model of an aircraft's longitudinal motion, and its pitch tracking under the paper's controller.
+"""Linear model of an F-16's longitudinal motion, the true system of the paper's first experiment, and its pitch
+tracking under the paper's controller.
 
     ẋ = A·x + B·u,   x = [h ft, Θ rad, V ft/s, α rad, q rad/s],   u = [F_T lb, δ deg]     (the paper's eq. 5)
     F_T = θ1·V + θ2,   δ = θ3·(Θref − Θ) + θ4·α + θ5·q + θ6                              (eq. 6)
@@ -7,10 +8,8 @@ All are deviations from trim; the total thrust and elevator are limited. The ref
 travelled. Control is held over steps of 0.02 s; the transition over a step is exact to the fourth order. This file and
 its experiment use the source's units; records use SI.
 
-Longitudinal model of an F-16, the true system of the paper's first experiment.
-
-Low-fidelity model of Russell's 2003 report (Stevens & Lewis data, centre of gravity at 0.30 of the mean chord),
-linearised at 15 000 ft and 500 ft/s. States and inputs as in `app.core.models.f16`.
+The F-16 is the low-fidelity model of Russell's 2003 report (Stevens & Lewis data, centre of gravity at 0.30 of the mean
+chord), linearised at 15 000 ft and 500 ft/s.
 """
 
 from typing import Final

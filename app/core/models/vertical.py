@@ -11,11 +11,9 @@ loop starts a latency after the command, from rest on the ground; until then not
 whole run in time. Both delays are interpolated to fractions of a step, so that the outputs depend on them continuously,
 as a fit requires.
 
-Takeoff of the simple vertical model with the disturbances of a recorded flight added inside the control loop.
-
-The paper's step 4 (Abbeel et al. 2006): f(s, a) + s_{t+1} − f(s_t, a_t), indexed by time; s is altitude and climb rate,
-a the thrust command, whose lagged value follows from the commands. The loop is entered at the first thrust of the
-recorded flight.
+The takeoff can also be run with the disturbances of a recorded flight added inside the control loop: the paper's step 4
+(Abbeel et al. 2006): f(s, a) + s_{t+1} − f(s_t, a_t), indexed by time; s is altitude and climb rate, a the thrust
+command, whose lagged value follows from the commands. The loop is entered at the first thrust of the recorded flight.
 """
 
 from typing import Final

@@ -1,6 +1,4 @@
-"""Trajectories: the samples of a flight or a model run.
-
-Reduction of samples for plotting.
+"""Trajectories: the samples of a flight or a model run, and their reduction for plotting.
 
 Records keep their peaks and shape (MinMaxLTTB, Van Der Donckt et al., 2023); smooth curves keep the samples at which
 they bend (Ramer, 1972; Douglas and Peucker, 1973).

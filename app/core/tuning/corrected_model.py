@@ -1,9 +1,4 @@
-"""The simple model, corrected by one flight.
-
-Recorded outputs, resampled to the model's time grid.
-
-The gains of a campaign's first flight.
-"""
+"""The simple model corrected by one flight, its optimum, and the gains of a campaign's first flight."""
 
 from dataclasses import dataclass
 from functools import cache

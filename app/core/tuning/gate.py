@@ -1,12 +1,5 @@
-"""The gate's verdict on one policy.
-
-Limits of a campaign's vehicle, shared by strategies and the gate.
-
-Limits on gains: what a controller can hold, the campaign's bounds, and its step limit.
-
-Handling of refusals: how they are reported, and who may overrule them.
-
-Gate check of a step before it is proposed.
+"""The gate: checks of a gain set before it is flown. What the controller can hold, the campaign's bounds, its step
+limit, the experiment's hazards; how refusals are reported, and who may overrule them.
 """
 
 import math

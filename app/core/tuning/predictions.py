@@ -11,11 +11,10 @@ The band has the same form at every instant, with σ converted to the output off
 experience: f² = (ν₀ + Σ z²)/(ν₀ + k), where z are the k earlier prediction errors in units of their own intervals and
 ν₀ = 4. An uncorrected model (first flight, simplex) has no base: the term 1/n and the bias are omitted.
 
-Predictions of a calibrated model: a flight's curve with a band, and its error with an interval.
-
-The remaining bias acts inside the loop: the disturbances of the best flight relative to its own calibrated model are
-applied to the new gains as well, so that gains which reject gusts are credited for it. If the record lacks the climb
-rate or the thrust command, the bias is added outside the loop, and fades with the distance from the flown gains.
+A calibrated model predicts a flight's curve and error by itself. Its remaining bias acts inside the loop: the
+disturbances of the best flight relative to its own calibrated model are applied to the new gains as well, so that gains
+which reject gusts are credited for it. If the record lacks the climb rate or the thrust command, the bias is added
+outside the loop, and fades with the distance from the flown gains.
 """
 
 from collections.abc import Sequence

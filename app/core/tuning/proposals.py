@@ -1,6 +1,5 @@
-"""Computes the next gain set from a campaign's frozen definition and its flights: a pure function.
-
-The recommended next action, shown beside the strategy's proposal.
+"""The next gain set, computed from a campaign's frozen definition and its flights: a pure function. With it, the next
+action that is recommended to the operator.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,5 @@
-"""Trust region: how far a step may go from the best flight, given how well earlier predictions held.
-
-Nelder–Mead within a box, with first steps towards its interior.
-
-Robust optimum: gains that perform well on several plausible models at once.
+"""How far a step may go from the best flight, given how well earlier predictions held, and the best gains within those
+bounds on several plausible models at once.
 
 The merit of a policy is its mean error over the models, plus a penalty of one metre per metre by which it rises above
 3.6 m on any model or stays below 2.4 m after five seconds; both limits keep a margin from what is unsafe. A fixed set

@@ -4,8 +4,6 @@ The base is the best flight so far. The model, corrected by it outside the loop 
 gradient (central differences) and the error at every step of a geometric ladder along the negative gradient; the best
 step is flown. A flight that does not improve leaves the base and the line unchanged, and the next step is half as long.
 A step that the gate would refuse is halved in the same way.
-
-Line search: evaluates step sizes along one direction on a model.
 """
 
 from collections.abc import Callable, Iterator, Sequence
