@@ -1,6 +1,6 @@
 """Vehicles as campaigns and flights use them: which vehicle, and its state.
 
-Registration is in `registering`, requests beside flights in `acts`, operators' leases in `control`.
+Registration is in `registration`, requests beside flights in `commands`, operators' leases in `control`.
 """
 
 from collections.abc import Mapping

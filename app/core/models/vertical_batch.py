@@ -177,7 +177,7 @@ def _set_up(gains: Counts, models: Samples, runs: Samples, whole: Counts) -> Non
 
 @kernel
 def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, guide: Samples, i: int) -> None:
-    """Step i of the loop and of the model for each run: `vertical_loop.step` in doubles, then `advance`."""
+    """Step i of the loop and of the model for each run: `control.paparazzi.step` in doubles, then `advance`."""
     now, seconds = (i & (PAST - 1)) * BATCH_WIDTH, i * STEP_S
     position, speed, feed_forward = guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i]
     for lane in range(lanes):

@@ -1,7 +1,7 @@
 """Fit the model to all flights, then choose its optimal gains.
 
-The choice is the robust optimum over a few plausible models (`hedging`), inside a trust region around the best flight
-(`trust`). A step that the gate would refuse is halved until it passes.
+The choice is the robust optimum over a few plausible models inside a trust region around the best flight
+(`trust_region`). A step that the gate would refuse is halved until it passes.
 """
 
 from collections.abc import Sequence
