@@ -3,7 +3,6 @@
 Land and motors off go from the socket's thread straight into a connection's pipe; their outcome is recorded afterwards.
 """
 
-import datetime as dt
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -26,7 +25,7 @@ from app.fleet import commands
 from app.fleet.commands import ActTask, LinkedVehicle
 from app.flights.abort import AbortRegistry
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
-from app.flights.vehicle_connection import VehicleConnection
+from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
 from app.flights.vehicle_process import run_vehicle_process
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.errors import SafeGainsError, VehicleError
@@ -35,7 +34,6 @@ T = TypeVar("T")
 
 RETRY_S: Final = 1.0
 YIELD_POLL_S: Final = 0.1
-RECONNECT_INTERVAL_S: Final = 2.0
 MAX_CONCURRENT: Final = 16
 
 _log = structlog.get_logger(__name__)
@@ -318,8 +316,7 @@ class VehicleConnectionManager:
                 )
 
     def _publish_state(self, vehicle_id: int, state: VehicleLinkState) -> None:
-        now = dt.datetime.now(dt.UTC).isoformat()
-        self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=now, step=""))
+        self._publish(VehicleStatus(vehicle_id=vehicle_id, state=state, at=status_time(), step=""))
 
     # ---- database
 

@@ -59,6 +59,8 @@ NOT_ANSWERING: Final = (
 MAX_UNANSWERED_ORDERS: Final = 50
 """Far fewer than fill the pipe of a process that does not read, so that sending a command never blocks."""
 SHUTDOWN_TIMEOUT_S: Final = 5.0
+RECONNECT_INTERVAL_S: Final = 2.0
+"""How often a vehicle that is wanted connected is looked for."""
 TAKE_OFF_TIMEOUT_S: Final = 2.0
 """A take-off later than this after the operator's request would surprise the operator."""
 
@@ -182,12 +184,12 @@ class VehicleConnection:
         return said
 
     def _listen(self) -> None:
-        status = VehicleStatus(vehicle_id=self.call.vehicle_id, state="connecting", at=_now(), step="")
+        status = VehicleStatus(vehicle_id=self.call.vehicle_id, state="connecting", at=status_time(), step="")
         patience_s: float | None = None
         try:
             while True:
                 while not self._pipe.poll(patience_s):
-                    self._hear_of(replace(status, state="not answering", at=_now(), trouble=NOT_ANSWERING))
+                    self._hear_of(replace(status, state="not answering", at=status_time(), trouble=NOT_ANSWERING))
                 match self._pipe.recv():
                     case VehicleStatus() as status:
                         self._hear_of(status)
@@ -221,5 +223,6 @@ class VehicleConnection:
             self._pipe.send(message)
 
 
-def _now() -> str:
+def status_time() -> str:
+    """The present time as a VehicleStatus has it."""
     return dt.datetime.now(dt.UTC).isoformat()

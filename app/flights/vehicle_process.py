@@ -4,7 +4,6 @@ It polls the pipe every few milliseconds in every operation during which the veh
 are dropped when the worker does not read them, so that a flight never waits for the worker.
 """
 
-import datetime as dt
 import os
 import signal
 import time
@@ -39,7 +38,7 @@ from app.flights.process_messages import (
     internal_error,
     mark_if_requested,
 )
-from app.flights.vehicle_connection import TAKE_OFF_TIMEOUT_S
+from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
 from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
 from app.vehicles.base import ConnectedVehicle, FlightRecord, StopRequest
@@ -55,7 +54,6 @@ LOCK_TIMEOUT_S: Final = 120.0
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
 """How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
 lock."""
-RECONNECT_INTERVAL_S: Final = 2.0
 _EXPIRED: Final = "It reached the vehicle's process too late and was not passed on; whoever asked was told so."
 
 
@@ -232,7 +230,7 @@ class VehicleProcess:
         return VehicleStatus(
             vehicle_id=self._call.vehicle_id,
             state="gone" if age_s is None or age_s > LOST_AFTER_S * self._speed else "connected",
-            at=dt.datetime.now(dt.UTC).isoformat(),
+            at=status_time(),
             concern=self._vehicle.concern,
             **known | {"held": dict(condition.held)},
         )

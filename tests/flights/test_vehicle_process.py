@@ -368,19 +368,15 @@ def test_a_vehicle_that_has_not_heard_land_yet_is_told_also_after_the_worker_die
     assert rig.drone.body.stands
 
 
-def test_a_vehicle_that_never_obeys_is_left_alone_after_a_minute(rig: AnsweringRig, tmp_path: Path) -> None:
+@pytest.mark.parametrize("silenced", [{"deaf_until_s": math.inf}, {"muted": True}], ids=["never obeys", "falls silent"])
+def test_a_vehicle_in_the_air_that_does_not_show_that_it_obeys_is_told_for_a_minute(
+    rig: AnsweringRig, tmp_path: Path, silenced: dict[str, float | bool]
+) -> None:
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
     in_the_air(rig, process)
-    rig.deaf_until_s = math.inf
-    assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
-
-
-def test_a_vehicle_that_falls_silent_in_the_air_is_told_on(rig: AnsweringRig, tmp_path: Path) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
-    in_the_air(rig, process)
-    rig.muted = True
+    for name, value in silenced.items():
+        setattr(rig, name, value)
     assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
 
 
