@@ -4,7 +4,7 @@ from typing import Final
 
 from app.vehicles.mavlink import agreement
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import Limits
+from app.vehicles.mavlink.limits import HEARTBEATS_MISSED, Limits
 from app.vehicles.mavlink.watch import (
     TrialObservation,
     has_unreliable_position,
@@ -13,7 +13,8 @@ from app.vehicles.mavlink.watch import (
     mode_of,
 )
 
-_HEARTBEATS_MISSED: Final = 3.5
+_IN_TURN: Final = 0.8
+"""Heartbeats nearer than so many periods are not of one vehicle."""
 _OWN_CEILING_M: Final = 0.5
 """How far below our ceiling a vehicle's own may be."""
 _LOW_BATTERY_S: Final = 1.0
@@ -42,6 +43,17 @@ def find_taken_over(watch: TrialObservation, limits: Limits) -> Finding | None:
     if not watch.armed or mode not in limits.manual_modes:
         return None
     return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle went into mode {_named(mode, limits)}.")
+
+
+def find_interruption(before: TrialObservation, watch: TrialObservation, limits: Limits) -> Finding | None:
+    """A pilot's mode that only the last heartbeat of the observation `before` told of, and the one after it no more,
+    unless it came between two of the vehicle's own."""
+    was_by_hand = before.armed and before.mode in limits.manual_modes
+    in_turn_s = _IN_TURN * limits.heartbeat_s
+    is_in_turn = min(before.heartbeat_gap_s, watch.heartbeat_gap_s) >= in_turn_s
+    if not (was_by_hand and is_in_turn) or watch.mode in limits.manual_modes:
+        return None
+    return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat told of the mode {_named(before.mode, limits)}.")
 
 
 def find_unexpected(
@@ -95,7 +107,7 @@ def find_doubled(watch: TrialObservation) -> Finding | None:
 def find_link(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if now_s - watch.heard_s > limits.silent_s:
         return Finding(failure=Failure.LINK, why=f"Nothing was heard for {limits.silent_s:g} s.")
-    if now_s - watch.heartbeat_s > _HEARTBEATS_MISSED * limits.heartbeat_s:
+    if now_s - watch.heartbeat_s > HEARTBEATS_MISSED * limits.heartbeat_s:
         return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
     return None
 

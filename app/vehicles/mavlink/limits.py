@@ -6,6 +6,8 @@ from typing import Final
 
 MAX_WITNESS_GAP: Final = 1.05
 """Periods of its heartbeat that lie between two of them which agree: one that said otherwise would come between."""
+HEARTBEATS_MISSED: Final = 3.5
+"""Periods of its heartbeat after which a vehicle that has sent none is lost."""
 GROUND_M: Final = 0.15
 """Nearer to the ground than this a vehicle may stand on it."""
 REPEAT_S: Final = 1.0

@@ -3,17 +3,15 @@
 It knows no autopilot and no clock: events carry their time, commands are data that `trial.py` carries out.
 """
 
-import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import pairwise
 from typing import Final
 
-from app.vehicles.mavlink import agreement, findings
+from app.vehicles.mavlink import agreement, findings, ground
 from app.vehicles.mavlink import watch as watching
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import DESCENDING_M_S, GROUND_M, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import Heartbeat, Position, confirms_motors_off
+from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
+from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
 from app.vehicles.mavlink.moves import (
     Plan,
     Step,
@@ -58,13 +56,6 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
-_IN_TURN: Final = 0.8
-"""Heartbeats nearer than so many periods are not of one vehicle."""
-_IN_PLACE_M: Final = 0.3
-_SHIFT_M: Final = 0.3
-"""By how much any altitude may shift on the ground as the motors start."""
-_CLIMBED_M: Final = 0.1
-"""A vehicle that has climbed less, by its climb rate, has not moved."""
 _ASKING_S: Final = 15.0
 """The longest that arming may take altogether, with every repetition."""
 
@@ -104,16 +95,11 @@ def _hear(trial: Trial, event: PacketReceived) -> Step:
 
 
 def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
-    """A pilot's mode that only one heartbeat told of is noted, unless that came between two of the vehicle's own."""
-    limits, before = trial.plan.limits, trial.watch
-    is_recording = trial.state in _STATES_WITH_TRIAL_GAINS and bool(_modes(trial))
-    was_by_hand = before.armed and before.mode in limits.manual_modes
-    in_turn_s = _IN_TURN * limits.heartbeat_s
-    is_in_turn = min(before.heartbeat_gap_s, watch.heartbeat_gap_s) >= in_turn_s
-    if not (is_recording and was_by_hand and is_in_turn) or watch.mode in limits.manual_modes:
+    """Note a pilot's mode that only one heartbeat told of."""
+    if trial.state not in _STATES_WITH_TRIAL_GAINS or not _modes(trial):
         return trial
-    why = f"One heartbeat told of the mode {limits.mode_names.get(before.mode, before.mode)}."
-    return note(trial, Finding(failure=Failure.INTERRUPTED, why=why))
+    finding = findings.find_interruption(trial.watch, watch, trial.plan.limits)
+    return trial if finding is None else note(trial, finding)
 
 
 def _with_fall(trial: Trial) -> Trial:
@@ -128,7 +114,7 @@ def _react(trial: Trial, event: Event) -> Step:
     if isinstance(event, MotorsOffRequested):
         return stop_motors(trial, event.reason, event.now_s)
     if isinstance(event, AbortRequested) and trial.state in COMMANDED:
-        trial = _with_ground(trial, event.now_s) if trial.state is State.ARM else trial
+        trial = ground.measure(trial, event.now_s) if trial.state is State.ARM else trial
         return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
     return _HANDLERS[trial.state](trial, event)
 
@@ -140,69 +126,19 @@ def _arm(trial: Trial, event: Event) -> Step:
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
-        return fail(_with_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
+        return fail(ground.measure(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
     if finding := findings.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
-        return fail(_with_ground(trial, now_s), finding, now_s)
+        return fail(ground.measure(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
     watch = replace(trial.watch, block="", behind_m=0.0, highest_m=last.altitude_m)
-    trial = _with_ground(replace(trial, watch=watch), now_s)
-    if finding := _left_ground(trial) or _disagreement(trial, now_s):
+    trial = ground.measure(replace(trial, watch=watch), now_s)
+    if finding := ground.find_departure(trial) or ground.find_disagreement(trial, now_s):
         return fail(trial, finding, now_s)
     mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
     trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=last.time_boot_s, commanded_in=mode)
     return enter(trial, State.TAKEOFF, now_s), (PerformAction(Action.TAKE_OFF),)
-
-
-def _with_ground(trial: Trial, now_s: float) -> Trial:
-    """Heights count from where it stands now, for its altitude shifts as its motors start, and begins anew on an
-    autopilot that counts from the ground. Where it may have moved, the ground stays where it was."""
-    watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
-    stood = samples[len(samples) // 2 :]
-    if not stood or watch.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
-        return trial
-    altitudes_m = [position.altitude_m for position in stood]
-    is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
-    is_in_place = stood[-1].away_m(watch.origin or stood[-1]) <= _IN_PLACE_M
-    shift_m = statistics.median(altitudes_m) - plan.ground_m
-    may_shift = plan.climbs_from_ground or abs(shift_m) <= _SHIFT_M
-    if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
-        return trial
-    return replace(
-        trial,
-        plan=plan.on_ground_at(plan.ground_m + shift_m),
-        watch=watching.reset_altitude(watch),
-        ground_shift_m=shift_m,
-        ground_samples=(),
-    )
-
-
-def _climbed_m(samples: Sequence[Position]) -> float:
-    """By its climb rate alone."""
-    return sum(later.climb_rate_m_s * (later.time_boot_s - earlier.time_boot_s) for earlier, later in pairwise(samples))
-
-
-def _left_ground(trial: Trial) -> Finding | None:
-    """For a vehicle that has not been told to climb."""
-    last = trial.watch.last
-    if last is None or abs(away_m := last.altitude_m - trial.plan.ground_m) <= GROUND_M:
-        return None
-    why = f"Its altitude changed by {away_m:+.2f} m before the take-off command, and it may have moved."
-    return Finding(failure=Failure.LOST_POSITION, why=why)
-
-
-def _disagreement(trial: Trial, now_s: float) -> Finding | None:
-    """Between the vehicle's altitude on the ground and that of the second source, which was last seen before any
-    shift."""
-    seen_m, last = agreement.current_altitude_m(trial.watch.second, now_s), trial.watch.last
-    if seen_m is None or last is None:
-        return None
-    apart_m = abs(seen_m + trial.ground_shift_m - last.altitude_m)
-    if apart_m <= agreement.MAX_DIFFERENCE_M:
-        return None
-    why = f"They were {apart_m:.2f} m apart before the take-off command."
-    return Finding(failure=Failure.DISAGREEMENT, why=why)
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:

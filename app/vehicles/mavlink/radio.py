@@ -8,7 +8,7 @@ from typing import Final
 from app.core.clock import Clock
 from app.vehicles.mavlink.arming_checks import ArmingChecks
 from app.vehicles.mavlink.dialects import Message, source_component
-from app.vehicles.mavlink.limits import MAX_WITNESS_GAP
+from app.vehicles.mavlink.limits import HEARTBEATS_MISSED, MAX_WITNESS_GAP
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.measurements import (
     Battery,
@@ -27,7 +27,6 @@ from app.vehicles.mavlink.signals import Action, ActionDone, ActionRefused, Pack
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
-HEARTBEATS_MISSED: Final = 3.5
 _POSITIONS: Final = 1000
 _SPOKEN: Final = 5
 
