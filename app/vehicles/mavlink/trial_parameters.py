@@ -24,20 +24,29 @@ class ChangedParameter:
     during: float
 
 
-def file_for(folder: Path, address: Address, vehicle: Identity) -> Path:
-    """Where it is kept for this vehicle, whoever flies it: those of one type may have one address by turns."""
-    described = f"{address} {vehicle.autopilot} {vehicle.system_id} {vehicle.uid}"
-    return folder / f"{'-'.join(re.findall(r'[A-Za-z0-9.]+', described))}.json"
+def files_for(folder: Path, address: Address, vehicle: Identity, *, is_simulated: bool) -> tuple[Path, ...]:
+    """Where it is kept for this vehicle, whoever flies it, for those of one type may have one address by turns; then
+    the files that were kept under other addresses of the same hardware id. Simulated vehicles may all tell the same
+    one, so their address is part of who they are."""
+    identity = _joined(f"{vehicle.autopilot} {vehicle.system_id} {vehicle.uid}")
+    own = folder / f"{_joined(str(address))}-{identity}.json"
+    if is_simulated or not vehicle.uid:
+        return (own,)
+    return own, *sorted(file for file in folder.glob(f"*-{identity}.json") if file != own)
+
+
+def _joined(described: str) -> str:
+    return "-".join(re.findall(r"[A-Za-z0-9.]+", described))
 
 
 class TrialParameters:
-    """What was changed is remembered until it is put back, as read back; in the file that `file` names once the vehicle
-    is known, where there is one, also beyond this process. A value is put back only if it is still the one that the
-    trial set: any other, somebody has set since.
+    """What was changed is remembered until it is put back, as read back; in the first of the files that `files` names
+    once the vehicle is known, where there is one, also beyond this process. All of them are read. A value is put back
+    only if it is still the one that the trial set: any other, somebody has set since.
     """
 
-    def __init__(self, radio: AutopilotLink, file: Callable[[], Path] | None = None) -> None:
-        self._radio, self._named = radio, file
+    def __init__(self, radio: AutopilotLink, files: Callable[[], tuple[Path, ...]] = tuple) -> None:
+        self._radio, self._named = radio, files
         self._changed: dict[str, ChangedParameter] | None = None
 
     def set(self) -> None:
@@ -72,14 +81,15 @@ class TrialParameters:
     # ---- beyond this process
 
     @cached_property
-    def _file(self) -> Path | None:
-        return None if self._named is None else self._named()
+    def _files(self) -> tuple[Path, ...]:
+        return self._named()
 
     def _remembered(self) -> dict[str, ChangedParameter]:
         """What this process has changed, or one before it on a vehicle of this make and system id. Raises VehicleError
         when the file cannot be read."""
         if self._changed is None:
-            self._changed = {} if self._file is None else self._read(self._file)
+            read = [self._read(file) for file in self._files]
+            self._changed = {name: one for changed in reversed(read) for name, one in changed.items()}
         return self._changed
 
     def _read(self, file: Path) -> dict[str, ChangedParameter]:
@@ -97,11 +107,14 @@ class TrialParameters:
 
     def _keep(self, changed: dict[str, ChangedParameter]) -> None:
         """On disk first. Raises VehicleError when it cannot be."""
-        if self._file is not None:
+        if self._files:
+            own, *others = self._files
             try:
-                self._store(self._file, changed)
+                self._store(own, changed)
+                for other in others:
+                    other.unlink(missing_ok=True)
             except OSError as error:
-                raise _unusable(self._file, error) from error
+                raise _unusable(own, error) from error
         self._changed = changed
 
     def _store(self, file: Path, changed: dict[str, ChangedParameter]) -> None:

@@ -25,7 +25,7 @@ from app.vehicles.mavlink.sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.states import QUARANTINE_STATES, TRANSITIONS, State
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
-from app.vehicles.mavlink.trial_parameters import TrialParameters, file_for
+from app.vehicles.mavlink.trial_parameters import TrialParameters, files_for
 from app.vehicles.mocap.recording import AlignedRecord, Scored, add_secondary_altitude
 
 STANDSTILL_S: Final = 1.0
@@ -315,7 +315,10 @@ class MavlinkVehicle:
         if self._kept_in is None:
             return TrialParameters(self._radio)
         folder, address = self._kept_in, addresses.parse(str(self._options["address"]))
-        return TrialParameters(self._radio, lambda: file_for(folder, address, self.identity))
+        is_simulated = bool(self._options["simulated"])
+        return TrialParameters(
+            self._radio, lambda: files_for(folder, address, self.identity, is_simulated=is_simulated)
+        )
 
     def _require_ready(self) -> None:
         """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""

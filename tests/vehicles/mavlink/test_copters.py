@@ -210,6 +210,21 @@ def test_vehicles_of_one_type_that_have_one_address_by_turns_are_kept_apart(tmp_
             assert (autopilot.held("MIS_TAKEOFF_ALT"), file.exists()) == (2.5, False)
 
 
+@pytest.mark.parametrize(("simulated", "afterwards"), [(False, 2.5), (True, 3.0)])
+def test_what_a_killed_process_had_set_is_put_back_under_another_address_where_the_hardware_id_is_the_vehicles_own(
+    tmp_path: Path, simulated: bool, afterwards: float
+) -> None:
+    """Simulated vehicles of one system id may all tell the same one."""
+    file = tmp_path / KEPT_IN
+    file.write_text(KEPT)
+    with ready("px4") as rig:
+        rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
+        options = {"address": "udp:127.0.0.1:14580@14550", "simulated": simulated}
+        with connected(rig, trial_parameters=tmp_path, **options) as vehicle:
+            assert (vehicle.concern, rig.drone.autopilot.held("MIS_TAKEOFF_ALT")) == ("", afterwards)
+            assert file.exists() == simulated
+
+
 def test_what_a_killed_process_had_set_is_put_back_before_anybody_has_decided_about_the_gains(tmp_path: Path) -> None:
     """As `gainline run` and a first connection meet it: gains are compared, and these are the safe ones."""
     file = tmp_path / KEPT_IN
