@@ -87,7 +87,6 @@ class VehicleProcess:
         """Connect to the vehicle. Raises VehicleError when it does not answer."""
         self._line, self._call = line, call
         self._speed = float(call.options.get("clock_speed", 1.0))
-        self._identity = call.identity
         self._is_open = self._may_interrupt = False
         self._take_off_by_s: float | None = None
         self._vehicle = self._open_vehicle()
@@ -138,7 +137,7 @@ class VehicleProcess:
     def _open_vehicle(self) -> ConnectedVehicle:
         while True:
             try:
-                return self._connect(self._call.safe_gains)
+                return self._connect()
             except VehicleError as error:
                 if not self._call.keep_retrying or isinstance(error, SafeGainsError):
                     raise
@@ -146,19 +145,11 @@ class VehicleProcess:
                 self._line.receive()
                 self._call.clock.wait_s(POLL_INTERVAL_S)
 
-    def _connect(self, safe_gains: Mapping[str, float]) -> ConnectedVehicle:
-        connect = get_kind(self._call.kind).connect
-        assert connect is not None, self._call.kind
-        vehicle = connect(
-            self._call.options, safe_gains, self._identity, self._call.trial_parameters, self._while_waiting
-        )
-        self._pin(vehicle)
-        return vehicle
-
-    def _pin(self, vehicle: ConnectedVehicle) -> None:
-        """Pin the identity like the worker does: at the first connection without a concern."""
-        if not vehicle.concern:
-            self._identity = vehicle.identity
+    def _connect(self) -> ConnectedVehicle:
+        call = self._call
+        connect = get_kind(call.kind).connect
+        assert connect is not None, call.kind
+        return connect(call.options, call.safe_gains, call.identity, call.trial_parameters, self._while_waiting)
 
     def _next(self) -> ToVehicleProcess:
         """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
@@ -244,7 +235,7 @@ class VehicleProcess:
         try:
             if self._vehicle.condition().armed:  # a slow operation would delay Land
                 raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
-            self._require_vehicle(asked.safe_gains)
+            self._require_safe_gains(asked.safe_gains)
             with self._interruptible():
                 answer = self._perform(asked.kind)
         except VehicleError as error:
@@ -264,7 +255,6 @@ class VehicleProcess:
                 self._vehicle.release()
             case _:
                 raise VehicleError(f"A session cannot carry out “{kind}”.", hint="Report this with the worker's log.")
-        self._pin(self._vehicle)
         return VehicleResponse(
             concern=self._vehicle.concern,
             held=self._held(),
@@ -273,18 +263,17 @@ class VehicleProcess:
             identity=self._vehicle.identity,
         )
 
-    def _require_vehicle(self, safe_gains: Mapping[str, float]) -> None:
-        """Reconnect if a person has changed the safe gains, which writes them once the vehicle is pinned."""
+    def _require_safe_gains(self, safe_gains: Mapping[str, float]) -> None:
+        """Give the vehicle its safe gains if a person has changed them. The link stays open for commands."""
         if dict(self._vehicle.safe_gains) != dict(safe_gains):
-            self._vehicle.close()
-            self._vehicle = self._connect(safe_gains)
+            self._vehicle.change_safe_gains(safe_gains)
 
     # ---- flights
 
     def _fly(self, orders: FlightRequest) -> None:
         self._trial_id, self._stop = orders.trial_id, None
         try:
-            self._require_vehicle(orders.safe_gains)
+            self._require_safe_gains(orders.safe_gains)
             with self._logged(orders):
                 try:
                     self._line.send(GainsStaged(self._stage(orders.gains)))

@@ -211,6 +211,11 @@ class ConnectedVehicle(Vehicle, Protocol):
         SafeGainsError when it is armed or does not take them."""
         ...
 
+    def change_safe_gains(self, safe_gains: Gains) -> None:
+        """Take other safe gains, and write them as connecting does. What goes wrong becomes a concern. Raises
+        GainsError for gains that it cannot hold."""
+        ...
+
     def land(self, reason: str) -> None:
         """Tell it to land, at once, whatever state it is in."""
         ...

@@ -210,7 +210,17 @@ def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: 
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
     process._vehicle._observe("Somebody else armed it.")  # type: ignore[attr-defined]
     answered = process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE))
-    assert (answered.problem, answered.concern, answered.held) == ("", "", dict(SAFE))
+    assert (answered.problem, answered.concern, answered.held) == ("", "Somebody else armed it.", dict(SAFE))
+
+
+def test_changed_safe_gains_that_a_vehicle_does_not_take_leave_it_observed(rig: AnsweringRig, tmp_path: Path) -> None:
+    process = started(rig, RecordingPipe(), tmp_path)
+    rig.drone.autopilot.ignores_parameters = True
+    answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
+    assert "Its safe gains could not be verified" in answered.concern
+    rig.drone.autopilot.ignores_parameters = False
+    answered = process._act(VehicleRequest(kind=ActKind.RELEASE, safe_gains=TUNED))
+    assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
 
 
 def test_a_vehicle_that_holds_what_nobody_decided_about_keeps_it_whatever_its_safe_gains_become(
@@ -271,6 +281,21 @@ def test_an_order_is_carried_out_at_once_and_ends_the_act_under_way(
     assert "interrupted: motors off was ordered (people below)" in answered.problem
     assert line.said[-1] == CommandForwarded(7, "motors off", "people below")
     assert stops_told_s(rig)[told] - ordered_s[0] < 0.5
+
+
+@pytest.mark.parametrize("ordered", [MOTORS_OFF, LAND], ids=["motors off", "land"])
+def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
+    rig: AnsweringRig, tmp_path: Path, ordered: VehicleCommand
+) -> None:
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    ordered_s = order_when(rig, line, "PARAM_SET", ordered)
+    told = len(rig.heard)
+    answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
+    assert line.said[-1] == CommandForwarded(ordered.number, ordered.order, ordered.reason)
+    kind = "COMMAND_LONG" if ordered is MOTORS_OFF else "SCRIPT_ITEM"
+    assert next(at_s for at_s, message in rig.heard[told:] if message.get_type() == kind) - ordered_s[0] < 0.5
+    assert (answered.problem, answered.held) == ("", dict(TUNED))
 
 
 def test_an_order_that_comes_too_late_is_not_passed_on_and_interrupts_nothing(

@@ -234,6 +234,19 @@ class MavlinkVehicle:
             raise SafeGainsError(f"The vehicle does not take what it had: {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
 
+    def change_safe_gains(self, safe_gains: Gains) -> None:
+        """Take other safe gains, which a person has named, and write them and read them back; while nobody has decided
+        about this vehicle, they are only compared, as at connecting. A vehicle in doubt stays so, and is given them by
+        its release. What goes wrong becomes a concern. Raises GainsError for gains that it cannot hold: nothing is
+        changed then."""
+        changed = GainStore(self._radio, safe_gains)
+        changed.held, self._gains = self._gains.held, changed
+        if self._decided and self._state in QUARANTINE_STATES:
+            return
+        if self._took_safe_gains() and self._state in QUARANTINE_STATES:
+            self._enter(State.IDLE)
+            self._why = ""
+
     def _put_back(self) -> str:
         """The safe gains, and what a trial set beside them; what is wrong with them, or nothing."""
         return self._gains.restore_or_explain() or self._parameters.restore()
@@ -284,15 +297,24 @@ class MavlinkVehicle:
         self._listen(0.0)
         if self._state in QUARANTINE_STATES:
             return
+        if self._took_safe_gains():
+            self._enter(State.SET_GAINS)
+            self._enter(State.IDLE)
+
+    def _took_safe_gains(self) -> bool:
+        """Write or compare the safe gains; whether it holds them and nothing else was found meanwhile. It is only
+        observed where not."""
+        was_observed = self._state in QUARANTINE_STATES
         try:
             self._set_up()
         except VehicleError as error:
             self._observe(str(error) if not self._decided else f"Its safe gains could not be verified: {error}")
-            return
+            return False
+        if self._state in QUARANTINE_STATES and not was_observed:
+            return False
         self._decided = True
         self._pinned = self.identity
-        self._enter(State.SET_GAINS)
-        self._enter(State.IDLE)
+        return True
 
     def _set_up(self) -> None:
         """Raises VehicleError when the vehicle is armed, refuses, does not take its safe gains, or holds others that
@@ -327,7 +349,8 @@ class MavlinkVehicle:
         preflight.require(self.check())
 
     def _observe(self, why: str) -> None:
-        self._enter(State.OBSERVE)
+        if self._state not in QUARANTINE_STATES:
+            self._enter(State.OBSERVE)
         self._why, self._gains.staged = why, None
 
     def _await_heartbeat(self) -> None:
