@@ -271,7 +271,7 @@ def record_released(session: Session, vehicle_id: int, *, identity: Identity | N
     row = repository.get_one(session, vehicle_id)
     row.concern = ""
     if identity is not None:
-        row.identity = asdict(identity.completed_by(_pinned(row)))
+        row.identity = asdict(identity)
     _move_to(row, VehicleState.READY)
 
 

@@ -1,6 +1,7 @@
 """What a registered vehicle is asked beside its flights: when it may be, once at a time, and what comes of it."""
 
 import threading
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
@@ -449,6 +450,10 @@ def test_the_hardware_id_is_pinned_when_it_is_told_and_changed_by_a_release_alon
         accepted = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0b")
         commands.record_released(session, vehicle["id"], identity=accepted)
     assert seen(client, vehicle)["identity"]["uid"] == "0b"
+    put_into(VehicleState.QUARANTINED, database, vehicle)
+    with database.write() as session:
+        acts.record_released(session, vehicle["id"], identity=replace(accepted, uid=""))
+    assert seen(client, vehicle)["identity"]["uid"] == "", "it tells none any more, and is accepted as it is"
 
 
 def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(

@@ -31,6 +31,8 @@ _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
 _DISARMED: Final = "disarmed"
 _VERSION_ATTEMPTS: Final = 2
+_UID_ATTEMPTS: Final = 10
+"""Of a vehicle that is known to tell its hardware id: twice as long as for a parameter."""
 _NAME_ATTEMPTS: Final = 2
 _CHECKS_ATTEMPTS: Final = 2
 _NO_POSITION: Final = "Wait until it knows where it is (GPS, cameras or its own sensors), then check again."
@@ -121,12 +123,14 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     return problem
 
 
-def identify(radio: AutopilotLink) -> None:
+def identify(radio: AutopilotLink, pinned: Identity | None = None) -> None:
     """Ask a vehicle that has not told its version and its hardware's id, or not since it was last away. Some never
-    answer, and Paparazzi tells unasked."""
-    asking = radio.profile.ask_version(radio.aim)
-    if asking is not None and not radio.seen.version and not radio.seen.uid:
-        radio.request(asking, lambda heard: isinstance(heard, Version), attempts=_VERSION_ATTEMPTS)
+    answer, and Paparazzi tells unasked; one whose hardware id is pinned is asked for 5 s."""
+    radio.hear_pending()
+    asking, is_needed = radio.profile.ask_version(radio.aim), bool(find_untold_uid(radio, pinned))
+    if asking is not None and (is_needed or not (radio.seen.version or radio.seen.uid)):
+        attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS
+        radio.request(asking, lambda heard: isinstance(heard, Version), attempts=attempts)
 
 
 def _has(radio: AutopilotLink, parameter: str) -> bool:
@@ -164,6 +168,13 @@ def is_another(radio: AutopilotLink, pinned: Identity | None) -> bool:
     """By its hardware's id, where it and the pinned one have told theirs."""
     uid = radio.seen.uid
     return pinned is not None and bool(uid and pinned.uid) and uid != pinned.uid
+
+
+def find_untold_uid(radio: AutopilotLink, pinned: Identity | None) -> str:
+    """That a vehicle whose hardware id is pinned has told none since it was last away; empty where it has."""
+    if pinned is None or not pinned.uid or radio.seen.uid:
+        return ""
+    return "It did not tell its hardware id, so it may be another vehicle than the pinned one; nothing was written."
 
 
 def is_armed(radio: AutopilotLink) -> bool:
@@ -251,6 +262,21 @@ def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservat
         or f"{rate_hz:.0f} sightings a second by {secondary.source.name}",
         needed=f"{SIGHTINGS_HZ:g} a second or more",
         hint="See that it tracks the vehicle and streams, or fly without it.",
+    )
+
+
+def evaluate_uid(radio: AutopilotLink, pinned: Identity) -> CheckItem:
+    """For a vehicle whose hardware id is pinned."""
+    passed = radio.seen.uid == pinned.uid
+    return CheckItem(
+        name="hardware_id",
+        title="Hardware id",
+        passed=passed,
+        found=radio.seen.uid or "not told",
+        needed=f"{pinned.uid}, that of the pinned one",
+        hint=""
+        if passed
+        else "See which vehicle it is, then try again. If it tells none any more, connect it again and release it.",
     )
 
 

@@ -164,10 +164,20 @@ class AutopilotLink:
             if self._is_autopilots(received.message)
         ]
         for each in heard:
-            if isinstance(each.measurement, Heartbeat) and each.now_s - self.seen.heartbeat_s > self.silence_s:
-                self.seen.forget_vehicle()  # another may have come in its place
+            if isinstance(each.measurement, Heartbeat):
+                self._forget_absent(each.now_s)
             self.seen.note(each.measurement, each.now_s)
         return heard
+
+    def hear_pending(self) -> None:
+        """Take in what has come, and forget who a vehicle is that is not there."""
+        self.listen(0.0)
+        self._forget_absent(self.clock.now_s())
+
+    def _forget_absent(self, now_s: float) -> None:
+        """Another may come in its place."""
+        if now_s - self.seen.heartbeat_s > self.silence_s:
+            self.seen.forget_vehicle()
 
     def _is_autopilots(self, message: Message) -> bool:
         """Not of another component on board; of any while the autopilot's is not known."""

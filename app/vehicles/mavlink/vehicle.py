@@ -114,6 +114,7 @@ class MavlinkVehicle:
         self._require_not_quarantined()
         self._identify()
         self._require_not_quarantined()
+        self._require_uid()
         if self._state is State.IDLE:
             self._enter(State.SET_GAINS)
         try:
@@ -225,11 +226,13 @@ class MavlinkVehicle:
 
     def restore(self) -> dict[str, float]:
         """Write the safe gains and return what was read back, which is them; a vehicle in doubt stays so. Raises
-        SafeGainsError when it is armed, is another one, or does not take them."""
+        SafeGainsError when it is armed, is another one, or does not take them, VehicleError when it does not tell its
+        known hardware id."""
         self._identify()
         preflight.require_disarmed(self._radio)
         if preflight.is_another(self._radio, self._pinned):
             raise SafeGainsError(self.concern, hint=_ANOTHER)
+        self._require_uid()
         if problem := self._put_back():
             raise SafeGainsError(f"The vehicle does not take what it had: {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
@@ -268,16 +271,21 @@ class MavlinkVehicle:
 
     def release(self) -> None:
         """A person has looked at it, also at who it is now: out of observation, once it is disarmed and holds its safe
-        gains, read back. Raises VehicleError when it is not heard, is armed, does not hold them, or differs from the
-        pinned one in what that person has not seen; it stays as it was then."""
+        gains, read back. One that tells no hardware id any more is accepted as it is. Raises VehicleError when it is
+        not heard, is armed, does not hold them, or differs from the pinned one in what that person has not seen; it
+        stays as it was then."""
         seen = self._why
         self._await_heartbeat()
         self._identify()
         if (change := preflight.identity_change(self._radio, self._pinned)) not in seen:
             raise SafeGainsError(change, hint=_ANOTHER)
-        if preflight.is_another(self._radio, self._pinned):
+        if (untold := preflight.find_untold_uid(self._radio, self._pinned)) not in seen:
+            self._why = f"{seen} {untold}".strip()
+            raise SafeGainsError(untold, hint=_ANOTHER)
+        if untold or preflight.is_another(self._radio, self._pinned):
             self._parameters = self._trial_parameters()
-        pinned, self._pinned, self._decided = self._pinned, self.identity, True
+        accepted = replace(self.identity, uid=self._radio.seen.uid)
+        pinned, self._pinned, self._decided = self._pinned, accepted, True
         try:
             self._set_up()
         except BaseException:
@@ -362,8 +370,15 @@ class MavlinkVehicle:
 
     def _identify(self) -> None:
         """Before anything is written: one that has been away may be another by now."""
-        preflight.identify(self._radio)
+        preflight.identify(self._radio, self._pinned)
         self._listen(0.0)
+        if self._pinned is not None and self._state not in QUARANTINE_STATES:
+            self._pinned = self._pinned.completed_by(self.identity)
+
+    def _require_uid(self) -> None:
+        """Raises VehicleError when the pinned vehicle's hardware id is known, and this one has not told its own."""
+        if untold := preflight.find_untold_uid(self._radio, self._pinned):
+            raise VehicleError(untold, hint="Try again. If it tells none any more, connect it again and release it.")
 
     def _listen(self, timeout_s: float) -> None:
         """Between flights: a vehicle that somebody else arms, or that tells another version or hardware id than the
@@ -406,8 +421,8 @@ class MavlinkVehicle:
     def _observe_ground(self, watched_s: float) -> Ground:
         """Where it stands. Raises VehicleError when it is not ready to fly, SafeGainsError when it is armed."""
         watched, items = self._check(watched_s)
-        preflight.require(items)
         self._require_not_quarantined()
+        preflight.require(items)
         return watched.ground
 
     def _check(self, watched_s: float) -> tuple[preflight.GroundObservation, tuple[CheckItem, ...]]:
@@ -416,11 +431,13 @@ class MavlinkVehicle:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)
         watched = preflight.observe(self._radio, self._lookout, watched_s=watched_s)
-        self._listen(0.0)
+        self._identify()
         if self._state not in QUARANTINE_STATES:
             preflight.confirm_stop(self._radio, watched)
         minimum_v = float(self._options["min_battery_v"])
         items = preflight.evaluate_items(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
+        if self._pinned is not None and self._pinned.uid:
+            items = (*items, preflight.evaluate_uid(self._radio, self._pinned))
         if self._lookout is not None:
             items = (*items, preflight.evaluate_secondary(self._lookout, watched))
         if self._radio.profile.flying_blocks:

@@ -1,5 +1,6 @@
 """A vehicle whose link stays open between flights, against the simulated drone."""
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -11,6 +12,7 @@ from pymavlink import mavutil
 from app.vehicles.base import FlightOptions, Identity, Sample, StopRequest
 from app.vehicles.errors import SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import number, text
+from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
@@ -131,17 +133,37 @@ def test_another_vehicle_of_the_same_make_and_version_is_only_observed_until_a_p
             assert vehicle.stage(OWN_SAFE[autopilot]) == OWN_SAFE[autopilot]
 
 
-@pytest.mark.parametrize(("pinned", "told"), [("", 7), ("0000000000000007", 0)])
-def test_a_hardware_id_that_is_not_known_yet_or_not_told_this_time_is_no_other_one(pinned: str, told: int) -> None:
-    """Pinned by a release that did not look at it; a firmware that tells it late, or not at all."""
+def test_a_vehicle_that_does_not_tell_its_known_hardware_id_is_given_nothing_until_a_person_releases_it() -> None:
+    """Another one whose answer is lost, or a firmware that tells it no more."""
     with LockstepRig("px4") as rig:
-        rig.drone.autopilot.uid = told  # type: ignore[attr-defined]
-        pin = Identity(system_id=1, autopilot="px4", version="1.16.0", uid=pinned)
+        rig.drone.autopilot.uid = 0  # type: ignore[attr-defined]
+        pin = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0000000000000007")
         with connected(rig, pin) as vehicle:
+            assert "It did not tell its hardware id" in vehicle.concern
+            item = next(item for item in vehicle.check() if item.name == "hardware_id")
+            assert (item.passed, item.found) == (False, "not told")
+            assert item.needed == "0000000000000007, that of the pinned one"
+            with pytest.raises(VehicleError, match="did not tell its hardware id"):
+                vehicle.restore()
+            assert not rig.told("PARAM_SET")
+            vehicle.release()
+            assert (vehicle.concern, vehicle.identity.uid) == ("", "")
+            assert vehicle.stage(OWN_SAFE["px4"]) == OWN_SAFE["px4"]
+            assert not [item for item in vehicle.check() if item.name == "hardware_id"]
+
+
+def test_a_hardware_id_that_is_told_for_the_first_time_is_the_vehicles_own_from_then_on() -> None:
+    """Pinned by a release that did not look at it."""
+    with LockstepRig("px4") as rig:
+        autopilot = rig.drone.autopilot
+        autopilot.uid = 0  # type: ignore[attr-defined]
+        with connected(rig, Identity(system_id=1, autopilot="px4", version="1.16.0")) as vehicle:
+            assert (vehicle.concern, vehicle.identity.uid) == ("", "")
+            swap(rig, vehicle, 7)
+            vehicle.check()
             assert (vehicle.concern, vehicle.identity.uid) == ("", "0000000000000007")
-            rig.drone.autopilot.uid = 9  # type: ignore[attr-defined]
-            vehicle._radio.send(vehicle._radio.profile.ask_version(vehicle._radio.aim))  # type: ignore[arg-type]
-            vehicle.attend(0.5)
+            swap(rig, vehicle, 9)
+            vehicle.check()
             assert "hardware id is 0000000000000009" in vehicle.concern
 
 
@@ -166,6 +188,88 @@ def test_a_vehicle_that_is_swapped_while_the_link_stays_open_is_asked_who_it_is_
         vehicle.attend(3.0)
         vehicle.release()
         assert (vehicle.concern, vehicle.identity) == ("", known)
+
+
+class LossyRig(LockstepRig):
+    """Loses what the drone tells of itself before `lost_until_s`."""
+
+    lost_until_s = 0.0
+
+    def arriving(self, frames: list[bytes]) -> list[bytes]:
+        if self.now_s() >= self.lost_until_s:
+            return frames
+        codec = PROFILES[self.autopilot].dialect.codec(system=1, component=1)
+        return [frame for frame in frames if codec.parse(frame)[0].get_type() != "AUTOPILOT_VERSION"]
+
+
+def test_another_vehicle_than_the_pinned_one_whose_answers_are_lost_while_it_connects_is_observed() -> None:
+    pin = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0000000000000007")
+    with LossyRig("px4") as rig:
+        rig.lost_until_s = rig.now_s() + 3.0
+        with connected(rig, pin) as vehicle:
+            assert rig.now_s() > rig.lost_until_s
+            assert f"hardware id is {vehicle.identity.uid}, that of the pinned one is {pin.uid}" in vehicle.concern
+            assert rig.writes == []
+
+
+def test_a_new_version_that_is_told_late_while_a_vehicle_connects_is_a_concern() -> None:
+    with LossyRig("px4") as rig:
+        with connected(rig) as vehicle:
+            known = vehicle.identity
+        rig.lost_until_s = rig.now_s() + 3.0
+        with connected(rig, replace(known, version="1.2.3")) as vehicle:
+            assert vehicle.concern == f"Its firmware is now version {known.version}; it was 1.2.3."
+
+
+def test_a_swapped_vehicle_whose_answers_are_lost_at_first_is_asked_on() -> None:
+    with LossyRig("px4") as rig, connected(rig) as vehicle:
+        swap(rig, vehicle, 9)
+        vehicle.attend(3.0)
+        written = list(rig.writes)
+        rig.lost_until_s = rig.now_s() + 4.0
+        with pytest.raises(SafeGainsError, match="hardware id is 0000000000000009"):
+            vehicle.stage(OWN_SAFE["px4"])
+        assert rig.writes == written
+
+
+def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> None:
+    with LossyRig("px4") as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            known = vehicle.identity
+            vehicle.attend(2.0)
+            vehicle.stage(OWN_SAFE["px4"])
+            swap(rig, vehicle, int(known.uid, 16))
+            vehicle.attend(3.0)
+            written = list(rig.writes)
+            rig.lost_until_s = math.inf
+            with pytest.raises(VehicleError, match="Hardware id: not told, needed: ") as refusal:
+                vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+            assert refusal.value.not_flown
+            assert "It did not tell its hardware id" in vehicle.concern
+            assert [name for name in rig.writes[len(written) :] if name.startswith("MPC_")] == []
+
+
+def test_a_person_who_has_not_seen_that_no_hardware_id_is_told_does_not_release_the_vehicle() -> None:
+    with LossyRig("px4") as rig, connected(rig) as vehicle:
+        vehicle._observe("Somebody else armed it.")
+        swap(rig, vehicle, 9)
+        rig.lost_until_s = math.inf
+        with pytest.raises(SafeGainsError, match="did not tell its hardware id"):
+            vehicle.release()
+        assert "Somebody else armed it. It did not tell its hardware id" in vehicle.concern
+        vehicle.release()
+        assert (vehicle.concern, vehicle.identity.uid) == ("", "")
+
+
+def test_a_vehicle_that_was_not_listened_to_for_a_while_is_asked_who_it_is_and_passes_its_checks() -> None:
+    with LockstepRig("px4") as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            rig.wait_s(8.0)
+            assert [item.name for item in vehicle.check() if not item.passed] == []
+            rig.wait_s(8.0)
+            assert vehicle.stage(OWN_SAFE["px4"]) == OWN_SAFE["px4"]
 
 
 def test_a_vehicle_that_is_swapped_after_it_was_staged_is_not_flown() -> None:
