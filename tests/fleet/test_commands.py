@@ -452,7 +452,7 @@ def test_the_hardware_id_is_pinned_when_it_is_told_and_changed_by_a_release_alon
     assert seen(client, vehicle)["identity"]["uid"] == "0b"
     put_into(VehicleState.QUARANTINED, database, vehicle)
     with database.write() as session:
-        acts.record_released(session, vehicle["id"], identity=replace(accepted, uid=""))
+        commands.record_released(session, vehicle["id"], identity=replace(accepted, uid=""))
     assert seen(client, vehicle)["identity"]["uid"] == "", "it tells none any more, and is accepted as it is"
 
 

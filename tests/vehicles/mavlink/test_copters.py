@@ -219,8 +219,9 @@ def test_what_a_killed_process_had_set_is_put_back_under_another_address_where_t
     file.write_text(KEPT)
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
-        options = {"address": "udp:127.0.0.1:14580@14550", "simulated": simulated}
-        with connected(rig, trial_parameters=tmp_path, **options) as vehicle:
+        with connected(
+            rig, trial_parameters=tmp_path, address="udp:127.0.0.1:14580@14550", simulated=simulated
+        ) as vehicle:
             assert (vehicle.concern, rig.drone.autopilot.held("MIS_TAKEOFF_ALT")) == ("", afterwards)
             assert file.exists() == simulated
 
