@@ -14,8 +14,8 @@ from typing import Final
 
 from app.core.experiments import get_experiment
 from app.vehicles.base import FlightOptions, Vehicle
-from app.vehicles.jsbsim.flight import new_aircraft
-from app.vehicles.open import open_vehicle
+from app.vehicles.jsbsim import new_aircraft
+from app.vehicles.registry import open_vehicle
 from app.vehicles.simulated import STEPS
 
 ROUNDS: Final = 15

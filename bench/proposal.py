@@ -28,7 +28,7 @@ from app.flights import queue, requests
 from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
 from app.vehicles.base import FlightOptions as Order
-from app.vehicles.open import open_vehicle
+from app.vehicles.registry import open_vehicle
 
 LIMIT_S: Final = 1.0
 WORKER: Final = "bench"

@@ -32,13 +32,13 @@ from app.simdrone.registry import get_autopilot
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.dialects import Message, number
-from app.vehicles.mavlink.kind import MAVLINK
-from app.vehicles.mavlink.moves import Plan
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialResult
+from app.vehicles.mavlink.trial_transitions import Plan
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mavlink_kind import MAVLINK
 
 CORE_SHARE_LIMIT: Final = 0.1
 DEFAULT_S: Final = 30.0

@@ -24,7 +24,7 @@ from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.registration import get_or_create_imported_vehicle
 from app.fleet.schemas import VehicleChoice
-from app.vehicles.open import VEHICLE_KINDS, check_options
+from app.vehicles.registry import VEHICLE_KINDS, check_options
 
 JsonObject = dict[str, Any]
 _AT_ONCE_BYTES: Final = 16 * 2**20

@@ -18,7 +18,7 @@ from app.core.policy import shortened
 from app.core.tuning.definition_checks import MAX_FLIGHTS
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import MANUAL
-from app.vehicles.open import get_kind
+from app.vehicles.registry import get_kind
 
 if TYPE_CHECKING:
     from ruamel.yaml.comments import CommentedMap

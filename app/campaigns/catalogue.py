@@ -15,7 +15,7 @@ from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Strategy
 from app.fleet.views import is_registered_one_by_one
 from app.vehicles.kinds import VehicleKind
-from app.vehicles.open import VEHICLE_KINDS, get_kind
+from app.vehicles.registry import VEHICLE_KINDS, get_kind
 from app.web.dependencies import Live
 
 router = APIRouter(prefix="/api", tags=["catalogue"])

@@ -23,7 +23,7 @@ from app.core.tuning.definition_checks import check_definition
 from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue
-from app.vehicles.open import VEHICLE_KINDS, check_options
+from app.vehicles.registry import VEHICLE_KINDS, check_options
 
 _ADAPTER: Final = TypeAdapter(Definition)
 

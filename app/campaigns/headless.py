@@ -16,9 +16,8 @@ from app.core.tuning.predictions import prediction_of
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.stop_rules import evaluate_stop_rule, landing_battery_v
 from app.core.tuning.strategy import Explanation, Interval, Kind, Proposal
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, Vehicle
-from app.vehicles.errors import SafeGainsError, VehicleError
-from app.vehicles.open import get_kind, open_vehicle
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, SafeGainsError, Sample, Vehicle, VehicleError
+from app.vehicles.registry import get_kind, open_vehicle
 
 Outcome = Literal["valid", "aborted", "invalid"]
 

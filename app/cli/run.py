@@ -28,7 +28,7 @@ from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategy import Proposal
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue, Sample
-from app.vehicles.open import get_kind
+from app.vehicles.registry import get_kind
 
 
 def run_campaign(

@@ -24,7 +24,7 @@ from app.core.tuning.strategies import STRATEGIES
 from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.base import VehicleOption
-from app.vehicles.open import VEHICLE_KINDS
+from app.vehicles.registry import VEHICLE_KINDS
 
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:

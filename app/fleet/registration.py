@@ -21,9 +21,8 @@ from app.fleet.control import record_act, require_may_command, require_not_contr
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
 from app.fleet.views import is_registered_one_by_one, settings_of, vehicle_view
-from app.vehicles.imported import IMPORT
 from app.vehicles.kinds import VehicleKind
-from app.vehicles.open import VEHICLE_KINDS, get_kind
+from app.vehicles.registry import IMPORT, VEHICLE_KINDS, get_kind
 
 
 def register_vehicle(session: Session, new: NewVehicle, context: RequestContext) -> Vehicle:

@@ -27,7 +27,7 @@ from app.fleet.views import (
     options_of,
     vehicle_view,
 )
-from app.vehicles.open import VEHICLE_KINDS, get_kind
+from app.vehicles.registry import VEHICLE_KINDS, get_kind
 
 __all__ = [
     "battery_flights",

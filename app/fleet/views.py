@@ -12,7 +12,7 @@ from app.fleet import repository
 from app.fleet.control import control_of
 from app.fleet.schemas import CampaignVehicle, GivenGains, Identity, Vehicle, VehicleAct, VehicleCheck
 from app.vehicles.kinds import VehicleKind
-from app.vehicles.open import VEHICLE_KINDS
+from app.vehicles.registry import VEHICLE_KINDS
 
 
 def can_fly(row: VehicleRow) -> bool:

@@ -28,7 +28,7 @@ from app.flights.process_messages import CommandForwarded, ConnectionOpened, Con
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
 from app.flights.vehicle_process import run_vehicle_process
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import SafeGainsError, VehicleError
 
 T = TypeVar("T")
 

@@ -34,8 +34,8 @@ from app.flights.process_messages import (
 )
 from app.processes import process_context
 from app.vehicles.base import FlightRecord, ShouldStop, StopRequest, Vehicle
-from app.vehicles.jsbsim.kind import prepare
-from app.vehicles.open import open_vehicle
+from app.vehicles.jsbsim import prepare
+from app.vehicles.registry import open_vehicle
 
 LOCK_TIMEOUT_S: Final = 10.0
 """How long a flight waits for another process that still holds the vehicle, such as one that is landing it after its

@@ -20,8 +20,17 @@ from app.core.errors import GainlineError
 from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, Phase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes.locks import LockedError, exclusive
-from app.vehicles.base import MOTORS_OFF_ASKED, CheckItem, FlightOptions, FlightRecord, Identity, OptionValue, Sample
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import (
+    MOTORS_OFF_ASKED,
+    CheckItem,
+    FlightOptions,
+    FlightRecord,
+    Identity,
+    OptionValue,
+    SafeGainsError,
+    Sample,
+    VehicleError,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

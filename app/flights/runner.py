@@ -33,9 +33,8 @@ from app.flights.process_messages import (
 from app.flights.queue import FlightTask
 from app.flights.record_spool import Spool
 from app.live.messages import FlightPhase, Phase, Telemetry
-from app.vehicles.base import FlightOptions, FlightRecord
-from app.vehicles.errors import VehicleError
-from app.vehicles.open import get_kind
+from app.vehicles.base import FlightOptions, FlightRecord, VehicleError
+from app.vehicles.registry import get_kind
 
 RETRY_S: Final = 1.0
 STAGED_FOR_S: Final = 600.0

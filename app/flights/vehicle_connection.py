@@ -44,7 +44,7 @@ from app.flights.process_messages import (
 )
 from app.live.messages import NO_LINK, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes import process_context
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import SafeGainsError, VehicleError
 
 _ENDED: Final = (
     "The process that had the vehicle's link ended; nobody knows whether it told the vehicle. Use the vehicle's own "

@@ -41,9 +41,15 @@ from app.flights.process_messages import (
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
 from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
-from app.vehicles.base import ConnectedVehicle, FlightRecord, StopRequest
-from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError
-from app.vehicles.open import get_kind, restore_safe_gains
+from app.vehicles.base import (
+    ConnectedVehicle,
+    FlightRecord,
+    InterruptedByOrderError,
+    SafeGainsError,
+    StopRequest,
+    VehicleError,
+)
+from app.vehicles.registry import get_kind, restore_safe_gains
 
 POLL_INTERVAL_S: Final = 0.005
 STATUS_INTERVAL_S: Final = 0.2

@@ -22,7 +22,7 @@ from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
 from app.reports import repository
 from app.reports.formatting import count, gain, gains, number, option, percent
-from app.vehicles.open import VEHICLE_KINDS
+from app.vehicles.registry import VEHICLE_KINDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import Optimum, model_optimum
 from app.core.tuning.proposals import next_proposal
 from app.processes import process_context
-from app.vehicles.lti import whole_flight
+from app.vehicles.f16 import whole_flight
 
 BEST_ERROR: Final = 0.204716
 """Local optimum of the true system, rad·s, to ±0.0002: the same from 20 starts."""

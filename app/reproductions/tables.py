@@ -19,7 +19,7 @@ from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.results import OVERRULE, Progress, Result, Row, curve
 from app.vehicles.base import FlightOptions, OptionValue
-from app.vehicles.open import get_kind, open_vehicle
+from app.vehicles.registry import get_kind, open_vehicle
 
 _CAMPAIGN: Final = Definition(experiment="takeoff", first_step_fraction=1.0)
 """The default campaign, without a step limit inside its bounds."""

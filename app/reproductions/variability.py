@@ -18,7 +18,7 @@ from app.core.statistics.comparisons import Group, pool_scatter, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
 from app.reproductions.results import OVERRULE, Progress, Result, Row, marks, ratio
 from app.reproductions.tables import overruled_for
-from app.vehicles.open import check_options
+from app.vehicles.registry import check_options
 from app.vehicles.simulated import simulate_takeoff, trajectory_of
 from app.vehicles.twin import TwinFlight
 

@@ -1,4 +1,10 @@
-"""The seam between the program and anything that flies."""
+"""The interface between the program and anything that flies, and the errors of vehicles.
+
+GainlineError
+└── VehicleError                  a vehicle could not do what was asked
+    ├── InterruptedByOrderError   a person ordered something else meanwhile
+    └── SafeGainsError            it may still hold experimental gains: to be quarantined
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -6,6 +12,7 @@ from pathlib import Path
 from typing import Final, Literal, Protocol
 
 from app.core.clock import REAL_TIME, Clock
+from app.core.errors import GainlineError
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 
@@ -233,3 +240,18 @@ class ConnectedVehicle(Vehicle, Protocol):
         """A person has looked at it: out of observation, once it is disarmed and holds its safe gains, read back.
         Raises VehicleError when it is not or does not; it stays as it was then."""
         ...
+
+
+class VehicleError(GainlineError):
+    """A vehicle could not do what was asked of it. `not_flown`: that was to fly, and it was never told to take off."""
+
+    not_flown = False
+
+
+class InterruptedByOrderError(VehicleError):
+    """What was under way with the vehicle was ended by a person's order to land or to stop its motors, which has gone
+    out."""
+
+
+class SafeGainsError(VehicleError):
+    """The safe gains could not be verified on the vehicle; it must not fly until a person has looked at it."""

@@ -1,10 +1,14 @@
-"""What all simulated vehicles share: gains, the course of a flight, its record, pacing and aborts."""
+"""What all simulated vehicles share: the gains that they can hold, the course of a flight, its record, simulated time
+held back to the requested speed, seeded disturbances, aborts.
+"""
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final, Protocol
 
 import numpy as np
 
+from app.core.clock import REAL_TIME, Clock
 from app.core.control.paparazzi import (
     ALT,
     CLIMB,
@@ -17,13 +21,86 @@ from app.core.control.paparazzi import (
     THROTTLE,
     fix,
 )
+from app.core.errors import GainsError, InputError, Problem
 from app.core.policy import Gains, shortened
 from app.core.records.trajectory import Trajectory
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest
-from app.vehicles.errors import VehicleError
-from app.vehicles.holding import accept_gains
-from app.vehicles.kernels import ALTITUDE, CHANNELS, COMMAND_SIZE, KD, KI, KP, MODE, SET_POINT, TARGET, Integers, Rows
-from app.vehicles.pacing import Pacer
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest, VehicleError
+from app.vehicles.kernels import (
+    ALTITUDE,
+    CHANNELS,
+    COMMAND_SIZE,
+    KD,
+    KI,
+    KP,
+    MODE,
+    SET_POINT,
+    TARGET,
+    Integers,
+    Rows,
+    correlate,
+)
+
+
+def accept_gains(
+    gains: Gains, names: Sequence[str], refusal: Callable[[float], str | None], *, kind: type[float], numbers: str
+) -> dict[str, float]:
+    """The gains, complete and in order, each as `kind`. Raises GainsError naming every unknown or missing gain and each
+    that `refusal` gives a reason against; `numbers` says which could be held."""
+    problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in names]
+    for name in names:
+        reason = refusal(gains[name]) if name in gains else "is missing"
+        if reason is not None:
+            problems.append(Problem(f"gains.{name}", reason))
+    if problems:
+        raise GainsError(
+            "The vehicle cannot hold these gains.",
+            problems=tuple(problems),
+            hint=f"Send {', '.join(names)} as {numbers}.",
+        )
+    return {name: kind(gains[name]) for name in names}
+
+
+LISTEN_EVERY_S: Final = 0.02
+"""The longest that a flight held back is deaf to an abort."""
+
+
+class Pacer:
+    """Lets vehicle time pass `speed` times as fast as the clock's, never faster; None does not hold it back at all.
+
+    Time is counted from the start: a computation that fell behind catches up.
+    """
+
+    def __init__(self, speed: float | None, clock: Clock = REAL_TIME) -> None:
+        """Raises InputError unless `speed` is a positive finite number or None."""
+        if speed is not None and not (math.isfinite(speed) and speed > 0.0):
+            raise InputError(
+                "This flight cannot be paced.",
+                problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
+                hint="Give simulated time over wall time, such as 10; nothing means as fast as possible.",
+            )
+        self._speed = speed
+        self._clock = clock
+        self._start_s = clock.now_s()
+
+    def wait_until(self, vehicle_time_s: float, should_stop: ShouldStop) -> StopRequest | None:
+        """Return None once `vehicle_time_s` seconds of the flight may have passed, or at once what ends it early.
+
+        `should_stop` is asked at least once, every 20 ms of the clock, and last when the time has come.
+        """
+        while True:
+            early_s = self._early_s(vehicle_time_s)
+            if early_s > 0.0:
+                self._clock.wait_s(min(early_s, LISTEN_EVERY_S))
+            if (stop := should_stop()) is not None:
+                return stop
+            if early_s <= LISTEN_EVERY_S:
+                return None
+
+    def _early_s(self, vehicle_time_s: float) -> float:
+        if self._speed is None:
+            return 0.0
+        return self._start_s + vehicle_time_s / self._speed - self._clock.now_s()
+
 
 GAIN_NAMES: Final = ("kp", "ki", "kd")
 TAKEOFF_ALTITUDE_M: Final = 3.0
@@ -210,3 +287,18 @@ def _refusal(value: float) -> str | None:
     if not INT32_MIN <= value <= INT32_MAX:
         return f"must be a number that 32 bits hold, got {shortened(value)}"
     return None if value == int(value) else f"must be a whole number of counts, got {value:g}"
+
+
+def streams(seed: int, count: int) -> list[np.random.Generator]:
+    """Independent generators of one flight: what one of them is asked for leaves the others alone."""
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(count)]
+
+
+def gusts(generator: np.random.Generator, steps: int, *, sd: float, correlation_s: float) -> Rows:
+    """Gauss-Markov gusts at 512 Hz, shape (steps,), with the standard deviation's unit."""
+    if sd == 0.0:
+        return np.zeros(steps)
+    series = generator.standard_normal(steps)
+    correlate(series, correlation_s)
+    series *= sd
+    return series

@@ -15,7 +15,6 @@ from app.core.errors import Problem
 from app.core.formatting import percent
 from app.core.policy import Gains
 from app.vehicles.base import Vehicle, VehicleOption
-from app.vehicles.disturbances import gusts, streams
 from app.vehicles.kernels import (
     AUTOPILOT_SIZE,
     BATTERY,
@@ -35,7 +34,7 @@ from app.vehicles.kernels import (
     fly_simple_model,
 )
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import FLIGHT_S, MAX_STEPS, SimulatedVehicle
+from app.vehicles.simulated import FLIGHT_S, MAX_STEPS, SimulatedVehicle, gusts, streams
 
 _THRUST_SD: Final = 0.003
 _START_SD_S: Final = 0.060

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from app.vehicles.base import FlightOptions, Sample
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import FlightOptions, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import Case

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
-from app.vehicles.base import FlightOptions, FlightRecord, Sample
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, Mishap, tuned_gains

@@ -11,7 +11,7 @@ from app.simdrone.motion_capture import VehicleLinkOutput
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue, StopRequest
 from app.vehicles.mavlink.dialects import FieldValue
-from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.mavlink_kind import MAVLINK
 from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case, Mishap
 from bench.hazards.stages import Stage, Stages
 from bench.hazards.wire import DIALECTS, GAINS, Order, order, stops_motors

@@ -15,9 +15,9 @@ from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.tuning.trust_region import minimise_in_box
 from app.vehicles.base import OptionValue
-from app.vehicles.jsbsim.flight import FULL_THRUST_N, GRAVITY_M_S2, JsbsimFlight
+from app.vehicles.jsbsim import FULL_THRUST_N, GRAVITY_M_S2, JsbsimFlight
 from app.vehicles.kernels import ALTITUDE, Rows
-from app.vehicles.open import check_options
+from app.vehicles.registry import check_options
 from app.vehicles.simulated import Simulation, simulate_takeoff, trajectory_of
 from app.vehicles.twin import TwinFlight
 

@@ -6,7 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
-from app.vehicles.open import open_vehicle
+from app.vehicles.registry import open_vehicle
 from tests.builders import create_ready_campaign, create_trial, get, land, lift_off, problems_of, run_jobs
 from tests.vehicles.flying import HAND, fly
 

@@ -20,9 +20,9 @@ from app.core.clock import ScaledClock
 from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import number, text
-from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink_kind import MAVLINK
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
 

@@ -8,8 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
-from app.vehicles.base import FlightOptions, FlightRecord
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 

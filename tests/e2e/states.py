@@ -37,7 +37,7 @@ from app.jobs import service as jobs
 from app.reproductions import service as reproductions
 from app.reproductions.registry import get_reproduction
 from app.vehicles.base import FlightOptions, StopRequest
-from app.vehicles.open import open_vehicle, restore_safe_gains
+from app.vehicles.registry import open_vehicle, restore_safe_gains
 from tests.builders import WORKER
 
 T = TypeVar("T")

@@ -14,9 +14,8 @@ from app.flights.flight_process import LOCK_TIMEOUT_S, FlightProcess
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import FlightPhase, Telemetry
 from app.processes.locks import exclusive
-from app.vehicles.base import FlightOptions
-from app.vehicles.errors import VehicleError
-from app.vehicles.open import open_vehicle
+from app.vehicles.base import FlightOptions, VehicleError
+from app.vehicles.registry import open_vehicle
 
 GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 

@@ -35,8 +35,8 @@ from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.vehicles.base import FlightOptions, Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import Message
-from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mavlink_kind import MAVLINK
 from tests.vehicles.flying import SAFE, TUNED
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import START_ENGINE, TAKE_OFF

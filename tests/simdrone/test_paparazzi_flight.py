@@ -8,7 +8,7 @@ import pytest
 
 from app.core.control.paparazzi import ALT
 from app.simdrone.body import vertical_command
-from app.vehicles.open import check_options
+from app.vehicles.registry import check_options
 from app.vehicles.twin import TwinFlight
 from tests.simdrone.ground import STILL, Ground, Heard, flying
 from tests.simdrone.paparazzi import (

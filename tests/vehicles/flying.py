@@ -12,7 +12,7 @@ from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest, Vehicle
-from app.vehicles.open import VEHICLE_KINDS, open_vehicle
+from app.vehicles.registry import VEHICLE_KINDS, open_vehicle
 
 TAKEOFF: Final = Takeoff()
 SAFE: Final = {"kp": 283, "ki": 13, "kd": 82}

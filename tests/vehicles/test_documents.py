@@ -4,7 +4,7 @@ import pytest
 
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.vehicles.base import OptionValue
-from app.vehicles.open import VEHICLE_KINDS
+from app.vehicles.registry import VEHICLE_KINDS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
 

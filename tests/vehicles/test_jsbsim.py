@@ -10,8 +10,8 @@ from app.core.control.paparazzi import ALT
 from app.core.errors import InputError
 from app.core.records.trajectory import Trajectory
 from app.vehicles.base import OptionValue
-from app.vehicles.jsbsim.flight import JsbsimFlight, new_aircraft
-from app.vehicles.open import check_options
+from app.vehicles.jsbsim import JsbsimFlight, new_aircraft
+from app.vehicles.registry import check_options
 from tests.vehicles.flying import SAFE, TAKEOFF, TUNED, flown
 
 WEIGHT_N = 0.4 * 9.8124
@@ -158,7 +158,7 @@ def test_gains_that_throw_it_about_still_leave_a_finite_record() -> None:
 
 THREADS = """
 import threading
-from app.vehicles.jsbsim.flight import new_aircraft
+from app.vehicles.jsbsim import new_aircraft
 
 def step() -> None:
     aircraft = new_aircraft()

@@ -3,8 +3,8 @@
 import pytest
 
 from app.vehicles.base import ShouldStop, StopRequest
-from app.vehicles.open import open_vehicle
-from app.vehicles.pacing import LISTEN_EVERY_S, Pacer
+from app.vehicles.registry import open_vehicle
+from app.vehicles.simulated import LISTEN_EVERY_S, Pacer
 from tests.vehicles.flying import CAN_FLY, PROFILES, Watcher, fly, never
 
 

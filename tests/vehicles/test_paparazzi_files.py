@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 import pytest
 
 from app.simdrone import paparazzi_plan as simulated
-from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.preflight import POSITIONS_HZ
 from app.vehicles.mavlink.profiles.paparazzi import BLOCKS, LAND, TAKE_OFF, Paparazzi
+from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.simulated import FLIGHT_S
 
 FOLDER = Path(__file__).parents[2] / "docs" / "paparazzi"

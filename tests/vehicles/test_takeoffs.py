@@ -9,7 +9,7 @@ import pytest
 from app.core.errors import GainsError
 from app.vehicles.base import Vehicle
 from app.vehicles.kernels import CHANNELS
-from app.vehicles.open import VEHICLE_KINDS, open_vehicle
+from app.vehicles.registry import VEHICLE_KINDS, open_vehicle
 from tests.vehicles.flying import SAFE, TAKES_OFF, Watcher, fly
 
 SLICE_STEPS: Final = 11

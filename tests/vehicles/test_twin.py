@@ -3,7 +3,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.core.errors import InputError
-from app.vehicles.open import open_vehicle
+from app.vehicles.registry import open_vehicle
 from tests.vehicles.flying import SAFE, TAKEOFF, TUNED, Watcher, flown, fly
 
 REPEATS = 120

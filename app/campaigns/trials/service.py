@@ -30,7 +30,7 @@ from app.core.tuning.gate import GateResult, check_policy, require_flyable, spac
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.fleet.control import require_may
-from app.vehicles.open import get_kind
+from app.vehicles.registry import get_kind
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from app.vehicles.mavlink.measurements import VehicleEvent
+from app.vehicles.mavlink.events import VehicleEvent
 
 ARMING_CHECK_SUMMARY: Final = 1 << 24 | 11047904
 """The autopilot's component, and the event commander_arming_check_summary."""

@@ -6,12 +6,11 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
-from app.vehicles.mavlink import agreement
-from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import GROUND_M
-from app.vehicles.mavlink.measurements import Position
-from app.vehicles.mavlink.moves import Trial
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink import secondary_altitude
+from app.vehicles.mavlink.events import Position
+from app.vehicles.mavlink.failures import GROUND_M, Failure, Finding
+from app.vehicles.mavlink.trial_transitions import Trial
 
 _IN_PLACE_M: Final = 0.3
 _SHIFT_M: Final = 0.3
@@ -56,11 +55,11 @@ def find_departure(trial: Trial) -> Finding | None:
 def find_disagreement(trial: Trial, now_s: float) -> Finding | None:
     """Between the vehicle's altitude on the ground and that of the second source, which was last seen before any
     shift."""
-    seen_m, last = agreement.current_altitude_m(trial.watch.second, now_s), trial.watch.last
+    seen_m, last = secondary_altitude.current_altitude_m(trial.watch.second, now_s), trial.watch.last
     if seen_m is None or last is None:
         return None
     apart_m = abs(seen_m + trial.ground_shift_m - last.altitude_m)
-    if apart_m <= agreement.MAX_DIFFERENCE_M:
+    if apart_m <= secondary_altitude.MAX_DIFFERENCE_M:
         return None
     why = f"They were {apart_m:.2f} m apart before the take-off command."
     return Finding(failure=Failure.DISAGREEMENT, why=why)

@@ -29,7 +29,7 @@ from app.vehicles.mavlink.dialects import (
     source_component,
     source_system,
 )
-from app.vehicles.mavlink.speakers import DuplicateDetector
+from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 

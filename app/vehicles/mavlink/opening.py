@@ -8,13 +8,12 @@ from typing import Final
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, signing
-from app.vehicles.mavlink.failures import HELP
-from app.vehicles.mavlink.limits import Limits
+from app.vehicles.mavlink.events import PacketReceived
+from app.vehicles.mavlink.failures import HELP, Limits
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Profile, Target
 from app.vehicles.mavlink.radio import REPLY_TIMEOUT_S, AutopilotLink
-from app.vehicles.mavlink.signals import PacketReceived
 from app.vehicles.mavlink.transports import Transport
 
 TAKEOFF_ALTITUDE_M: Final = 3.0

@@ -9,16 +9,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
-from app.vehicles.base import CheckItem, Identity
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import CheckItem, Identity, SafeGainsError, VehicleError
+from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
+from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
 from app.vehicles.mavlink.failures import RESPONSES, Failure
-from app.vehicles.mavlink.measurements import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
 from app.vehicles.mavlink.radio import AutopilotLink
-from app.vehicles.mavlink.sources import AlignedAltitudeSource
 
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0

@@ -8,22 +8,25 @@ from typing import Final
 from app.core.clock import Clock
 from app.vehicles.mavlink.arming_checks import ArmingChecks
 from app.vehicles.mavlink.dialects import Message, source_component
-from app.vehicles.mavlink.limits import HEARTBEATS_MISSED, MAX_WITNESS_GAP
-from app.vehicles.mavlink.link import Link, Received
-from app.vehicles.mavlink.measurements import (
+from app.vehicles.mavlink.events import (
+    Action,
+    ActionDone,
+    ActionRefused,
     Battery,
     BlockEntered,
     CommandReply,
     Heartbeat,
     Measurement,
+    PacketReceived,
     Parameter,
     Position,
     StatusText,
     VehicleEvent,
     Version,
 )
+from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, MAX_WITNESS_GAP
+from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Step, Target
-from app.vehicles.mavlink.signals import Action, ActionDone, ActionRefused, PacketReceived
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5

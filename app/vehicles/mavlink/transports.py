@@ -16,7 +16,7 @@ from typing import Final, Protocol
 
 import serial
 
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.addresses import (
     Address,
     SerialAddress,

@@ -4,15 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from app.vehicles.base import Sample, ShouldStop, StopRequest
-from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.failures import UNHEEDED
-from app.vehicles.mavlink.limits import UNHEEDED_S
-from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.measurements import Position
-from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
-from app.vehicles.mavlink.signals import (
+from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.events import (
     AbortRequested,
     Action,
     ActionRefused,
@@ -23,15 +17,19 @@ from app.vehicles.mavlink.signals import (
     MotorsOffRequested,
     PacketReceived,
     PerformAction,
+    Position,
     RecordSample,
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
     Tick,
 )
-from app.vehicles.mavlink.states import LANDING, State
+from app.vehicles.mavlink.failures import UNHEEDED, UNHEEDED_S
+from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
-from app.vehicles.mavlink.watch import TrialObservation
+from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.trial_transitions import LANDING, State
 
 LISTEN_S: Final = 0.01
 """How long the loop is deaf to an abort, at the most."""

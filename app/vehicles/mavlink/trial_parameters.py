@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from app.vehicles.base import Identity
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import Identity, VehicleError
 from app.vehicles.mavlink.addresses import Address
+from app.vehicles.mavlink.events import Setting
 from app.vehicles.mavlink.parameters import read_parameter, write_parameter
 from app.vehicles.mavlink.radio import AutopilotLink
-from app.vehicles.mavlink.signals import Setting
 
 
 @dataclass(frozen=True, slots=True)

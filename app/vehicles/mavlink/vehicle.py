@@ -8,25 +8,34 @@ from typing import Final
 
 from app.core.clock import Clock
 from app.core.policy import Gains
-from app.vehicles.base import CheckItem, Condition, FlightOptions, FlightRecord, Identity, Sample, ShouldStop
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import (
+    CheckItem,
+    Condition,
+    FlightOptions,
+    FlightRecord,
+    Identity,
+    SafeGainsError,
+    Sample,
+    ShouldStop,
+    VehicleError,
+)
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import addresses, findings, parameters, preflight, records
-from app.vehicles.mavlink import watch as watching
+from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight, records
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
+from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
-from app.vehicles.mavlink.gains import GainStore, written
-from app.vehicles.mavlink.gauges import StatusReader
-from app.vehicles.mavlink.machine import Plan, Trial
 from app.vehicles.mavlink.opening import limits_of, open_radio
-from app.vehicles.mavlink.orders import RepeatedCommand
+from app.vehicles.mavlink.parameters import GainStore, written
 from app.vehicles.mavlink.preflight import Ground
-from app.vehicles.mavlink.signals import Action, PacketReceived, RecordSample
-from app.vehicles.mavlink.sources import AlignedAltitudeSource, AltitudeSource
-from app.vehicles.mavlink.states import QUARANTINE_STATES, TRANSITIONS, State
+from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
+from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.status import StatusReader
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
+from app.vehicles.mavlink.trial_machine import Plan, Trial
 from app.vehicles.mavlink.trial_parameters import TrialParameters, files_for
-from app.vehicles.mocap.recording import AlignedRecord, Scored, add_secondary_altitude
+from app.vehicles.mavlink.trial_transitions import QUARANTINE_STATES, TRANSITIONS, State
 
 STANDSTILL_S: Final = 1.0
 """Watched once more before arming, for between staging and flying a person may have taken his time."""
@@ -478,7 +487,7 @@ class MavlinkVehicle:
     def _keep_landing(self, trial: Trial) -> None:
         """A vehicle that could not be landed within its trial is told to land all the same, as long as it is armed and
         no person flies it."""
-        by_hand = findings.find_taken_over(trial.watch, trial.plan.limits) is not None
+        by_hand = limit_checks.find_taken_over(trial.watch, trial.plan.limits) is not None
         if not by_hand and not self._radio.is_disarmed and self._order is None:
             with suppress(LinkError):
                 self._order = RepeatedCommand(self._radio, Action.LAND, by_person=False)

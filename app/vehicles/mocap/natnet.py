@@ -11,9 +11,9 @@ from typing import Final, Protocol
 from natnet import NatNetClient, NatNetError, Version
 
 from app.core.clock import Clock
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import VehicleError
+from app.vehicles.mavlink.altitude_sources import SourceSample
 from app.vehicles.mavlink.link import Received
-from app.vehicles.mavlink.sources import SourceSample
 from app.vehicles.mocap.addresses import NatNetAddress
 from app.vehicles.mocap.stream import SILENT_S, PoseStream
 

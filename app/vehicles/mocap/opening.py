@@ -1,7 +1,7 @@
 """Opens the second source of altitude that a text names."""
 
 from app.core.clock import Clock
-from app.vehicles.mavlink.sources import AltitudeSource
+from app.vehicles.mavlink.altitude_sources import AltitudeSource
 from app.vehicles.mocap.addresses import NatNetAddress, OdometryAddress, StreamAddress, parse
 from app.vehicles.mocap.natnet import NatNetSource
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource

@@ -4,7 +4,7 @@ import math
 from collections import deque
 from typing import Final
 
-from app.vehicles.mavlink.sources import SourceSample
+from app.vehicles.mavlink.altitude_sources import SourceSample
 
 SILENT_S: Final = 1.0
 KEPT: Final = 20_000

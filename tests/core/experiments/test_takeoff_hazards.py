@@ -27,7 +27,7 @@ from app.core.models.vertical_hazards import (
 )
 from app.core.policy import Gains
 from app.vehicles.base import FlightOptions, StopRequest
-from app.vehicles.open import open_vehicle
+from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 
 SAFE: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}

@@ -11,7 +11,7 @@ from app.core.records.glitches import find_glitches, repaired
 from app.core.records.trajectory import Samples, Trajectory
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.vehicles.base import FlightOptions, OptionValue, StopRequest
-from app.vehicles.open import open_vehicle
+from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 
 DATA = Path(__file__).parents[2] / "data"

@@ -8,7 +8,7 @@ from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.models.f16 import ELEMENTS, SYSTEM, perturbed
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.identification import Fit, identify
-from app.vehicles.lti import LOG_NOISE
+from app.vehicles.f16 import LOG_NOISE
 from tests.vehicles.flying import HAND, TRACKING, flown
 
 MODEL = PitchTracking({"model_seed": 50})

@@ -21,15 +21,15 @@ from app.simdrone.body import TICK_S
 from app.simdrone.drone import Lockstep
 from app.simdrone.motion_capture import open_outlet
 from app.simdrone.registry import Make
-from app.vehicles import open as open_module
+from app.vehicles import registry as open_module
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import Message, text
-from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Transport, open_transport
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
 from tests.simdrone.ground import switched_on

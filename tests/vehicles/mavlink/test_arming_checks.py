@@ -20,7 +20,7 @@ from app.vehicles.mavlink.arming_checks import (
     ArmingChecks,
 )
 from app.vehicles.mavlink.dialects import COMMON
-from app.vehicles.mavlink.measurements import VehicleEvent
+from app.vehicles.mavlink.events import VehicleEvent
 from app.vehicles.mavlink.profiles import PROFILES
 from tests.logs.recorded import recorded
 

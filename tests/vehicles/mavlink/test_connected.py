@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from app.vehicles.base import FlightOptions, Identity, Sample, StopRequest
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, StopRequest, VehicleError
 from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

@@ -13,13 +13,12 @@ import pytest
 from app.simdrone import faults
 from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
-from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest, VehicleError
 from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY
 from app.vehicles.mavlink.dialects import Message
-from app.vehicles.mavlink.kind import MAVLINK
-from app.vehicles.mavlink.measurements import VehicleEvent
+from app.vehicles.mavlink.events import VehicleEvent
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mavlink_kind import MAVLINK
 from tests.vehicles.flying import never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_connected import connected

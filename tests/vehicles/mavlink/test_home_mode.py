@@ -8,8 +8,7 @@ import pytest
 from app.simdrone.body import Autopilot, Body, OutgoingMessage
 from app.simdrone.paparazzi import HOME, NAV, Paparazzi
 from app.simdrone.registry import Make
-from app.vehicles.base import FlightOptions, FlightRecord
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, never, unwatched

@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.measurements import BlockEntered
-from app.vehicles.mavlink.signals import (
+from app.vehicles.mavlink.events import (
     AbortRequested,
     Action,
     ActionDone,
+    BlockEntered,
     MotorsOffRequested,
     SecondaryAltitudeReceived,
 )
-from app.vehicles.mavlink.states import State
-from tests.vehicles.mavlink.test_machine import STAGES
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.trial_transitions import State
+from tests.vehicles.mavlink.test_trial_machine import STAGES
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 TAKE_OFF, STANDBY, LAND_BLOCK = 4, 5, 14

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.vehicles.mavlink.measurements import Position
+from app.vehicles.mavlink.events import Position
 from app.vehicles.mavlink.preflight import GroundObservation
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))

@@ -9,9 +9,10 @@ import pytest
 
 from app.core.errors import GainsError
 from app.core.experiments import get_experiment
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.dialects import FieldValue, Message, number, text
-from app.vehicles.mavlink.measurements import (
+from app.vehicles.mavlink.events import (
+    Action,
     Battery,
     Block,
     BlockCount,
@@ -22,12 +23,12 @@ from app.vehicles.mavlink.measurements import (
     Measurement,
     Parameter,
     Position,
+    Setting,
     Version,
 )
 from app.vehicles.mavlink.parameters import settings
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Target, check_gains
-from app.vehicles.mavlink.signals import Action, Setting
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 
 PAPARAZZI, ARDUPILOT, PX4 = (PROFILES[name] for name in ("paparazzi", "ardupilot", "px4"))

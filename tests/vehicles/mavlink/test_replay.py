@@ -8,12 +8,8 @@ import pytest
 
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
-from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.measurements import Position
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.signals import (
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.events import (
     Action,
     ActionDone,
     Command,
@@ -21,12 +17,16 @@ from app.vehicles.mavlink.signals import (
     GainsRestored,
     PacketReceived,
     PerformAction,
+    Position,
     RecordSample,
     RestoreGains,
     Setting,
     Tick,
 )
-from app.vehicles.mavlink.states import State
+from app.vehicles.mavlink.failures import Limits
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.trial_transitions import State
 from tests.vehicles.mavlink.replaying import FLOWN, Recorded, messages, recorded
 
 PAPARAZZI = PROFILES["paparazzi"]

@@ -8,8 +8,14 @@ from app.simdrone.body import Autopilot, Body
 from app.simdrone.paparazzi import Paparazzi
 from app.simdrone.paparazzi_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
 from app.simdrone.registry import Make
-from app.vehicles.base import FlightOptions, FlightRecord, StopRequest
-from app.vehicles.errors import InterruptedByOrderError, SafeGainsError, VehicleError
+from app.vehicles.base import (
+    FlightOptions,
+    FlightRecord,
+    InterruptedByOrderError,
+    SafeGainsError,
+    StopRequest,
+    VehicleError,
+)
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle

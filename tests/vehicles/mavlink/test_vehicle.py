@@ -7,12 +7,19 @@ import pytest
 
 from app.core.errors import InputError
 from app.core.experiments.takeoff import Takeoff
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, StopRequest
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import (
+    FlightOptions,
+    FlightRecord,
+    OptionValue,
+    SafeGainsError,
+    Sample,
+    StopRequest,
+    VehicleError,
+)
 from app.vehicles.mavlink.dialects import number, text
-from app.vehicles.mavlink.kind import MAVLINK
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
-from app.vehicles.open import open_vehicle
+from app.vehicles.mavlink_kind import MAVLINK
+from app.vehicles.registry import open_vehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig

@@ -2,32 +2,30 @@
 
 from dataclasses import dataclass, field
 
-from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.limits import Limits
-from app.vehicles.mavlink.machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.measurements import (
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.events import (
     DISARMING,
+    Action,
+    ActionDone,
     Battery,
+    Command,
     CommandReply,
+    Event,
+    GainsRestored,
     Heartbeat,
     LandedState,
     Measurement,
-    Position,
-)
-from app.vehicles.mavlink.signals import (
-    Action,
-    ActionDone,
-    Command,
-    Event,
-    GainsRestored,
     PacketReceived,
     PerformAction,
+    Position,
     RecordSample,
     SendGain,
     Setting,
     Tick,
 )
-from app.vehicles.mavlink.states import State
+from app.vehicles.mavlink.failures import Limits
+from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
+from app.vehicles.mavlink.trial_transitions import State
 
 GROUND_M = 0.1
 STEP_S = 0.02

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from app.simdrone.motion_capture import MocapOutput, MotionCapture, open_outlet
-from app.vehicles.mavlink.sources import AltitudeSource, SourceSample
+from app.vehicles.mavlink.altitude_sources import AltitudeSource, SourceSample
 from app.vehicles.mocap.addresses import SourceAddress
 
 LOOPBACK: Final = "127.0.0.1"

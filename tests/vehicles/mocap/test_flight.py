@@ -9,9 +9,8 @@ import pytest
 
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.glitches import find_glitches
-from app.vehicles.base import FlightRecord, OptionValue
-from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.base import FlightRecord, OptionValue, VehicleError
+from app.vehicles.mavlink_kind import MAVLINK
 from tests.simdrone.ground import free_port
 from tests.vehicles.flying import SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig

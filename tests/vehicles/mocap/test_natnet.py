@@ -11,7 +11,7 @@ import pytest
 
 from app.core.clock import ScaledClock
 from app.simdrone.motion_capture import MocapFrame, NatNetServer, frame_packet
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import VehicleError
 from app.vehicles.mocap import natnet
 from app.vehicles.mocap.addresses import NatNetAddress
 from app.vehicles.mocap.natnet import NatNetSource

@@ -8,7 +8,7 @@ from contextlib import closing
 import pytest
 
 from app.core.clock import ScaledClock
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, FieldValue
 from app.vehicles.mavlink.link import Received

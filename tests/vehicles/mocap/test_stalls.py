@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from app.vehicles.mavlink.measurements import Position
-from app.vehicles.mavlink.signals import PacketReceived, SecondaryAltitudeReceived
-from app.vehicles.mavlink.states import State
+from app.vehicles.mavlink.events import PacketReceived, Position, SecondaryAltitudeReceived
 from app.vehicles.mavlink.trial import in_order
+from app.vehicles.mavlink.trial_transitions import State
 from tests.vehicles.mavlink.walking import TrialDriver
 
 

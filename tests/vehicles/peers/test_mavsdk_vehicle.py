@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.vehicles.base import FlightOptions, OptionValue, Vehicle
-from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.kind import MAVLINK
-from app.vehicles.mavlink.machine import Plan
+from app.vehicles.base import FlightOptions, OptionValue, Vehicle, VehicleError
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.open import open_vehicle
+from app.vehicles.mavlink.trial_machine import Plan
+from app.vehicles.mavlink_kind import MAVLINK
+from app.vehicles.registry import open_vehicle
 from tests.vehicles.flying import never, unwatched
 from tests.vehicles.mavlink.speaking import free_port
 from tests.vehicles.peers.mavsdk_vehicle import FLOATS, INTEGERS, MAKE, MavsdkVehicle

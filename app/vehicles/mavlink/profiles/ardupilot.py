@@ -5,10 +5,9 @@ from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
-from app.vehicles.mavlink.measurements import DISARMING, Measurement
+from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
-from app.vehicles.mavlink.signals import Action, Setting
 
 GUIDED: Final = 4
 LAND: Final = 9

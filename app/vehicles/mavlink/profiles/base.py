@@ -19,7 +19,8 @@ from app.vehicles.mavlink.dialects import (
     source_system,
     text,
 )
-from app.vehicles.mavlink.measurements import (
+from app.vehicles.mavlink.events import (
+    Action,
     Battery,
     CommandReply,
     FenceBreach,
@@ -28,10 +29,10 @@ from app.vehicles.mavlink.measurements import (
     Measurement,
     Parameter,
     Position,
+    Setting,
     StatusText,
     Version,
 )
-from app.vehicles.mavlink.signals import Action, Setting
 
 ARMED_BIT: Final = 128
 ARM_DISARM: Final = 400

@@ -4,13 +4,21 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from app.vehicles.errors import VehicleError
+from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.dialects import PAPARAZZI as DIALECT
 from app.vehicles.mavlink.dialects import Message, number, text
-from app.vehicles.mavlink.measurements import Block, BlockCount, BlockEntered, CommandReply, Measurement, Version
+from app.vehicles.mavlink.events import (
+    Action,
+    Block,
+    BlockCount,
+    BlockEntered,
+    CommandReply,
+    Measurement,
+    Setting,
+    Version,
+)
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
-from app.vehicles.mavlink.signals import Action, Setting
 
 HOLDING: Final = "Holding point"
 START_ENGINE: Final = "Start Engine"

@@ -6,11 +6,10 @@ from types import MappingProxyType
 from typing import Final
 
 from app.vehicles.mavlink.dialects import COMMON, Message, number
-from app.vehicles.mavlink.measurements import DISARMING, Measurement, Parameter, VehicleEvent
+from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.ardupilot import request_telemetry, request_version
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
-from app.vehicles.mavlink.signals import Action, Setting
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 

@@ -9,7 +9,7 @@ from app.core.tuning.corrected_model import uncorrected_model
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategies.identified import foresee
 from app.core.tuning.strategy import Proposal
-from app.vehicles.lti import LOG_NOISE
+from app.vehicles.f16 import LOG_NOISE
 from tests.core.tuning.flying import compiled_only
 from tests.core.tuning.test_identification import MODEL, flight
 from tests.vehicles.flying import HAND, TRACKING

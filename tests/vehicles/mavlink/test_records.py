@@ -8,7 +8,7 @@ import pytest
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.glitches import find_glitches
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.mocap.recording import add_secondary_altitude
+from app.vehicles.mavlink.records import add_secondary_altitude
 
 ZERO_S = 700.0
 """The record's time 0 on the ground's clock."""

@@ -4,13 +4,12 @@ from pathlib import Path
 
 import pytest
 
-import app.vehicles.open as opening
+import app.vehicles.registry as opening
 from app.core.errors import InputError
 from app.core.policy import Gains
-from app.vehicles.base import Vehicle
-from app.vehicles.errors import SafeGainsError, VehicleError
+from app.vehicles.base import SafeGainsError, Vehicle, VehicleError
 from app.vehicles.kinds import Options, VehicleKind
-from app.vehicles.open import VEHICLE_KINDS, check_options, get_kind, open_vehicle
+from app.vehicles.registry import VEHICLE_KINDS, check_options, get_kind, open_vehicle
 from app.vehicles.simulated import SimulatedVehicle, Simulation
 from tests.vehicles.flying import SAFE, TUNED
 

@@ -2,10 +2,9 @@
 
 from typing import Final
 
-from app.vehicles.mavlink import agreement
-from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import HEARTBEATS_MISSED, Limits
-from app.vehicles.mavlink.watch import (
+from app.vehicles.mavlink import secondary_altitude
+from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding, Limits
+from app.vehicles.mavlink.observation import (
     TrialObservation,
     has_unreliable_position,
     is_behind_climb_rate,
@@ -132,7 +131,7 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
 def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if watch.stuck_s > limits.stuck_s:
         return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
-    return agreement.find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
+    return secondary_altitude.find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
 
 
 def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:

@@ -6,21 +6,25 @@ from itertools import pairwise
 
 import pytest
 
-from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.machine import Plan
-from app.vehicles.mavlink.measurements import FenceBreach, Heartbeat, Measurement, Parameter, Position
-from app.vehicles.mavlink.signals import (
+from app.vehicles.mavlink.events import (
     AbortRequested,
     Action,
     ActionDone,
     ActionRefused,
     DuplicateVehicleDetected,
+    FenceBreach,
+    Heartbeat,
+    Measurement,
+    Parameter,
     PerformAction,
+    Position,
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
 )
-from app.vehicles.mavlink.states import TRANSITIONS, State
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.trial_machine import Plan
+from app.vehicles.mavlink.trial_transitions import TRANSITIONS, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 ABORT = "the operator pressed Abort"

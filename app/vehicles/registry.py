@@ -1,21 +1,40 @@
-"""The vehicles there are, and the one way to take control of one."""
+"""The kinds of vehicle, and the one way to take control of one. Of the kind `import`, flights come in as files."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NoReturn
 
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
-from app.vehicles.base import OptionValue, Vehicle
-from app.vehicles.errors import SafeGainsError
-from app.vehicles.imported import IMPORT
-from app.vehicles.jsbsim.kind import JSBSIM
-from app.vehicles.kinds import VehicleKind
-from app.vehicles.lti import LTI
-from app.vehicles.mavlink.kind import MAVLINK
+from app.vehicles.base import OptionValue, SafeGainsError, Vehicle, VehicleError
+from app.vehicles.f16 import LTI
+from app.vehicles.jsbsim import JSBSIM
+from app.vehicles.kinds import Options, VehicleKind
+from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.twin import TWIN
+
+
+def _open(_options: Options, _safe_gains: Gains, _trial_parameters: Path | None) -> NoReturn:
+    raise VehicleError(
+        "This vehicle flies elsewhere, so this program cannot fly it.",
+        hint="Fly the proposed gains yourself, then upload the flight's log, or a CSV with the columns time_s and "
+        "altitude_m.",
+    )
+
+
+IMPORT: Final = VehicleKind(
+    name="import",
+    title="Flown elsewhere",
+    line="You fly the proposed gains on your own vehicle and upload its log, or the altitude as CSV.",
+    is_real=True,
+    can_fly=False,
+    experiments=("takeoff", "takeoff-ardupilot", "takeoff-px4"),
+    options=(),
+    open=_open,
+)
+
 
 VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
     {kind.name: kind for kind in (JSBSIM, TWIN, LTI, MAVLINK, IMPORT)}

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Final
 
+from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.signals import SecondaryAltitudeReceived
 
 MAX_DIFFERENCE_M: Final = 0.3
 APART_S: Final = 0.3

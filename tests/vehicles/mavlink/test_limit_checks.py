@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import pytest
 
-from app.vehicles.mavlink import findings
-from app.vehicles.mavlink import watch as watching
+from app.vehicles.mavlink import limit_checks
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.events import Battery, FenceBreach, Heartbeat, Measurement, Position
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.measurements import Battery, FenceBreach, Heartbeat, Measurement, Position
-from app.vehicles.mavlink.watch import TrialObservation
+from app.vehicles.mavlink.observation import TrialObservation
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS
 
 START_S = 10.0
@@ -28,17 +28,17 @@ def told(watch: TrialObservation, *measurements: Measurement | None, at_s: float
 
 
 def envelope(watch: TrialObservation, *, settling: bool = True) -> str | None:
-    finding = findings.find_envelope(watch, LIMITS, ground_m=GROUND_M, settling=settling)
+    finding = limit_checks.find_envelope(watch, LIMITS, ground_m=GROUND_M, settling=settling)
     return None if finding is None else finding.why
 
 
 def test_a_hover_keeps_every_limit() -> None:
     watch = told(watch_of(3.0, 3.0, 3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.05)
     assert envelope(watch) is None
-    assert findings.find_link(watch, LIMITS, 10.1) is None
-    assert findings.find_frozen(watch, LIMITS, 10.3) is None
-    assert findings.find_battery(watch, 10.1) is None
-    assert findings.find_unexpected(watch, LIMITS, LIMITS.flying_modes) is None
+    assert limit_checks.find_link(watch, LIMITS, 10.1) is None
+    assert limit_checks.find_frozen(watch, LIMITS, 10.3) is None
+    assert limit_checks.find_battery(watch, 10.1) is None
+    assert limit_checks.find_unexpected(watch, LIMITS, LIMITS.flying_modes) is None
 
 
 def test_the_corridor_is_measured_from_the_ground_under_the_vehicle() -> None:
@@ -112,16 +112,16 @@ def test_more_than_three_glitches_are_too_many() -> None:
 
 def test_a_second_without_any_packet_is_a_lost_link() -> None:
     watch = watch_of(3.0)
-    assert findings.find_link(watch, LIMITS, 11.0) is None
-    lost = findings.find_link(watch, LIMITS, 11.01)
+    assert limit_checks.find_link(watch, LIMITS, 11.0) is None
+    lost = limit_checks.find_link(watch, LIMITS, 11.01)
     assert lost is not None
     assert lost.failure is Failure.LINK
 
 
 def test_any_packet_keeps_the_link_but_three_missed_heartbeats_lose_it() -> None:
     watch = told(watch_of(3.0), None, at_s=11.7)
-    assert findings.find_link(watch, LIMITS, 11.74) is None
-    lost = findings.find_link(watch, LIMITS, 11.8)
+    assert limit_checks.find_link(watch, LIMITS, 11.74) is None
+    lost = limit_checks.find_link(watch, LIMITS, 11.8)
     assert lost is not None
     assert lost.why == "Three heartbeats were missed."
 
@@ -134,53 +134,53 @@ def repeated(watch: TrialObservation, *, until_s: float) -> TrialObservation:
 
 
 def test_a_clock_that_stands_still_among_packets_is_frozen() -> None:
-    assert findings.find_frozen(repeated(watch_of(3.0), until_s=10.24), LIMITS, 10.3) is None
-    frozen = findings.find_frozen(repeated(watch_of(3.0), until_s=10.28), LIMITS, 10.3)
+    assert limit_checks.find_frozen(repeated(watch_of(3.0), until_s=10.24), LIMITS, 10.3) is None
+    frozen = limit_checks.find_frozen(repeated(watch_of(3.0), until_s=10.28), LIMITS, 10.3)
     assert frozen is not None
     assert frozen.failure is Failure.FROZEN
 
 
 def test_what_a_stall_delayed_may_come_in_any_order() -> None:
     watch = told(watch_of(3.0), Heartbeat(9, True, "4"), Battery(12.4), at_s=10.8)
-    assert findings.find_frozen(watch, LIMITS, 10.3) is None
+    assert limit_checks.find_frozen(watch, LIMITS, 10.3) is None
 
 
 def test_a_position_that_stays_away_among_other_packets_is_frozen_too() -> None:
     watch = watch_of(3.0)
     for beat in range(1, 4):
         watch = told(watch, Heartbeat(9, True, "4"), at_s=10.0 + beat * 0.5)
-    assert findings.find_frozen(watch, LIMITS, 10.3) is not None
+    assert limit_checks.find_frozen(watch, LIMITS, 10.3) is not None
 
 
 def test_silence_alone_is_not_frozen() -> None:
     watch = watch_of(3.0, 3.0)
     watch, _ = watching.update(watch, Position(10.9, 3.0, 0.0), 10.9, LIMITS)
-    assert findings.find_frozen(watch, LIMITS, 10.3) is None
+    assert limit_checks.find_frozen(watch, LIMITS, 10.3) is None
 
 
 def test_a_packet_that_was_overtaken_is_left_out_and_a_clock_that_falls_back_is_a_reboot() -> None:
     watch = told(watch_of(3.0, 3.0), Position(10.0, 3.0, 0.0), at_s=10.03)
-    assert findings.find_unexpected(replace(watch, armed=True), LIMITS, frozenset()) is None
+    assert limit_checks.find_unexpected(replace(watch, armed=True), LIMITS, frozenset()) is None
     watch = told(watch, Position(0.5, 3.0, 0.0), at_s=10.04)
-    assert findings.find_unexpected(replace(watch, armed=True), LIMITS, frozenset()) is None
+    assert limit_checks.find_unexpected(replace(watch, armed=True), LIMITS, frozenset()) is None
     watch = told(watch, Position(0.7, 3.0, 0.0), at_s=10.24)
     watch = told(watch, Position(0.92, 3.0, 0.0), at_s=10.46)
-    reboot = findings.find_unexpected(replace(watch, armed=True), LIMITS, frozenset())
+    reboot = limit_checks.find_unexpected(replace(watch, armed=True), LIMITS, frozenset())
     assert reboot is not None
     assert reboot.why == "The vehicle rebooted."
 
 
 def test_a_battery_is_low_after_a_second_below_the_limit() -> None:
     watch = told(watch_of(3.0), Battery(10.4), at_s=10.1)
-    assert findings.find_battery(watch, 11.1) is None
-    assert findings.find_battery(watch, 11.2) is not None
-    assert findings.find_battery(told(watch, Battery(10.6), at_s=10.9), 11.2) is None
+    assert limit_checks.find_battery(watch, 11.1) is None
+    assert limit_checks.find_battery(watch, 11.2) is not None
+    assert limit_checks.find_battery(told(watch, Battery(10.6), at_s=10.9), 11.2) is None
 
 
 def test_a_battery_that_says_nothing_for_ten_seconds_counts_as_low() -> None:
     watch = told(watch_of(3.0), Battery(12.0), at_s=10.1)
-    assert findings.find_battery(watch, 20.0) is None
-    silent = findings.find_battery(watch, 20.2)
+    assert limit_checks.find_battery(watch, 20.0) is None
+    silent = limit_checks.find_battery(watch, 20.2)
     assert silent is not None
     assert silent.why == "No battery voltage was heard for 10 s."
 
@@ -200,7 +200,9 @@ def test_a_disarming_and_a_strange_mode_are_unexpected_once_heartbeats_agree() -
         (disarmed, "The vehicle disarmed itself in the air."),
         (strange, "The vehicle went into mode Failsafe."),
     ):
-        found = [findings.find_unexpected(beating(*[beat] * count), named, LIMITS.flying_modes) for count in (1, 2, 3)]
+        found = [
+            limit_checks.find_unexpected(beating(*[beat] * count), named, LIMITS.flying_modes) for count in (1, 2, 3)
+        ]
         assert found[:2] == [None, None]
         assert found[2] is not None
         assert found[2].why == why
@@ -208,10 +210,10 @@ def test_a_disarming_and_a_strange_mode_are_unexpected_once_heartbeats_agree() -
 
 def test_a_mode_in_which_a_person_flies_is_a_take_over() -> None:
     named = replace(LIMITS, mode_names={"64": "By hand"})
-    taken = findings.find_taken_over(beating(*[Heartbeat(9, True, "64")] * 3), named)
+    taken = limit_checks.find_taken_over(beating(*[Heartbeat(9, True, "64")] * 3), named)
     assert taken is not None
     assert (taken.failure, taken.why) == (Failure.TAKEN_OVER, "The vehicle went into mode By hand.")
-    assert findings.find_taken_over(beating(*[Heartbeat(9, False, "64")] * 3), named) is None
+    assert limit_checks.find_taken_over(beating(*[Heartbeat(9, False, "64")] * 3), named) is None
 
 
 def test_the_ground_takes_height_and_speed_and_a_fresh_sample() -> None:

@@ -7,13 +7,32 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from app.vehicles.mavlink import agreement, findings, ground
-from app.vehicles.mavlink import watch as watching
-from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, land_every_s
-from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
-from app.vehicles.mavlink.moves import (
+from app.vehicles.mavlink import ground, limit_checks, secondary_altitude
+from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.events import (
+    AbortRequested,
+    Action,
+    ActionDone,
+    ActionRefused,
+    Command,
+    DuplicateVehicleDetected,
+    Event,
+    GainsRestored,
+    Heartbeat,
+    MotorsOffRequested,
+    PacketReceived,
+    PerformAction,
+    RecordSample,
+    RestoreGains,
+    SecondaryAltitudeReceived,
+    confirms_motors_off,
+)
+from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, Finding, land_every_s
+from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.trial_transitions import (
+    COMMANDED,
     Plan,
+    State,
     Step,
     Trial,
     abort,
@@ -26,24 +45,6 @@ from app.vehicles.mavlink.moves import (
     send_gains,
     stop_motors,
 )
-from app.vehicles.mavlink.signals import (
-    AbortRequested,
-    Action,
-    ActionDone,
-    ActionRefused,
-    Command,
-    DuplicateVehicleDetected,
-    Event,
-    GainsRestored,
-    MotorsOffRequested,
-    PacketReceived,
-    PerformAction,
-    RecordSample,
-    RestoreGains,
-    SecondaryAltitudeReceived,
-)
-from app.vehicles.mavlink.states import COMMANDED, State
-from app.vehicles.mavlink.watch import TrialObservation
 
 __all__ = ["Plan", "Trial", "advance", "begin"]
 
@@ -98,7 +99,7 @@ def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
     """Note a pilot's mode that only one heartbeat told of."""
     if trial.state not in _STATES_WITH_TRIAL_GAINS or not _modes(trial):
         return trial
-    finding = findings.find_interruption(trial.watch, watch, trial.plan.limits)
+    finding = limit_checks.find_interruption(trial.watch, watch, trial.plan.limits)
     return trial if finding is None else note(trial, finding)
 
 
@@ -106,7 +107,7 @@ def _with_fall(trial: Trial) -> Trial:
     """A fall is noted wherever it happens, unless a person has asked for it."""
     if trial.stopped or trial.commanded_s is None or trial.doubt:
         return trial
-    fall = findings.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
+    fall = limit_checks.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
     return trial if fall is None else note(trial, fall)
 
 
@@ -127,7 +128,7 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
         return fail(ground.measure(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
-    if finding := findings.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
+    if finding := limit_checks.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(ground.measure(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
@@ -157,7 +158,7 @@ def _take_off(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m):
         return enter(trial, State.RECORD, now_s), ()
-    if finding := findings.find_altitude_behind(trial.watch):
+    if finding := limit_checks.find_altitude_behind(trial.watch):
         return fail(trial, finding, now_s)
     if isinstance(event, ActionRefused):
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
@@ -232,7 +233,7 @@ def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
 
 def _doubting(trial: Trial) -> Trial:
     """While it lands for another reason, what puts it in doubt is remembered."""
-    finding = _changed(trial) if trial.commanded_s is not None else findings.find_doubled(trial.watch)
+    finding = _changed(trial) if trial.commanded_s is not None else limit_checks.find_doubled(trial.watch)
     return trial if finding is None else note(trial, finding)
 
 
@@ -352,32 +353,32 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     plan, watch = trial.plan, trial.watch
     return (
         _taken_over(trial)
-        or findings.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
-        or (findings.find_interrupted_climb(watch, plan.limits) if _modes(trial) else None)
-        or findings.find_doubled(watch)
-        or findings.find_link(watch, plan.limits, now_s)
-        or findings.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
-        or findings.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
-        or findings.find_frozen(watch, plan.limits, now_s)
-        or findings.find_lost_position(watch, plan.limits, now_s)
-        or agreement.find_disagreement(watch.second)
-        or findings.find_battery(watch, now_s)
+        or limit_checks.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
+        or (limit_checks.find_interrupted_climb(watch, plan.limits) if _modes(trial) else None)
+        or limit_checks.find_doubled(watch)
+        or limit_checks.find_link(watch, plan.limits, now_s)
+        or limit_checks.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
+        or limit_checks.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
+        or limit_checks.find_frozen(watch, plan.limits, now_s)
+        or limit_checks.find_lost_position(watch, plan.limits, now_s)
+        or secondary_altitude.find_disagreement(watch.second)
+        or limit_checks.find_battery(watch, now_s)
     )
 
 
 def _envelope(trial: Trial) -> Finding | None:
-    return findings.find_envelope(trial.watch, trial.plan.limits, ground_m=trial.plan.ground_m, settling=False)
+    return limit_checks.find_envelope(trial.watch, trial.plan.limits, ground_m=trial.plan.ground_m, settling=False)
 
 
 def _taken_over(trial: Trial) -> Finding | None:
     """By a person, as heartbeats show that have certainly seen the command."""
-    return findings.find_taken_over(trial.watch, trial.plan.limits) if _modes(trial) else None
+    return limit_checks.find_taken_over(trial.watch, trial.plan.limits) if _modes(trial) else None
 
 
 def _changed(trial: Trial) -> Finding | None:
     """What is not told of a vehicle that lands; that its motors stop then is no surprise."""
     watch = replace(trial.watch, armed=True)
-    return findings.find_doubled(watch) or findings.find_unexpected(
+    return limit_checks.find_doubled(watch) or limit_checks.find_unexpected(
         watch, trial.plan.limits, _modes(trial), _blocks(trial)
     )
 

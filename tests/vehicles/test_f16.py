@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.vehicles.lti import LOG_NOISE, whole_flight
-from app.vehicles.open import open_vehicle
+from app.vehicles.f16 import LOG_NOISE, whole_flight
+from app.vehicles.registry import open_vehicle
 from tests.vehicles.flying import HAND, TRACKING, Watcher, flown, fly
 
 RUNAWAY = HAND | {"theta_3": 0.0, "theta_4": -57.3, "theta_5": -57.3, "theta_6": 0.5}

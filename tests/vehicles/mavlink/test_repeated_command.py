@@ -6,13 +6,12 @@ from typing import Any, cast
 
 import pytest
 
+from app.vehicles.mavlink.events import Action, BlockEntered, Heartbeat, Measurement, PacketReceived, Position
 from app.vehicles.mavlink.link import Link
-from app.vehicles.mavlink.measurements import BlockEntered, Heartbeat, Measurement, Position
-from app.vehicles.mavlink.orders import RepeatedCommand
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Target
 from app.vehicles.mavlink.radio import AutopilotLink
-from app.vehicles.mavlink.signals import Action, PacketReceived
+from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from tests.clocks import SimulatedClock
 
 GUIDED, STABILIZE, LAND = "4", "0", "9"

@@ -32,12 +32,11 @@ from app.vehicles.base import (
     ShouldStop,
     StopRequest,
     Vehicle,
+    VehicleError,
     VehicleOption,
 )
-from app.vehicles.errors import VehicleError
-from app.vehicles.holding import accept_gains
 from app.vehicles.kinds import Options, VehicleKind
-from app.vehicles.pacing import Pacer
+from app.vehicles.simulated import Pacer, accept_gains
 
 GAIN_NAMES: Final = PitchTracking.space.names
 LOG_NOISE: Final = np.array([3.0, math.radians(0.1), 0.5, math.radians(0.2), math.radians(0.1)])

@@ -3,12 +3,10 @@
 from itertools import takewhile
 from typing import Final
 
-from app.vehicles.errors import VehicleError
-from app.vehicles.mavlink.failures import UNHEEDED
-from app.vehicles.mavlink.limits import DESCENDING_M_S, REPEAT_S, UNHEEDED_S, land_every_s
-from app.vehicles.mavlink.measurements import Heartbeat, confirms_motors_off
+from app.vehicles.base import VehicleError
+from app.vehicles.mavlink.events import Action, Heartbeat, PacketReceived, confirms_motors_off
+from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, UNHEEDED, UNHEEDED_S, land_every_s
 from app.vehicles.mavlink.radio import AutopilotLink
-from app.vehicles.mavlink.signals import Action, PacketReceived
 
 STOPPING_S: Final = 5.0
 """For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""

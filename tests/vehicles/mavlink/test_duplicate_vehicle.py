@@ -6,7 +6,7 @@ from itertools import chain
 
 import pytest
 
-from app.vehicles.mavlink.speakers import DuplicateDetector
+from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
 
 Packet = tuple[float, int, bytes, float]
 """When it comes, its sequence number, its frame, the vehicle's time that it tells."""

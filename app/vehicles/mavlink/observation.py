@@ -8,10 +8,8 @@ the one before, or whose clock cannot, is doubted until more of its kind have co
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.vehicles.mavlink import agreement
-from app.vehicles.mavlink.agreement import SecondaryAltitude
-from app.vehicles.mavlink.limits import GROUND_M, Limits
-from app.vehicles.mavlink.measurements import (
+from app.vehicles.mavlink import secondary_altitude
+from app.vehicles.mavlink.events import (
     Battery,
     BlockEntered,
     FenceBreach,
@@ -19,8 +17,10 @@ from app.vehicles.mavlink.measurements import (
     LandedState,
     Measurement,
     Position,
+    SecondaryAltitudeReceived,
 )
-from app.vehicles.mavlink.signals import SecondaryAltitudeReceived
+from app.vehicles.mavlink.failures import GROUND_M, Limits
+from app.vehicles.mavlink.secondary_altitude import SecondaryAltitude
 
 RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
@@ -162,7 +162,7 @@ def sight(watch: TrialObservation, sighted: SecondaryAltitudeReceived) -> TrialO
     """The memory after the second source of altitude spoke."""
     second = watch.second or SecondaryAltitude(heard_s=sighted.now_s)
     vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sighted.now_s) else None
-    return replace(watch, second=agreement.update(second, sighted, vehicle_m))
+    return replace(watch, second=secondary_altitude.update(second, sighted, vehicle_m))
 
 
 def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObservation:
@@ -211,7 +211,7 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """By what it says of itself, or by where the second source sees it, whatever its altitude."""
     says_so = watch.landed is False and now_s - watch.landed_s < AGREED_S
-    seen_m = agreement.current_altitude_m(watch.second, now_s)
+    seen_m = secondary_altitude.current_altitude_m(watch.second, now_s)
     return says_so or (seen_m is not None and seen_m - ground_m > GROUND_M)
 
 

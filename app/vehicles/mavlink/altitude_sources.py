@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.vehicles.mavlink.events import SecondaryAltitudeReceived
 from app.vehicles.mavlink.link import Received
-from app.vehicles.mavlink.signals import SecondaryAltitudeReceived
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
